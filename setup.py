@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes into wheels and source distributions of which commit they are; pyproject.toml says all else."""
+"""Writes into wheels and source distributions of which commit they are;
+pyproject.toml says all else.
+"""
 
 import runpy
 from pathlib import Path

@@ -1,48 +1,55 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clouds and fog of water droplets: extinction and phase function, from Mie's theory over the sizes of the droplets.
+"""Clouds and fog of water droplets: extinction and phase function, from Mie's theory over
+the sizes of the droplets.
 
 The modified gamma distribution (Bouthors 2008, eq. 3) has the number of droplets by radius
 
     N(r) = N_0 / (Gamma(gamma) r_n) (r/r_n)^(gamma - 1) exp(-r/r_n).
 
-Its moments are <r^k> = r_n^k Gamma(gamma + k)/Gamma(gamma): the mean square radius is gamma (gamma + 1) r_n^2, the
-effective radius r_e = <r^3>/<r^2> = (gamma + 2) r_n.
+Its moments are <r^k> = r_n^k Gamma(gamma + k)/Gamma(gamma): the mean square radius is gamma
+(gamma + 1) r_n^2, the effective radius r_e = <r^3>/<r^2> = (gamma + 2) r_n.
 
 **Extinction.** A droplet takes Q_ext pi r^2 out of a beam, hence
 
     kappa = N_0 <Q_ext pi r^2> = N_0 pi <r^2> Q,        Q = <Q_ext r^2>/<r^2>.
 
-Equation 4 of the paper prints kappa = N_0 pi r_e^2: it has the square of the effective radius for the mean square
-radius, (gamma + 2)^2 for gamma (gamma + 1), and lacks Q. For gamma = 2 the one is 2.67 times too much, the other 2.14
-times too little. `Optics.printed_extinction` is the printed value.
+Equation 4 of the paper prints kappa = N_0 pi r_e^2: it has the square of the effective radius for
+the mean square radius, (gamma + 2)^2 for gamma (gamma + 1), and lacks Q. For gamma = 2 the one is
+2.67 times too much, the other 2.14 times too little. `Optics.printed_extinction` is the printed
+value.
 
-**Sizes.** With u = r/r_n both averages have the weight u^(gamma + 1) exp(-u). The rule is the midpoint rule between the
-quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption has resonances too narrow for any rule: the rule
-samples them at random, and the error falls as slowly as the number of sizes grows. The sizes of the rule are therefore
-part of the definition of a phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says what more
-sizes would change.
+**Sizes.** With u = r/r_n both averages have the weight u^(gamma + 1) exp(-u). The rule is the
+midpoint rule between the quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption
+has resonances too narrow for any rule: the rule samples them at random, and the error falls as
+slowly as the number of sizes grows. The sizes of the rule are therefore part of the definition of a
+phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says what more sizes
+would change.
 
-**Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at most in the cosine: 2
-S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and products of two of these have at most
-twice that degree. Hence Gauss-Legendre nodes, one more than N_largest each way, give all Legendre moments exactly,
+**Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at
+most in the cosine: 2 S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and
+products of two of these have at most twice that degree. Hence Gauss-Legendre nodes, one more than
+N_largest each way, give all Legendre moments exactly,
 
     p(cos) = sum_l (2 l + 1) chi_l P_l(cos),      chi_l = (1/2) int p P_l dcos,      chi_0 = 1, chi_1 = g,
 
-and the series equals the function at any cosine. Values come from a cubic spline over the angle through values of the
-series at sixteen angles for each of its terms; the spline differs from the series by less than 1e-8 of the value.
+and the series equals the function at any cosine. Values come from a cubic spline over the angle
+through values of the series at sixteen angles for each of its terms; the spline differs from the
+series by less than 1e-8 of the value.
 
-**The modified phase function** (the paper's appendix, after Lenoble 1985) cuts the forward peak: light that a droplet
-deflects by less than 5 degrees counts as not scattered. Let f be the fraction of the light that is cut out of p. The
-rest is p_cut/(1 - f), of mean 1, and, so that the same light is scattered into other directions as before,
+**The modified phase function** (the paper's appendix, after Lenoble 1985) cuts the forward peak:
+light that a droplet deflects by less than 5 degrees counts as not scattered. Let f be the fraction
+of the light that is cut out of p. The rest is p_cut/(1 - f), of mean 1, and, so that the same light
+is scattered into other directions as before,
 
     kappa' = (1 - albedo f) kappa,        albedo' = albedo (1 - f)/(1 - albedo f).
 
-The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy. Here nothing is left
-below the angle, and the density is lowered by the fraction that is cut.
+The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy.
+Here nothing is left below the angle, and the density is lowered by the fraction that is cut.
 
-Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the full phase function
-divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa p.
-With kappa' and the albedo itself the divisor is 1 - albedo f.
+Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the
+full phase function divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since
+albedo' kappa' p/(1 - f) = albedo kappa p. With kappa' and the albedo itself the divisor is 1 -
+albedo f.
 """
 
 from dataclasses import dataclass
@@ -58,12 +65,14 @@ from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 
-#: Refractive index of water by the wavelength [um] (Hale and Querry 1973, interpolated; the imaginary part is below
-#: 2e-8 and left out: droplets of the sizes here lose less than 1e-5 of the light).
+#: Refractive index of water by the wavelength [um] (Hale and Querry 1973, interpolated; the
+#: imaginary part is below 2e-8 and left out: droplets of the sizes here lose less than 1e-5 of the
+#: light).
 WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}
 
-#: Sizes in the average up to r_e = 6 um; beyond, fewer in inverse proportion, but at least a quarter. *Measured* at
-#: 6 um, green: twice as many move Q by 1.1e-4, g by 4e-5, the phase function by 0.1 % (median), 0.8 % (largest).
+#: Sizes in the average up to r_e = 6 um; beyond, fewer in inverse proportion, but at least a
+#: quarter. *Measured* at 6 um, green: twice as many move Q by 1.1e-4, g by 4e-5, the phase function
+#: by 0.1 % (median), 0.8 % (largest).
 SIZES = 6400
 
 _RADII = (2.0, 50.0)  # r_e [um]
@@ -91,12 +100,15 @@ class Droplets:
         low, high = _RADII
         if not low <= self.effective_radius <= high:
             raise InputError(
-                f"the effective radius is {self.effective_radius} um; expected {low:g} to {high:g} um, the droplets of "
+                f"the effective radius is {self.effective_radius} um; expected {low:g} to {high:g} "
+                "um, the droplets of "
                 "fog and clouds"
             )
         for name in ("gamma", "number"):
             if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"{name} of the droplets is {getattr(self, name)}; expected a number above 0")
+                raise InputError(
+                    f"{name} of the droplets is {getattr(self, name)}; expected a number above 0"
+                )
 
     @property
     def scale(self) -> float:
@@ -114,9 +126,12 @@ class Droplets:
         return round(SIZES * min(1.0, max(0.25, 6 / self.effective_radius)))
 
     def nodes(self, count: int) -> tuple[Array, Array]:
-        """Return `count` radii in increasing order [um] and weights of an average weighted by r^2 [1]."""
+        """Return `count` radii in increasing order [um] and weights of an
+        average weighted by r^2 [1].
+        """
         low, high = (
-            inverse(self.gamma + 2, _TAIL) for inverse in (scipy.special.gammaincinv, scipy.special.gammainccinv)
+            inverse(self.gamma + 2, _TAIL)
+            for inverse in (scipy.special.gammaincinv, scipy.special.gammainccinv)
         )
         u = low + (high - low) * (np.arange(count) + 0.5) / count
         density = np.exp((self.gamma + 1) * np.log(u / (self.gamma + 1)) - (u - self.gamma - 1))
@@ -125,7 +140,9 @@ class Droplets:
 
 @dataclass(frozen=True)
 class Optics:
-    """How droplets extinguish and scatter light of one wavelength; call it with cosines for the phase function."""
+    """How droplets extinguish and scatter light of one wavelength; call it with
+    cosines for the phase function.
+    """
 
     droplets: Droplets
     wavelength: float  #: [um]
@@ -147,7 +164,13 @@ class Optics:
     @property
     def extinction(self) -> float:
         """Return kappa = N_0 pi <r^2> Q [1/m]."""
-        return self.droplets.number * np.pi * self.droplets.mean_square_radius * 1e-12 * self.q_extinction
+        return (
+            self.droplets.number
+            * np.pi
+            * self.droplets.mean_square_radius
+            * 1e-12
+            * self.q_extinction
+        )
 
     @property
     def mean_free_path(self) -> float:
@@ -162,7 +185,9 @@ class Optics:
     def series(self, cos_scatter: ArrayLike) -> Array:
         """Return the phase function [1] at cosines of any shape, by its Legendre series."""
         terms = (2 * np.arange(len(self.chi)) + 1) * self.chi
-        return np.asarray(np.polynomial.legendre.legval(np.asarray(cos_scatter, dtype=np.float64), terms))
+        return np.asarray(
+            np.polynomial.legendre.legval(np.asarray(cos_scatter, dtype=np.float64), terms)
+        )
 
     def moments(self, count: int) -> Array:
         """Return the first Legendre moments chi_l [1], (count,)."""
@@ -180,7 +205,9 @@ class Optics:
         return self.from_half(0.5 - 0.5 * c, 0.5 + 0.5 * c)
 
     def from_half(self, down: Array, up: Array) -> Array:
-        """Return the phase function [1] from sin^2 and cos^2 of half the scattering angle, arrays of one shape."""
+        """Return the phase function [1] from sin^2 and cos^2 of half the scattering
+        angle, arrays of one shape.
+        """
         return self.spline(2 * np.arctan2(np.sqrt(down), np.sqrt(up)))
 
     def fraction(self, low: float, high: float) -> float:
@@ -189,23 +216,32 @@ class Optics:
 
 
 @lru_cache(maxsize=32)
-def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes: int | None = None) -> Optics:
+def optics(
+    droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes: int | None = None
+) -> Optics:
     """Return how droplets extinguish and scatter light.
 
-    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air [um], one of `WATER`;
-    `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises InputError for another wavelength.
+    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air
+    [um], one of `WATER`; `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises
+    InputError for another wavelength.
 
-    Valid for all `Droplets`. Takes some seconds at r_e = 6 um, and a minute at 50 um; the results are kept.
+    Valid for all `Droplets`. Takes some seconds at r_e = 6 um, and a minute at 50
+    um; the results are kept.
     """
     kinds = droplets or Droplets()
     if wavelength not in WATER:
-        raise InputError(f"the wavelength is {wavelength} um; expected {', '.join(f'{each:g}' for each in WATER)} um")
+        raise InputError(
+            f"the wavelength is {wavelength} um; expected "
+            f"{', '.join(f'{each:g}' for each in WATER)} um"
+        )
     m = complex(WATER[wavelength])
     radius, weight = kinds.nodes(sizes or kinds.sizes)
     x = 2 * np.pi * radius / wavelength
     count = terms(float(x[-1]))
     nodes, fractions = np.polynomial.legendre.leggauss(2 * count + 1)
-    blocks = [(part, *coefficients(x[part], m)) for part in np.array_split(np.arange(len(x)), _BLOCKS)]
+    blocks = [
+        (part, *coefficients(x[part], m)) for part in np.array_split(np.arange(len(x)), _BLOCKS)
+    ]
     extinction = scattering = 0.0
     for part, a, b in blocks:
         efficiency = summed(x[part], a, b)
@@ -215,9 +251,14 @@ def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes:
     for start in range(0, len(nodes), _COLUMNS):
         chosen = slice(start, start + _COLUMNS)
         pi, tau = angular_functions(nodes[chosen], count)
-        # An intensity is 2 (|S_1|^2 + |S_2|^2)/(x^2 Q_sca) with weights Q_sca: the sizes' own Q_sca cancels.
-        phase[chosen] = sum(2 * (weight[part] / x[part] ** 2) @ intensities(a, b, pi, tau) for part, a, b in blocks)
-    return Optics(kinds, wavelength, m, extinction, scattering, _moments(nodes, fractions, phase, 2 * count))
+        # An intensity is 2 (|S_1|^2 + |S_2|^2)/(x^2 Q_sca) with weights Q_sca: the
+        # sizes' own Q_sca cancels.
+        phase[chosen] = sum(
+            2 * (weight[part] / x[part] ** 2) @ intensities(a, b, pi, tau) for part, a, b in blocks
+        )
+    return Optics(
+        kinds, wavelength, m, extinction, scattering, _moments(nodes, fractions, phase, 2 * count)
+    )
 
 
 @dataclass(frozen=True)
@@ -230,16 +271,22 @@ class Modified:
 
     @cached_property
     def removed(self) -> float:
-        """The fraction of the light that is cut out of the phase function, and by which the density is lowered [1]."""
+        """The fraction of the light that is cut out of the phase function, and by which
+        the density is lowered [1].
+        """
         return self.full.fraction(0, self.angle)
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
-        """Return the phase function [1] at cosines of the scattering angle, of any shape; its mean is 1."""
+        """Return the phase function [1] at cosines of the scattering angle, of
+        any shape; its mean is 1.
+        """
         c = np.asarray(cos_scatter, dtype=np.float64)
         return self.from_half(0.5 - 0.5 * c, 0.5 + 0.5 * c)
 
     def from_half(self, down: Array, up: Array) -> Array:
-        """Return the phase function [1] from sin^2 and cos^2 of half the scattering angle, arrays of one shape."""
+        """Return the phase function [1] from sin^2 and cos^2 of half the scattering
+        angle, arrays of one shape.
+        """
         edge = np.sin(np.deg2rad(0.5 * self.angle)) ** 2
         return np.where(down < edge, 0.0, self.full.from_half(down, up)) / (1 - self.removed)
 
@@ -256,7 +303,9 @@ def _moments(cos_scatter: Array, weights: Array, values: Array, count: int) -> A
 
 
 def _integral(phase: Optics, low: float, high: float) -> float:
-    """Return (1/2) int p dcos between two angles [degrees]: half the series, a sum of (P_{l+1} - P_{l-1}) chi_l."""
+    """Return (1/2) int p dcos between two angles [degrees]: half the series, a sum of
+    (P_{l+1} - P_{l-1}) chi_l.
+    """
     edges = np.cos(np.deg2rad([high, low]))
     before, last = np.ones(2), edges.copy()
     total = 0.5 * np.array(edges)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two Gauss-Kronrod pairs: of 10 and 21 nodes, as in QUADPACK's qk21 (Piessens et al. 1983), and of 3 and 7 nodes.
+"""Two Gauss-Kronrod pairs: of 10 and 21 nodes, as in QUADPACK's qk21 (Piessens et al.
+1983), and of 3 and 7 nodes.
 
-Every second node of Kronrod, from the second on, is one of Gauss's, so one evaluation gives two integrals. The rules of
-Kronrod with 21 and 7 nodes are exact for polynomials up to degree 31 and 11, those of Gauss up to degree 19 and 5.
+Every second node of Kronrod, from the second on, is one of Gauss's, so one evaluation gives two
+integrals. The rules of Kronrod with 21 and 7 nodes are exact for polynomials up to degree 31 and
+11, those of Gauss up to degree 19 and 5.
 """
 
 from dataclasses import dataclass
@@ -61,7 +63,9 @@ class Pair:
     weights: NDArray[np.float64]  #: of Kronrod and of Gauss at these nodes, (n, 2)
 
 
-def _pair(half_nodes: tuple, half_kronrod: tuple, middle: float, half_gauss: tuple, gauss_middle: float) -> Pair:
+def _pair(
+    half_nodes: tuple, half_kronrod: tuple, middle: float, half_gauss: tuple, gauss_middle: float
+) -> Pair:
     """Return a pair from what lies left of the middle, and the weights there."""
     half = np.zeros(len(half_nodes))
     half[1::2] = half_gauss
@@ -74,4 +78,6 @@ def _pair(half_nodes: tuple, half_kronrod: tuple, middle: float, half_gauss: tup
 #: 10 and 21 nodes.
 WIDE = _pair(_HALF_NODES, _HALF_KRONROD, 0.149445554002916905664936468389821, _HALF_GAUSS, 0.0)
 #: 3 and 7 nodes.
-NARROW = _pair(_HALF_NODES_OF_7, _HALF_KRONROD_OF_7, 0.450916538658474142345110087045571, (5 / 9,), 8 / 9)
+NARROW = _pair(
+    _HALF_NODES_OF_7, _HALF_KRONROD_OF_7, 0.450916538658474142345110087045571, (5 / 9,), 8 / 9
+)

@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scattering of a plane wave by a homogeneous sphere (Mie 1908), in NumPy.
 
-A sphere of radius r has the size x = 2 pi r / wavelength and the refractive index m = n + i k relative to what is
-around it, k >= 0 where it absorbs. With the Riccati-Bessel functions psi_n(x) = x j_n(x), chi_n(x) = -x y_n(x) and
-xi_n = psi_n - i chi_n, and the logarithmic derivative D_n = psi_n'/psi_n, the fields outside have the coefficients
-(Bohren and Huffman 1983, eq. 4.88)
+A sphere of radius r has the size x = 2 pi r / wavelength and the refractive index m = n + i k
+relative to what is around it, k >= 0 where it absorbs. With the Riccati-Bessel functions psi_n(x) =
+x j_n(x), chi_n(x) = -x y_n(x) and xi_n = psi_n - i chi_n, and the logarithmic derivative D_n =
+psi_n'/psi_n, the fields outside have the coefficients (Bohren and Huffman 1983, eq. 4.88)
 
     a_n = [(D_n(m x)/m + n/x) psi_n(x) - psi_{n-1}(x)] / [(D_n(m x)/m + n/x) xi_n(x) - xi_{n-1}(x)]
     b_n = [(m D_n(m x) + n/x) psi_n(x) - psi_{n-1}(x)] / [(m D_n(m x) + n/x) xi_n(x) - xi_{n-1}(x)].
 
-**Recurrences.** psi and chi obey f_{n+1} = (2n + 1)/x f_n - f_{n-1} (eq. 4.83). Upwards chi grows and is stable; psi
-falls beyond n = x and takes up an error of about epsilon chi_n, which is epsilon in a_n. D_n is stable downwards (eq.
-4.89), D_{n-1} = n/z - 1/(D_n + n/z): a step divides an error by (D_n + n/z)^2, which is about 1 up to n = |z| and
-grows beyond. The transition is |z|^(1/3) wide, so the start, from zero, is eight such widths beyond |z| and 16 terms
-more. (Bohren and Huffman's own program starts at |z| + 15; *measured*, that loses 1e-5 of Q_ext at x = 100, m = 1.33.)
+**Recurrences.** psi and chi obey f_{n+1} = (2n + 1)/x f_n - f_{n-1} (eq. 4.83). Upwards chi grows
+and is stable; psi falls beyond n = x and takes up an error of about epsilon chi_n, which is epsilon
+in a_n. D_n is stable downwards (eq. 4.89), D_{n-1} = n/z - 1/(D_n + n/z): a step divides an error
+by (D_n + n/z)^2, which is about 1 up to n = |z| and grows beyond. The transition is |z|^(1/3) wide,
+so the start, from zero, is eight such widths beyond |z| and 16 terms more. (Bohren and Huffman's
+own program starts at |z| + 15; *measured*, that loses 1e-5 of Q_ext at x = 100, m = 1.33.)
 
-**Terms.** The coefficients fall fast beyond n = x; Wiscombe (1980, Appl. Opt. 19, 1505) found the numbers of terms
-that serve, x + 4 x^(1/3) + 1 up to x = 8, x + 4.05 x^(1/3) + 2 up to 4200, x + 4 x^(1/3) + 2 above.
+**Terms.** The coefficients fall fast beyond n = x; Wiscombe (1980, Appl. Opt. 19, 1505) found the
+numbers of terms that serve, x + 4 x^(1/3) + 1 up to x = 8, x + 4.05 x^(1/3) + 2 up to 4200, x + 4
+x^(1/3) + 2 above.
 
 **Sums** (eqs 4.61, 4.62, 4.82, p. 120). With Q the cross section over pi r^2,
 
@@ -30,7 +32,8 @@ that serve, x + 4 x^(1/3) + 1 up to x = 8, x + 4.05 x^(1/3) + 2 up to 4200, x + 
 
     pi_n = (2n - 1)/(n - 1) cos pi_{n-1} - n/(n - 1) pi_{n-2}    tau_n = n cos pi_n - (n + 1) pi_{n-1},
 
-and unpolarised light is scattered as 2 (|S_1|^2 + |S_2|^2) / (x^2 Q_sca), whose mean over the sphere is 1.
+and unpolarised light is scattered as 2 (|S_1|^2 + |S_2|^2) / (x^2 Q_sca), whose
+mean over the sphere is 1.
 """
 
 import math
@@ -52,7 +55,9 @@ _LARGEST = 2e4  # size up to which the recurrences were tried
 
 @dataclass(frozen=True)
 class Efficiencies:
-    """Cross sections of spheres over their geometric cross sections; arrays of the shape of the sizes."""
+    """Cross sections of spheres over their geometric cross sections; arrays
+    of the shape of the sizes.
+    """
 
     extinction: Array  #: Q_ext [1]
     scattering: Array  #: Q_sca [1]
@@ -71,11 +76,12 @@ def terms(size: float) -> int:
 def coefficients(size: ArrayLike, index: complex) -> tuple[Complex, Complex]:
     """Return the coefficients a_n and b_n of spheres [1], (terms, sizes) each; row n - 1 holds n.
 
-    `size`: x = 2 pi r / wavelength of each sphere [1], (sizes,); `index`: m = n + i k, the refractive index relative to
-    the surroundings [1], k >= 0. Raises InputError for a size outside 1e-6 to 2e4 or an index that is no refractive
-    index.
+    `size`: x = 2 pi r / wavelength of each sphere [1], (sizes,); `index`: m = n + i k, the
+    refractive index relative to the surroundings [1], k >= 0. Raises InputError for a size outside
+    1e-6 to 2e4 or an index that is no refractive index.
 
-    Valid for what `InputError` does not name. Beyond a sphere's own number of terms its coefficients are 0.
+    Valid for what `InputError` does not name. Beyond a sphere's own number of
+    terms its coefficients are 0.
     """
     x, m = checked(size, index)
     own = np.array([terms(each) for each in x])
@@ -92,23 +98,29 @@ def coefficients(size: ArrayLike, index: complex) -> tuple[Complex, Complex]:
         chi, chi_before = np.where(needed, (2 * n - 1) / x * chi - chi_before, 1.0), chi
         xi, xi_before = psi - 1j * chi, psi_before - 1j * chi_before
         electric, magnetic = derivative[n] / inner + n / x, derivative[n] * inner + n / x
-        a[n - 1] = np.where(needed, (electric * psi - psi_before) / (electric * xi - xi_before), 0.0)
-        b[n - 1] = np.where(needed, (magnetic * psi - psi_before) / (magnetic * xi - xi_before), 0.0)
+        a[n - 1] = np.where(
+            needed, (electric * psi - psi_before) / (electric * xi - xi_before), 0.0
+        )
+        b[n - 1] = np.where(
+            needed, (magnetic * psi - psi_before) / (magnetic * xi - xi_before), 0.0
+        )
     return a, b
 
 
 def efficiencies(size: ArrayLike, index: complex) -> Efficiencies:
     """Return the efficiencies and mean cosines of spheres.
 
-    Parameters, `Raises` and validity are those of `coefficients`; published values for sizes up to 1e4 are met to
-    their digits.
+    Parameters, `Raises` and validity are those of `coefficients`; published values for sizes up to
+    1e4 are met to their digits.
     """
     x, _ = checked(size, index)
     return summed(x, *coefficients(x, index))
 
 
 def summed(x: Array, a: Complex, b: Complex) -> Efficiencies:
-    """Return the efficiencies of spheres of sizes x, (sizes,) [1], from their coefficients, (terms, sizes) each."""
+    """Return the efficiencies of spheres of sizes x, (sizes,) [1], from their
+    coefficients, (terms, sizes) each.
+    """
     n = np.arange(1, len(a) + 1)[:, None]
     extinction = 2 * np.sum((2 * n + 1) * (a + b).real, axis=0) / x**2
     scattering = 2 * np.sum((2 * n + 1) * (np.abs(a) ** 2 + np.abs(b) ** 2), axis=0) / x**2
@@ -121,7 +133,9 @@ def summed(x: Array, a: Complex, b: Complex) -> Efficiencies:
 
 
 def angular_functions(cos_scatter: Array, count: int) -> tuple[Array, Array]:
-    """Return pi_n and tau_n [1] at cosines of the scattering angle, (count, cosines) each; row n - 1 holds n."""
+    """Return pi_n and tau_n [1] at cosines of the scattering angle, (count, cosines)
+    each; row n - 1 holds n.
+    """
     pi = np.empty((count, len(cos_scatter)))
     tau = np.empty_like(pi)
     before, last = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
@@ -136,12 +150,13 @@ def angular_functions(cos_scatter: Array, count: int) -> tuple[Array, Array]:
 def intensities(a: Complex, b: Complex, pi: Array, tau: Array) -> Array:
     """Return |S_1|^2 + |S_2|^2 [1] of spheres, (sizes, cosines).
 
-    `a`, `b`: of `coefficients`, (terms, sizes) each; `pi`, `tau`: of `angular_functions`, at least as many terms,
-    (terms or more, cosines) each.
+    `a`, `b`: of `coefficients`, (terms, sizes) each; `pi`, `tau`: of `angular_functions`, at least
+    as many terms, (terms or more, cosines) each.
     """
     n = np.arange(1, len(a) + 1)[:, None]
     weight = (2 * n + 1) / (n * (n + 1))
-    # S_1 + S_2 takes a + b with pi + tau, S_1 - S_2 takes a - b with pi - tau, and the squares add up to twice ours.
+    # S_1 + S_2 takes a + b with pi + tau, S_1 - S_2 takes a - b with pi - tau, and the
+    # squares add up to twice ours.
     plus, minus = ((weight * each).T for each in (a + b, a - b))
     sums, differences = pi[: len(a)] + tau[: len(a)], pi[: len(a)] - tau[: len(a)]
     total = np.zeros((len(plus), pi.shape[1]))
@@ -158,11 +173,17 @@ def checked(size: ArrayLike, index: complex) -> tuple[Array, complex]:
     """
     x = np.atleast_1d(np.asarray(size, dtype=np.float64))
     if not x.size or not np.all((x >= 1e-6) & (x <= _LARGEST)):
-        raise InputError(f"the size 2 pi r/wavelength is {size!r}; expected numbers from 1e-6 to {_LARGEST:g}")
-    m = complex(index)
-    if not (math.isfinite(m.real) and math.isfinite(m.imag) and m.real > 0 and m.imag >= 0) or m == 1:
         raise InputError(
-            f"the refractive index is {index}; expected n + ik with n > 0 and k >= 0, not 1 (absorption is positive k)"
+            f"the size 2 pi r/wavelength is {size!r}; expected numbers from 1e-6 to {_LARGEST:g}"
+        )
+    m = complex(index)
+    if (
+        not (math.isfinite(m.real) and math.isfinite(m.imag) and m.real > 0 and m.imag >= 0)
+        or m == 1
+    ):
+        raise InputError(
+            f"the refractive index is {index}; expected n + ik with n > 0 and k >= 0, not 1 "
+            "(absorption is positive k)"
         )
     return x, m
 

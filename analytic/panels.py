@@ -1,28 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight integral of millions of segments in float64, each to a tolerance that its own error estimate meets.
+"""The airlight integral of millions of segments in float64, each to a tolerance that its
+own error estimate meets.
 
-The integral is taken in w = asinh((x - foot)/height) (DESIGN section 2), with E = e^w = q/h, where every quantity is
-free of cancellation and of overflow:
+The integral is taken in w = asinh((x - foot)/height) (DESIGN section 2), with E = e^w = q/h, where
+every quantity is free of cancellation and of overflow:
 
     J = (1/h) int_{w0}^{w1} exp(-sigma_t (foot + h E)) p(cos) 2E/(1 + E^2) dw
     (1 + cos)/2 = 1/(1 + E^2),      (1 - cos)/2 = E^2/(1 + E^2).
 
-A segment from the light that counts only s times in the exponent (`shadow_scale`) turns x + r into x + s r, that is
+A segment from the light that counts only s times in the exponent (`shadow_scale`) turns
+x + r into x + s r, that is
 
     foot + h (E - 1/E)/2 + s h (E + 1/E)/2  =  foot + h ((1 + s)/2 E - (1 - s)/2 1/E).
 
-Why w and why panels of one width do for all parameters: the integrand is analytic in the strip |Im w| < pi/2. Its poles
-E = +-i lie on the edge, as do those of Henyey-Greenstein, E^2 = -((1 -+ g)/(1 +- g))^2, and exp(-a E) is bounded there
-since Re E > 0. The optical thickness and the sharpness of a lobe only shift the places where the integrand changes and
-do not bring the singularities closer. Gauss rules with n nodes on a panel of half width H hence converge as rho^(-2n),
-rho = H' + sqrt(1 + H'^2), H' = pi/(2H) (Trefethen 2013, Approximation Theory and Approximation Practice, theorem 19.3).
+Why w and why panels of one width do for all parameters: the integrand is analytic in the strip |Im
+w| < pi/2. Its poles E = +-i lie on the edge, as do those of Henyey-Greenstein, E^2 = -((1 -+ g)/(1
++- g))^2, and exp(-a E) is bounded there since Re E > 0. The optical thickness and the sharpness of
+a lobe only shift the places where the integrand changes and do not bring the singularities closer.
+Gauss rules with n nodes on a panel of half width H hence converge as rho^(-2n), rho = H' + sqrt(1 +
+H'^2), H' = pi/(2H) (Trefethen 2013, Approximation Theory and Approximation Practice, theorem 19.3).
 
-Each panel is integrated by the 21 nodes of Kronrod, its error estimated by the difference from the 10 of Gauss among
-them: the estimate is that of the worse rule, an upper bound by many digits for smooth integrands. Panels of segments
-that miss the tolerance are halved until they meet it.
+Each panel is integrated by the 21 nodes of Kronrod, its error estimated by the difference from the
+10 of Gauss among them: the estimate is that of the worse rule, an upper bound by many digits for
+smooth integrands. Panels of segments that miss the tolerance are halved until they meet it.
 
-A table of a phase function cuts a segment at each of its entries. These narrow panels, of 0.1 at most, have a rho of 63
-or more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's seven suffice for a third of the work.
+A table of a phase function cuts a segment at each of its entries. These narrow panels, of 0.1 at
+most, have a rho of 63 or more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's
+seven suffice for a third of the work.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,12 +44,14 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Weight = Callable[[Array, Index], Array]
 
-_PANEL = 2.4  # width of the first panels: rho = 2.97, so that Gauss's ten nodes are right to about 1e-9 to 1e-11
+# width of the first panels: rho = 2.97, so that Gauss's ten nodes are right to about 1e-9 to 1e-11
+_PANEL = 2.4
 _NARROW = 0.1  # width in w up to which a panel has Kronrod's 7 nodes, and not 21
 _NEGLIGIBLE = 44.0  # e-folds after which the rest of a segment is below 1e-19 of it
 _CHUNK = 8192  # panels evaluated at once: 1.4 MB an array
 _HALVINGS = 40
-_NEAR_ZERO = 1e-15  # height over distance below which a light beside the segment may as well be at this height
+# height over distance below which a light beside the segment may as well be at this height
+_NEAR_ZERO = 1e-15
 _AT_LIGHT = 1e-290  # height [m] below which 1/height would overflow
 
 
@@ -85,23 +91,29 @@ def airlight_segments(
 ) -> tuple[Array, Array]:
     """Integrate the airlight of N segments of rays.
 
-    `foot`, `height`: signed distance of the foot point and distance between light and ray [m]; numbers or shape (N,).
-    `x0`, `x1`: ends of the segments along the ray [m], x0 <= x1; x1 may be infinite. `sigma_t`: extinction coefficient
-    [1/m], >= 0. `phase`: phase function, the same for all segments. `shadow_scale`: s in [0, 1]: the light's segment
-    counts s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that attenuates over shortened shadow rays
-    (DESIGN section 6.1). `weight`: relative intensity of the light: called as weight(x, index) with distances x of
-    shape (m, 7) or (m, 21) [m] and the row numbers of their segments, shape (m,); returns an array of the shape of x.
-    Where it has kinks, cut the segments there, otherwise the panels around them are halved many times. `rtol`: relative
-    tolerance, in [1e-13, 0.1]. Returns `value`, `error`: J [1/m] and an estimate of its absolute error, mostly many
-    digits too large, of shape (N,). Raises InputError for numbers out of their ranges, NaN, or arrays that do not
+    `foot`, `height`: signed distance of the foot point and distance between light and ray [m];
+    numbers or shape (N,). `x0`, `x1`: ends of the segments along the ray [m], x0 <= x1; x1 may be
+    infinite. `sigma_t`: extinction coefficient [1/m], >= 0. `phase`: phase function, the same for
+    all segments. `shadow_scale`: s in [0, 1]: the light's segment counts s times in the exponent,
+    exp(-sigma_t (x + s r)), as in a renderer that attenuates over shortened shadow rays (DESIGN
+    section 6.1). `weight`: relative intensity of the light: called as weight(x, index) with
+    distances x of shape (m, 7) or (m, 21) [m] and the row numbers of their segments, shape (m,);
+    returns an array of the shape of x. Where it has kinks, cut the segments there, otherwise the
+    panels around them are halved many times. `rtol`: relative tolerance, in [1e-13, 0.1]. Returns
+    `value`, `error`: J [1/m] and an estimate of its absolute error, mostly many digits too large,
+    of shape (N,). Raises InputError for numbers out of their ranges, NaN, or arrays that do not
     broadcast.
 
-    Valid for all finite inputs: x0 = x1 gives 0, the light on the segment +inf (error inf), the light on the ray beside
-    the segment the finite limit. A segment that cannot meet `rtol` comes back with an error estimate that says so.
+    Valid for all finite inputs: x0 = x1 gives 0, the light on the segment +inf (error inf), the
+    light on the ray beside the segment the finite limit. A segment that cannot meet `rtol` comes
+    back with an error estimate that says so.
     """
     columns = _checked(foot, height, x0, x1, sigma_t)
     if not 0 <= shadow_scale <= 1:
-        raise InputError(f"shadow_scale is {shadow_scale}; expected a number from 0 to 1 (1 is the physical value)")
+        raise InputError(
+            f"shadow_scale is {shadow_scale}; expected a number from 0 to 1 (1 is the physical "
+            "value)"
+        )
     if not 1e-13 <= rtol <= 0.1:
         raise InputError(f"rtol is {rtol}; expected a relative tolerance from 1e-13 to 0.1")
     integrand = _Integrand(phase, float(shadow_scale), weight)
@@ -112,11 +124,15 @@ def airlight_segments(
     for first in range(0, n, step):
         rows = np.arange(first, min(first + step, n))
         part = slice(first, first + len(rows))
-        value[part], error[part] = _integrate_chunk([c[part] for c in columns], rows, integrand, rtol)
+        value[part], error[part] = _integrate_chunk(
+            [c[part] for c in columns], rows, integrand, rtol
+        )
     return value, error
 
 
-def _integrate_chunk(columns: list[Array], rows: Index, integrand: _Integrand, rtol: float) -> tuple[Array, Array]:
+def _integrate_chunk(
+    columns: list[Array], rows: Index, integrand: _Integrand, rtol: float
+) -> tuple[Array, Array]:
     """Integrate the segments of one chunk; `rows` are their numbers in the caller's input."""
     value, error = np.zeros(len(rows)), np.zeros(len(rows))
     foot, height, x0, x1, _ = columns
@@ -132,18 +148,23 @@ def _integrate_chunk(columns: list[Array], rows: Index, integrand: _Integrand, r
     return value, error
 
 
-def log_distance(foot: Array, height: Array, x0: Array, x1: Array) -> tuple[Array, Array, Array, Array]:
+def log_distance(
+    foot: Array, height: Array, x0: Array, x1: Array
+) -> tuple[Array, Array, Array, Array]:
     """Return segments in w, without cancellation.
 
-    With A and B the values of w at the ends, sinh(A - B) = sinh A cosh B - cosh A sinh B = (s1 r0 - s0 r1)/h^2. Since
-    (s1 r0)^2 - (s0 r1)^2 = h^2 (s1^2 - s0^2), the width of a segment that does not hold the foot is
+    With A and B the values of w at the ends, sinh(A - B) = sinh A cosh B - cosh A sinh B = (s1 r0 -
+    s0 r1)/h^2. Since (s1 r0)^2 - (s0 r1)^2 = h^2 (s1^2 - s0^2), the width of a segment that does
+    not hold the foot is
 
         w1 - w0 = asinh( (x1 - x0) (s0 + s1) / (s1 r0 + s0 r1) ),
 
-    all sums being of one sign. The width of a segment that holds the foot is the sum of two positive terms.
+    all sums being of one sign. The width of a segment that holds the foot is the
+    sum of two positive terms.
 
-    `foot`, `height`, `x0`, `x1`: as in `airlight_segments`, arrays of one shape [m]. Returns `start`, `scale`, `width`,
-    `height`: w0, E at w0, w1 - w0, which may be infinite [1], and the height, above 0 [m].
+    `foot`, `height`, `x0`, `x1`: as in `airlight_segments`, arrays of one shape [m]. Returns
+    `start`, `scale`, `width`, `height`: w0, E at w0, w1 - w0, which may be infinite [1], and the
+    height, above 0 [m].
     """
     s0, s1 = x0 - foot, x1 - foot
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
@@ -172,10 +193,13 @@ def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segm
 
 
 def _folds(integrand: _Integrand) -> float:
-    """Return after how many e-folds of decay to stop: more where the lobe can outweigh the decay."""
+    """Return after how many e-folds of decay to stop: more where the
+    lobe can outweigh the decay.
+    """
     phase = integrand.phase
     if isinstance(phase, Tabulated) or integrand.weight is not None:
-        return 745.0  # zeros are possible: only what underflows is left out, which costs one panel more
+        # zeros are possible: only what underflows is left out, which costs one panel more
+        return 745.0
     ends = phase(np.array([-1.0, 0.0, 1.0]))
     if ends.min() == 0:
         return 745.0
@@ -184,10 +208,13 @@ def _folds(integrand: _Integrand) -> float:
 
 @dataclass(frozen=True)
 class Panels:
-    """Panels and what the two rules gave for them, arrays of shape (m,); the last three may be (m, columns)."""
+    """Panels and what the two rules gave for them, arrays of shape (m,); the last
+    three may be (m, columns).
+    """
 
     owner: Index  #: row of the segment, in its chunk
-    start: Array  #: in the variable of the integral; here the distance in w from the start of the segment
+    #: in the variable of the integral; here the distance in w from the start of the segment
+    start: Array
     width: Array
     value: Array  #: the integral by Kronrod's rule
     error: Array  #: by how much Gauss's rule differs from it
@@ -201,11 +228,13 @@ def adapted(
     count: int,
     rtol: float,
 ) -> tuple[Array, Array]:
-    """Halve the panels of all sums that miss the tolerance until none does, or only rounding is left.
+    """Halve the panels of all sums that miss the tolerance until none does,
+    or only rounding is left.
 
-    `first`: segment, start and width of the first panels; `evaluate`: integrates such panels; `row`: to which of
-    `count` sums each segment belongs; `count`: number of sums; `rtol`: relative tolerance of each [1]. Returns `value`,
-    `error`: the sums and estimates of their errors, (count,), or (count, columns): all columns share panels.
+    `first`: segment, start and width of the first panels; `evaluate`: integrates such panels;
+    `row`: to which of `count` sums each segment belongs; `count`: number of sums; `rtol`: relative
+    tolerance of each [1]. Returns `value`, `error`: the sums and estimates of their errors,
+    (count,), or (count, columns): all columns share panels.
     """
     panels = evaluate(*first)
     for _ in range(_HALVINGS):
@@ -234,17 +263,22 @@ def _summed(owner: Index, values: Array, n: int) -> Array:
 
 
 def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Array]:
-    """Cut the segments at the kinks of the phase function and into panels no wider than `_PANEL`."""
+    """Cut the segments at the kinks of the phase function and into
+    panels no wider than `_PANEL`.
+    """
     owner, start, width = cut_at_kinks(segments.start, segments.width, kinks)
     return equal_panels(owner, start, width, np.maximum(np.ceil(width / _PANEL), 1))
 
 
 def cut_at_kinks(begin: Array, width: Array, kinks: Array) -> tuple[Index, Array, Array]:
-    """Cut intervals of w at the kinks of a phase function; return their numbers, starts from `begin` on, and widths."""
+    """Cut intervals of w at the kinks of a phase function; return their numbers, starts
+    from `begin` on, and widths.
+    """
     owner: Index = np.arange(len(begin), dtype=np.int64)
     if not len(kinks):
         return owner, np.zeros(len(begin)), width
-    # cos = -tanh w, so the kinks in increasing order of w are those in decreasing order of the cosine.
+    # cos = -tanh w, so the kinks in increasing order of w are those in
+    # decreasing order of the cosine.
     at = np.clip(np.arctanh(-kinks[::-1]) - begin[:, None], 0.0, width[:, None])
     ends = np.concatenate([np.zeros((len(begin), 1)), at, width[:, None]], axis=1)
     pieces = np.diff(ends, axis=1)
@@ -252,7 +286,9 @@ def cut_at_kinks(begin: Array, width: Array, kinks: Array) -> tuple[Index, Array
     return owner, ends[owner, piece], pieces[owner, piece]
 
 
-def equal_panels(owner: Index, start: Array, width: Array, count: Array) -> tuple[Index, Array, Array]:
+def equal_panels(
+    owner: Index, start: Array, width: Array, count: Array
+) -> tuple[Index, Array, Array]:
     """Cut intervals into equal panels, `count` of each; return their owners, starts and widths."""
     times = count.astype(np.int64)
     number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
@@ -260,14 +296,18 @@ def equal_panels(owner: Index, start: Array, width: Array, count: Array) -> tupl
     return np.repeat(owner, times), np.repeat(start, times) + number * width, width
 
 
-def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array) -> Panels:
+def _evaluate(
+    segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array
+) -> Panels:
     """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
     both = np.empty((len(owner), 2))
     noise = np.empty(len(owner))
     for pair, block in blocks_by_rule(width, _CHUNK):
         panels = owner[block], start[block], width[block]
         both[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
-    return Panels(owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0]))
+    return Panels(
+        owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0])
+    )
 
 
 def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
@@ -285,7 +325,9 @@ def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
 def _evaluate_block(
     segments: _Segments, integrand: _Integrand, pair: Pair, owner: Index, start: Array, width: Array
 ) -> tuple[Array, Array]:
-    """Return the integrals of the panels by both rules, (m, 2), and the relative rounding error of the integrand."""
+    """Return the integrals of the panels by both rules, (m, 2), and the relative
+    rounding error of the integrand.
+    """
     foot, height, sigma_t = segments.foot[owner], segments.height[owner], segments.sigma_t[owner]
     middle, half = start + 0.5 * width, 0.5 * width
     e = np.exp(middle[:, None] + half[:, None] * pair.nodes)
@@ -308,7 +350,9 @@ def _evaluate_block(
         f *= integrand.weight(x, segments.index[owner])
     scale = half / height
     with np.errstate(over="ignore"):
-        size = 16 + np.abs(sigma_t * foot) + (1 + up_rate * e[:, len(pair.nodes) // 2]) * (1 + middle)
+        size = (
+            16 + np.abs(sigma_t * foot) + (1 + up_rate * e[:, len(pair.nodes) // 2]) * (1 + middle)
+        )
     return (f @ pair.weights) * scale[:, None], np.finfo(float).eps * size
 
 
@@ -318,17 +362,22 @@ def _joined(panels: Panels, keep: NDArray[np.bool_], more: Panels) -> Panels:
     return Panels(*(np.concatenate([getattr(panels, f)[keep], getattr(more, f)]) for f in fields))
 
 
-def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, sigma_t: ArrayLike) -> tuple[Array, ...]:
+def _checked(
+    foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, sigma_t: ArrayLike
+) -> tuple[Array, ...]:
     """Return the inputs as float64 arrays of one shape (N,), or refuse them."""
     names = ("foot", "height", "x0", "x1", "sigma_t")
     try:
         columns = [np.asarray(c, dtype=np.float64) for c in (foot, height, x0, x1, sigma_t)]
         columns = [np.atleast_1d(c) for c in np.broadcast_arrays(*columns)]
     except (TypeError, ValueError) as reason:
-        raise InputError(f"foot, height, x0, x1 and sigma_t do not fit together: {reason}") from None
+        raise InputError(
+            f"foot, height, x0, x1 and sigma_t do not fit together: {reason}"
+        ) from None
     if columns[0].ndim != 1:
         raise InputError(
-            f"foot, height, x0, x1 and sigma_t have the shape {columns[0].shape}; expected one column each"
+            f"foot, height, x0, x1 and sigma_t have the shape {columns[0].shape}; expected one "
+            "column each"
         )
     for name, column in zip(names, columns):
         fine = np.isfinite(column) if name != "x1" else ~np.isnan(column)
@@ -338,6 +387,13 @@ def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, s
             fine &= column >= columns[2]
         if not fine.all():
             row = int(np.argmin(fine))
-            wanted = {"height": "a number >= 0", "sigma_t": "a number >= 0", "x1": "a number >= x0, or inf"}
-            raise InputError(f"{name} of row {row} is {column[row]}; expected {wanted.get(name, 'a finite number')}")
+            wanted = {
+                "height": "a number >= 0",
+                "sigma_t": "a number >= 0",
+                "x1": "a number >= x0, or inf",
+            }
+            raise InputError(
+                f"{name} of row {row} is {column[row]}; expected "
+                f"{wanted.get(name, 'a finite number')}"
+            )
     return tuple(columns)

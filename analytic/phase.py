@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions, normalised so that their mean over the sphere is 1.
 
-The mean over the sphere is (1/2) int_{-1}^{1} p(c) dc, c the cosine of the scattering angle, +1 forward. With
+The mean over the sphere is (1/2) int_{-1}^{1} p(c) dc, c the cosine of the
+scattering angle, +1 forward. With
 
     up = (1 + c)/2 = cos^2(angle/2),    down = (1 - c)/2 = sin^2(angle/2)
 
@@ -16,15 +17,16 @@ the functions read
     hg-draine   (1 - w) hg(g_HG) + w (1 + alpha c^2)/(1 + alpha (1 + 2 g_D^2)/3) hg(g_D)
     mie, mie-modified   water droplets, `analytic.droplets`, at one wavelength
 
-The second term of `hg-draine` is Draine's function (2003, ApJ 598, 1017): the mean of c^2 over an hg is (1 + 2 g^2)/3.
-Jendersie and d'Eon (SIGGRAPH 2023 Talks) fitted both terms to fog and clouds, for diameters d of 5 to 50 um:
+The second term of `hg-draine` is Draine's function (2003, ApJ 598, 1017): the mean of c^2 over an
+hg is (1 + 2 g^2)/3. Jendersie and d'Eon (SIGGRAPH 2023 Talks) fitted both terms to fog and clouds,
+for diameters d of 5 to 50 um:
 
     g_HG = exp(-0.0990567/(d - 1.67154))            g_D = exp(-2.20679/(d + 3.91029) - 0.428934)
     alpha = exp(3.62489 - 8.29288/(d + 5.52825))    w = exp(-0.599085/(d - 0.641583) - 0.665888)
 
-Everything is evaluated from `up` and `down`, which a caller near the forward or backward direction knows without
-cancellation: 1 + g^2 - 2 g c = (1 - g)^2 + 4 g down = (1 + g)^2 - 4 g up, all terms positive in the first for g > 0, in
-the second for g < 0.
+Everything is evaluated from `up` and `down`, which a caller near the forward or backward direction
+knows without cancellation: 1 + g^2 - 2 g c = (1 - g)^2 + 4 g down = (1 + g)^2 - 4 g up, all terms
+positive in the first for g > 0, in the second for g < 0.
 """
 
 import math
@@ -52,21 +54,25 @@ class PhaseFunction:
     -----
     Valid for -1 <= cosine <= 1. Multiply by 1/(4 pi) for 1/sr.
 
-    The cosine is Mitsuba's too, as evaluated in version 3.9.1: for light that travels along +z (`wi` = -z in its
-    interaction record) `eval_pdf` with `wo` = +z gives the largest value of an 'hg' of positive g and the last value of
-    a 'tabphase'. Its values are these divided by 4 pi.
+    The cosine is Mitsuba's too, as evaluated in version 3.9.1: for light that travels along +z
+    (`wi` = -z in its interaction record) `eval_pdf` with `wo` = +z gives the largest value of an
+    'hg' of positive g and the last value of a 'tabphase'. Its values are these divided by 4 pi.
     """
 
     name: ClassVar[str]
-    is_constant: ClassVar[bool] = False  #: whether it is 1 in all directions, so that integrands can leave it out
+    #: whether it is 1 in all directions, so that integrands can leave it out
+    is_constant: ClassVar[bool] = False
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
-        """Evaluate at cosines of the scattering angle [1], any shape; the result has the same shape."""
+        """Evaluate at cosines of the scattering angle [1], any shape; the
+        result has the same shape.
+        """
         c = np.asarray(cos_scatter, dtype=np.float64)
         return self.from_half(0.5 - 0.5 * c, 0.5 + 0.5 * c)
 
     def from_half(self, down: Array, up: Array) -> Array:
-        """Evaluate from `down`, sin^2, and `up`, cos^2 of half the scattering angle [1], arrays of one shape.
+        """Evaluate from `down`, sin^2, and `up`, cos^2 of half the scattering angle
+        [1], arrays of one shape.
 
         Where both are known without cancellation, the value has none either.
         """
@@ -77,22 +83,27 @@ class PhaseFunction:
         raise NotImplementedError
 
     def mp(self, cos_scatter: Any) -> Any:
-        """Evaluate one cosine, `cos_scatter`, in mpmath at its current precision [1]; parameters are exact."""
+        """Evaluate one cosine, `cos_scatter`, in mpmath at its current precision
+        [1]; parameters are exact.
+        """
         raise NotImplementedError
 
     def series(self, degree: int) -> list[float] | None:
-        """Return the coefficients of p(-sin theta) in powers of theta up to a degree; None where there are none.
+        """Return the coefficients of p(-sin theta) in powers of theta up to a degree;
+        None where there are none.
 
-        With c = -sin theta the lobes are powers of U = (1 + c)/2 (hazy 8, murky 32) and of 1 + g^2 - 2 g c
-        (Henyey-Greenstein, -3/2), by the recurrence of J. C. P. Miller (Knuth, Seminumerical Algorithms, 4.7): U P' = n
-        U' P for P = U^n, any real n, so k U_0 P_k = sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}. U_0 = 1/2 and 1 + g^2
-        are never zero.
+        With c = -sin theta the lobes are powers of U = (1 + c)/2 (hazy 8, murky 32) and of 1 +
+        g^2 - 2 g c (Henyey-Greenstein, -3/2), by the recurrence of J. C. P. Miller (Knuth,
+        Seminumerical Algorithms, 4.7): U P' = n U' P for P = U^n, any real n, so k U_0 P_k =
+        sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}. U_0 = 1/2 and 1 + g^2 are never zero.
         """
         return None
 
     @property
     def kinks(self) -> Array:
-        """Cosines strictly between -1 and 1 at which the slope jumps, in increasing order; empty if smooth."""
+        """Cosines strictly between -1 and 1 at which the slope jumps, in
+        increasing order; empty if smooth.
+        """
         return np.empty(0)
 
 
@@ -197,7 +208,10 @@ class HenyeyGreenstein(PhaseFunction):
 
     def __post_init__(self) -> None:
         if not isinstance(self.g, (int, float, np.floating)) or not -1 < self.g < 1:
-            raise InputError(f"g is {self.g}; expected a number between -1 and 1, both excluded: give the mean cosine")
+            raise InputError(
+                f"g is {self.g}; expected a number between -1 and 1, both excluded: give the mean "
+                "cosine"
+            )
 
     def _value(self, down: Array, up: Array) -> Array:
         g = self.g
@@ -226,7 +240,8 @@ class Tabulated(PhaseFunction):
         For fewer than two values, negative or infinite ones, and those that are all 0.
     """
 
-    table: Sequence[float]  #: from cosine -1 (backward) to +1 (forward), in any unit: they are divided by their mean
+    #: from cosine -1 (backward) to +1 (forward), in any unit: they are divided by their mean
+    table: Sequence[float]
 
     name = "tabulated"
 
@@ -270,7 +285,8 @@ class HgDraine(PhaseFunction):
     def __post_init__(self) -> None:
         if not 5 <= self.diameter <= 50:
             raise InputError(
-                f"the diameter of 'hg-draine' is {self.diameter} um; expected 5 to 50 um, where the fit holds"
+                f"the diameter of 'hg-draine' is {self.diameter} um; expected 5 to 50 um, where "
+                "the fit holds"
             )
 
     @property
@@ -342,7 +358,10 @@ class Mie(PhaseFunction):
     def __post_init__(self) -> None:
         if self.wavelength not in WATER:
             known = ", ".join(f"{each:g}" for each in WATER)
-            raise InputError(f"the wavelength of '{self.name}' is {self.wavelength} um; expected one of {known} um")
+            raise InputError(
+                f"the wavelength of '{self.name}' is {self.wavelength} um; expected one of {known} "
+                "um"
+            )
 
     @property
     def _optics(self) -> Optics:
@@ -384,7 +403,8 @@ class MieModified(Mie):
         return np.cos(np.deg2rad([Modified.angle]))
 
 
-#: Makes a phase function from the numbers behind its name, by the name, and how many numbers there may be.
+#: Makes a phase function from the numbers behind its name, by the name, and how
+#: many numbers there may be.
 _NUMBERS: dict[str, tuple[Callable[..., PhaseFunction], int]] = {
     "isotropic": (Isotropic, 0),
     "rayleigh": (Rayleigh, 0),
@@ -398,25 +418,34 @@ _NUMBERS: dict[str, tuple[Callable[..., PhaseFunction], int]] = {
 }
 
 
-def _droplets(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> tuple[Droplets, float]:
+def _droplets(
+    radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
+) -> tuple[Droplets, float]:
     return Droplets(radius, gamma), wavelength
 
 
-def phase_from_words(words: str, *, g: float = 0.0, table: Sequence[float] | None = None) -> PhaseFunction:
+def phase_from_words(
+    words: str, *, g: float = 0.0, table: Sequence[float] | None = None
+) -> PhaseFunction:
     """Return a phase function by words such as 'hg', 'hg-draine:12' and 'mie:6:2:0.55'.
 
-    `words`: a name, then by colons for 'hg' g, for 'hg-draine' the diameter [um],
-    for 'mie' and 'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default; `g`: of 'hg'
-    where the words do not say it; `table`: of 'tabulated', see `Tabulated`. Raises InputError for an unknown name,
-    numbers that are none or too many of them, those out of range, and 'tabulated' without a table.
+    `words`: a name, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
+    'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default; `g`:
+    of 'hg' where the words do not say it; `table`: of 'tabulated', see `Tabulated`. Raises
+    InputError for an unknown name, numbers that are none or too many of them, those out of range,
+    and 'tabulated' without a table.
     """
     name, *cells = words.strip().lower().split(":")
     if name not in _NUMBERS:
         near = nearest(name, _NUMBERS) or "."
-        raise InputError(f"no phase function is called '{name}'{near} Use one of {', '.join(_NUMBERS)}")
+        raise InputError(
+            f"no phase function is called '{name}'{near} Use one of {', '.join(_NUMBERS)}"
+        )
     make, most = _NUMBERS[name]
     if len(cells) > most:
-        raise InputError(f"the phase function is '{words}'; expected at most {most} numbers after '{name}'")
+        raise InputError(
+            f"the phase function is '{words}'; expected at most {most} numbers after '{name}'"
+        )
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
@@ -425,7 +454,9 @@ def phase_from_words(words: str, *, g: float = 0.0, table: Sequence[float] | Non
         ) from None
     if name == "tabulated":
         if table is None:
-            raise InputError("the phase function 'tabulated' came without a table; give one, or use another name")
+            raise InputError(
+                "the phase function 'tabulated' came without a table; give one, or use another name"
+            )
         return Tabulated(table)
     if name == "hg" and not numbers:
         return HenyeyGreenstein(g)
@@ -434,7 +465,10 @@ def phase_from_words(words: str, *, g: float = 0.0, table: Sequence[float] | Non
 
 def _cosine(degree: int) -> list[float]:
     """Return the series of c = -sin theta: 0, -1, 0, 1/3!, 0, -1/5!, .."""
-    return [0.0 if k % 2 == 0 else (-1.0) ** ((k + 1) // 2) / math.factorial(k) for k in range(degree + 1)]
+    return [
+        0.0 if k % 2 == 0 else (-1.0) ** ((k + 1) // 2) / math.factorial(k)
+        for k in range(degree + 1)
+    ]
 
 
 def _product(first: list[float], second: list[float]) -> list[float]:
@@ -446,7 +480,9 @@ def _power_series(u: list[float], n: float) -> list[float]:
     """Return the series of U^n by Miller's recurrence."""
     p = [u[0] ** n]
     for k in range(1, len(u)):
-        p.append(math.fsum((n * i - (k - i)) * u[i] * p[k - i] for i in range(1, k + 1)) / (k * u[0]))
+        p.append(
+            math.fsum((n * i - (k - i)) * u[i] * p[k - i] for i in range(1, k + 1)) / (k * u[0])
+        )
     return p
 
 
@@ -463,12 +499,22 @@ def _checked_table(table: Sequence[float]) -> tuple[float, ...]:
     try:
         values = tuple(float(v) for v in table)
     except (TypeError, ValueError):
-        raise InputError(f"the table of a phase function is {table!r}; expected a list of numbers") from None
+        raise InputError(
+            f"the table of a phase function is {table!r}; expected a list of numbers"
+        ) from None
     if len(values) < 2:
-        raise InputError(f"the table of a phase function has {len(values)} value; expected at least 2, from -1 to +1")
+        raise InputError(
+            f"the table of a phase function has {len(values)} value; expected at least 2, from -1 "
+            "to +1"
+        )
     for index, value in enumerate(values):
         if not (math.isfinite(value) and value >= 0):
-            raise InputError(f"value {index} of the phase function's table is {value}; expected finite values >= 0")
+            raise InputError(
+                f"value {index} of the phase function's table is {value}; expected finite values "
+                ">= 0"
+            )
     if _table_mean(np.asarray(values)) <= 0:
-        raise InputError("all values of the phase function's table are 0; expected at least one above 0")
+        raise InputError(
+            "all values of the phase function's table are 0; expected at least one above 0"
+        )
     return values

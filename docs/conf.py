@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sphinx's settings. The pages are built by `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs`."""
+"""Sphinx's settings. The pages are built by `.venv/bin/python -m sphinx -W
+--keep-going docs airlight-docs`.
+"""
 
 import sys
 from pathlib import Path

@@ -1,54 +1,60 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The side under test: real-time single scattering in Dr.Jit, float32 and float64 from one source.
 
-A scene is read once, a method says of each light which radiance the lit media scatter into the camera rays, and a frame
-adds that to the surfaces. Mitsuba only reads the scene and casts rays. Nothing here imports the reference side
-(`analytic`, `reference`) or what compares both sides.
+A scene is read once, a method says of each light which radiance the lit media scatter into the
+camera rays, and a frame adds that to the surfaces. Mitsuba only reads the scene and casts rays.
+Nothing here imports the reference side (`analytic`, `reference`) or what compares both sides.
 
 Rooms:
 
 - `errors.py`: the exceptions for mistakes of the user and for a missing driver;
 - `child_process.py`: a process for work that may hang, started, asked and ended;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
-- `transforms.py`: transforms of Mitsuba's plugins, and which of them lights and spheres cannot have;
+- `transforms.py`: transforms of Mitsuba's plugins, and which of them lights
+  and spheres cannot have;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, fast functions, Gauss-Legendre nodes;
 - `droplets.py`: phase functions of the droplets of fog and clouds;
 - `area_lights/`: area lights, and the samples that stand for them;
-- `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
-- `scene/media/`: media; a new one, such as height fog, goes there, and its page says what it must write;
+- `scene/`: camera, lights, phase functions and meshes, read from Mitsuba; the
+  features of a scene; what moves;
+- `scene/media/`: media; a new one, such as height fog, goes there, and its page
+  says what it must write;
 - `rays.py`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
-- `image_filters.py`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
+- `image_filters.py`: Gaussian, bilateral and joint bilateral filters of whole
+  images, and up-sampling;
 - `kernels/`: the airlight integral between two distances along a ray in a homogeneous medium;
 - `export/`: kernels as shader code;
 - `intervals.py`: the lit intervals of rays and their sum;
 - `clouds/`: light scattered more than once;
-- `methods/`: the methods, in `methods/interface/` what all of them share with frames, and in `methods/published/` what
-  papers do otherwise;
+- `methods/`: the methods, in `methods/interface/` what all of them share with frames, and in
+  `methods/published/` what papers do otherwise;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
-**One frame, from XML to pixel**: the files of this room that `airlight render hall --method shadow-planes` passes, in
-this order, as `python docs/tools/frame_path.py hall shadow-planes` lists them.
+**One frame, from XML to pixel**: the files of this room that `airlight render hall --method
+shadow-planes` passes, in this order, as `python docs/tools/frame_path.py hall shadow-planes` lists
+them.
 
-1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and `scene/lights.py` the
-   parts, and `scene/triangle_table.py` what shading needs of triangles. Arrays come from `numerics/array_types.py`.
-2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters
-   (`parameters.py`), and later the view of the rays that it renders. `methods/interface/media_checks.py` refuses media
-   that it does not render.
-3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights, by
-   `numerics/recorded.py`.
-4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang together,
-   `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
+1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and
+   `scene/lights.py` the parts, and `scene/triangle_table.py` what shading needs of triangles.
+   Arrays come from `numerics/array_types.py`.
+2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its
+   parameters (`parameters.py`), and later the view of the rays that it renders.
+   `methods/interface/media_checks.py` refuses media that it does not render.
+3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of
+   lights, by `numerics/recorded.py`.
+4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang
+   together, `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
    `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light
    (`numerics/functions.py`).
 5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
 6. `rays.py` says where each ray of the view passes the light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
-8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the kernel,
-   `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and that how far a panel may reach
-   (`scene/rule_reach.py`).
-9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
-   `frame/light_on_ray.py` checks that all of it is finite.
+8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the
+   kernel, `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and that how far a
+   panel may reach (`scene/rule_reach.py`).
+9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings
+   both to the host; `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A process for work that may hang, or end its process: the code and the shaders of users.
 
-The caller sends messages and waits for one answer to each; a process that does not answer in time is ended. It leads a
-group, so that all that it started ends with it, and it ends with its caller, however the caller ends.
+The caller sends messages and waits for one answer to each; a process that does not answer in time
+is ended. It leads a group, so that all that it started ends with it, and it ends with its caller,
+however the caller ends.
 """
 
 import math
@@ -21,7 +22,8 @@ from typing import Any
 
 from airlight.errors import InputError
 
-_LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
+# that a user's method may take for one scene or command [s]
+_LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"
 _LONGEST = 2e6  # s: the system waits for an answer 2^31 ms at most, which are 24 days
 
 
@@ -35,7 +37,10 @@ def method_limit() -> float:
     with suppress(ValueError):
         if 0 < float(given) <= _LONGEST:
             return float(given)
-    raise InputError(f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0 up to {_LONGEST:g}, such as 300 [s]")
+    raise InputError(
+        f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0 up to {_LONGEST:g}, such as 300 "
+        "[s]"
+    )
 
 
 class ChildProcess:
@@ -100,9 +105,13 @@ class ChildProcess:
                 return self._connection.recv()
         except (EOFError, OSError):
             how = _how(self._process.wait())
-            raise EndedError(f"{self._name}: ended its process, {how}; expected an answer or an exception") from None
+            raise EndedError(
+                f"{self._name}: ended its process, {how}; expected an answer or an exception"
+            ) from None
         self.end()
-        raise EndedError(f"{self._name}: no answer within {self._limit:g} s; its process was ended{self._hint}")
+        raise EndedError(
+            f"{self._name}: no answer within {self._limit:g} s; its process was ended{self._hint}"
+        )
 
 
 def _end(process: subprocess.Popen, connection: Connection) -> None:
@@ -125,7 +134,9 @@ def _how(status: int) -> str:
 
 
 def connection_to_caller() -> Connection:
-    """Return the connection to the caller, in a process that `ChildProcess` started: it ends with the caller."""
+    """Return the connection to the caller, in a process that `ChildProcess` started:
+    it ends with the caller.
+    """
     threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
     return Connection(int(sys.argv[2]))
 

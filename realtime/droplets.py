@@ -3,29 +3,33 @@
 
 **The phase function of droplets as a cosine series of the scattering angle.**
 
-The sizes are those of Bouthors 2008, eq. 3: with u = r/r_n the weight of an average over the cross sections is
-u^(gamma + 1) exp(-u), r_n = r_e/(gamma + 2). The rule takes the same midpoints as `analytic.droplets`: spheres have
-resonances too narrow for any rule, so the sizes are part of what is computed.
+The sizes are those of Bouthors 2008, eq. 3: with u = r/r_n the weight of an average over the cross
+sections is u^(gamma + 1) exp(-u), r_n = r_e/(gamma + 2). The rule takes the same midpoints as
+`analytic.droplets`: spheres have resonances too narrow for any rule, so the sizes are part of what
+is computed.
 
-Amplitudes of N terms are polynomials of degree N in the cosine, their squares of degree 2 N at most. As a function of
-the angle the square is a sum of cos(k angle), k <= 2 N, and its values at 2 N + 1 equally spaced angles from 0 to 180
-degrees give the coefficients exactly (a discrete cosine transform of type 1). The mean over the sphere of a cosine
-series is the sum over even k of a_k/(1 - k^2), which scales it to 1.
+Amplitudes of N terms are polynomials of degree N in the cosine, their squares of degree 2 N at
+most. As a function of the angle the square is a sum of cos(k angle), k <= 2 N, and its values at 2
+N + 1 equally spaced angles from 0 to 180 degrees give the coefficients exactly (a discrete cosine
+transform of type 1). The mean over the sphere of a cosine series is the sum over even k of a_k/(1 -
+k^2), which scales it to 1.
 
 **The amplitudes of light that spheres without absorption scatter (Mie 1908), in real arithmetic.**
 
-`analytic.mie` has complex coefficients by Bohren and Huffman's recurrences. Here the coefficients are phase shifts (van
-de Hulst 1957, section 10.21): for a real refractive index m and the size x = 2 pi r/wavelength,
+`analytic.mie` has complex coefficients by Bohren and Huffman's recurrences. Here the coefficients
+are phase shifts (van de Hulst 1957, section 10.21): for a real refractive index m and the size x =
+2 pi r/wavelength,
 
     a_n = p_n/(p_n - i q_n),   p_n = psi_n'(y) psi_n(x) - m psi_n(y) psi_n'(x),   y = m x,
                                q_n = psi_n'(y) chi_n(x) - m psi_n(y) chi_n'(x),
 
-and b_n with the factor m at the first terms, where psi_n(x) = x j_n(x) and chi_n(x) = -x y_n(x). Divided by psi_n(y),
-each p and q needs the logarithmic derivative D = psi_n'(y)/psi_n(y) alone.
+and b_n with the factor m at the first terms, where psi_n(x) = x j_n(x) and chi_n(x) = -x y_n(x).
+Divided by psi_n(y), each p and q needs the logarithmic derivative D = psi_n'(y)/psi_n(y) alone.
 
-**Ratios.** R_n = psi_n/psi_{n-1} follows from the three-term recurrence as 1/R_n = (2n + 1)/x - R_{n+1}, stable
-downwards for any start beyond the transition at n = x (Du 2004, Appl. Opt. 43, 1951, has it for y). Then psi_n'/psi_n =
-1/R_n - n/x. chi_n is stable upwards. psi_n itself follows from both by the Wronskian
+**Ratios.** R_n = psi_n/psi_{n-1} follows from the three-term recurrence as 1/R_n = (2n + 1)/x -
+R_{n+1}, stable downwards for any start beyond the transition at n = x (Du 2004, Appl. Opt. 43,
+1951, has it for y). Then psi_n'/psi_n = 1/R_n - n/x. chi_n is stable upwards. psi_n itself follows
+from both by the Wronskian
 
     psi_{n-1} chi_n - psi_n chi_{n-1} = 1:      psi_{n-1} = 1/(chi_n - R_n chi_{n-1}),
 
@@ -33,14 +37,15 @@ in which nothing cancels beyond n = x and no error is carried from one n to the 
 
 **The phase function of droplets as a table that kernels look up, from forward to backward.**
 
-The peak is a degree wide, the glory two, and both ends need angles to more digits than a cosine has in float32. With
-a = sin(angle/2) and b = cos(angle/2), which callers know without cancellation, the table is over
+The peak is a degree wide, the glory two, and both ends need angles to more digits than a cosine has
+in float32. With a = sin(angle/2) and b = cos(angle/2), which callers know without cancellation, the
+table is over
 
     w = a/(a + b),    0 forward, 1 backward,    angle = 2 atan2(w, 1 - w),    d(angle)/dw = 2/(w^2 + (1 - w)^2),
 
-which near both ends is half the angle from there, and costs two roots and a division. Between entries the function is
-Hermite's cubic of their values and slopes: with eight entries for each term of the series it differs from it by less
-than 1e-6 of the value.
+which near both ends is half the angle from there, and costs two roots and a division. Between
+entries the function is Hermite's cubic of their values and slopes: with eight entries for each term
+of the series it differs from it by less than 1e-6 of the value.
 """
 
 from dataclasses import dataclass
@@ -53,7 +58,8 @@ from airlight.realtime.errors import InputError
 
 Array = NDArray[np.float64]
 
-_WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}  # refractive index by wavelength [um], Hale and Querry 1973
+# refractive index by wavelength [um], Hale and Querry 1973
+_WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}
 _TAIL, _SIZES, _REFERENCE_RADIUS = 1e-9, 6400, 6.0  # as `analytic.droplets` has them
 _GROUPS = 24  # of sizes with one number of terms each
 _CHUNK = 512  # angles at a time
@@ -79,7 +85,8 @@ class DropletSeries:
     def fraction_below(self, angle: float) -> float:
         """Return the fraction of the light [1] that is scattered by less than an angle [rad].
 
-        It is (1/2) int_0^angle p sin: of cos(k t) sin t the integral is that of (sin((k + 1) t) - sin((k - 1) t))/2.
+        It is (1/2) int_0^angle p sin: of cos(k t) sin t the integral is that of (sin((k +
+        1) t) - sin((k - 1) t))/2.
         """
         k = np.arange(len(self.cosines), dtype=np.float64)
         up, down = k + 1, k - 1
@@ -89,11 +96,14 @@ class DropletSeries:
 
 
 @lru_cache(maxsize=16)
-def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> DropletSeries:
+def droplet_series(
+    radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
+) -> DropletSeries:
     """Return the phase function of water droplets.
 
-    `radius`: effective radius r_e [um], 2 to 50; `gamma`: how narrow the sizes are distributed [1], above 0;
-    `wavelength`: one of 0.65, 0.55, 0.45 [um]. Raises InputError for numbers out of these ranges.
+    `radius`: effective radius r_e [um], 2 to 50; `gamma`: how narrow the sizes are distributed [1],
+    above 0; `wavelength`: one of 0.65, 0.55, 0.45 [um]. Raises InputError for numbers out of these
+    ranges.
 
     Takes some seconds at 6 um, a minute at 50 um; the results are kept.
     """
@@ -109,7 +119,10 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
     scale = radius / (gamma + 2)
     size = 2 * np.pi * scale * u / wavelength
     most = int(term_counts(size[-1:])[0])
-    groups = [(part, *phase_shift_coefficients(size[part], _WATER[wavelength])) for part in _grouped(count)]
+    groups = [
+        (part, *phase_shift_coefficients(size[part], _WATER[wavelength]))
+        for part in _grouped(count)
+    ]
     efficiency = 0.0
     for part, a, b in groups:
         degeneracy = 2 * np.arange(1, a.shape[1] + 1) + 1
@@ -120,7 +133,9 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
         plus, minus = angular_factors(np.cos(angle[start : start + _CHUNK]), most)
         for part, a, b in groups:
             fraction = weight[part] / size[part] ** 2
-            values[start : start + _CHUNK] += _scattered(fraction, a + b, plus) + _scattered(fraction, a - b, minus)
+            values[start : start + _CHUNK] += _scattered(fraction, a + b, plus) + _scattered(
+                fraction, a - b, minus
+            )
     cosines = dct(values, type=1) / (len(values) - 1)
     cosines[[0, -1]] *= 0.5
     even = np.arange(0, len(cosines), 2)
@@ -131,11 +146,15 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
 
 def _check(radius: float, gamma: float, wavelength: float) -> None:
     if not 2 <= radius <= 50:
-        raise InputError(f"the effective radius of the droplets is {radius} um; expected 2 to 50 um")
+        raise InputError(
+            f"the effective radius of the droplets is {radius} um; expected 2 to 50 um"
+        )
     if not 0 < gamma < np.inf:
         raise InputError(f"gamma of the droplets is {gamma}; expected a number above 0")
     if wavelength not in _WATER:
-        raise InputError(f"the wavelength is {wavelength} um; expected one of {', '.join(map(str, _WATER))} um")
+        raise InputError(
+            f"the wavelength is {wavelength} um; expected one of {', '.join(map(str, _WATER))} um"
+        )
 
 
 def _grouped(count: int) -> list[NDArray[np.int64]]:
@@ -145,13 +164,16 @@ def _grouped(count: int) -> list[NDArray[np.int64]]:
 def _scattered(fraction: Array, coefficients: NDArray[np.complex128], factors: Array) -> Array:
     """Return the sum over the sizes of share |amplitude|^2, (angles,)."""
     used = factors[: coefficients.shape[1]]
-    real, imaginary = (np.ascontiguousarray(part) @ used for part in (coefficients.real, coefficients.imag))
+    real, imaginary = (
+        np.ascontiguousarray(part) @ used for part in (coefficients.real, coefficients.imag)
+    )
     return fraction @ (real * real + imaginary * imaginary)
 
 
 Complex = NDArray[np.complex128]
 
-_WIDTHS, _MARGIN = 8.0, 20  # where downward recurrences start: widths x^(1/3) of the transition, and terms
+# where downward recurrences start: widths x^(1/3) of the transition, and terms
+_WIDTHS, _MARGIN = 8.0, 20
 
 
 def term_counts(size: Array) -> NDArray[np.int64]:
@@ -163,7 +185,8 @@ def term_counts(size: Array) -> NDArray[np.int64]:
 def phase_shift_coefficients(size: Array, index: float) -> tuple[Complex, Complex]:
     """Return a_n and b_n [1], (sizes, terms) each; column n - 1 holds n.
 
-    `size`: x of each sphere [1], (sizes,); `index`: m, the real refractive index relative to the surroundings [1].
+    `size`: x of each sphere [1], (sizes,); `index`: m, the real refractive index relative
+    to the surroundings [1].
 
     Valid for sizes from 0.01 to 5000. Beyond a sphere's own number of terms its coefficients are 0.
     """
@@ -203,10 +226,11 @@ def _ratios(argument: Array, count: int) -> Array:
 
 
 def angular_factors(cosine: Array, count: int) -> tuple[Array, Array]:
-    """Return (2n + 1)/(n (n + 1)) times pi_n + tau_n, and times pi_n - tau_n [1], (count, angles) each.
+    """Return (2n + 1)/(n (n + 1)) times pi_n + tau_n, and times pi_n - tau_n
+    [1], (count, angles) each.
 
-    Both obey recurrences of Legendre's derivatives: pi_n = P_n'(cos), and tau_n = cos pi_n - sin^2 P_n'' with sin^2
-    P_n'' = 2 cos P_n' - n (n + 1) P_n.
+    Both obey recurrences of Legendre's derivatives: pi_n = P_n'(cos), and tau_n = cos pi_n - sin^2
+    P_n'' with sin^2 P_n'' = 2 cos P_n' - n (n + 1) P_n.
 
     `cosine`: of the scattering angle, (angles,); `count`: largest n.
     """
@@ -240,8 +264,12 @@ class DropletTable:
 
 
 @lru_cache(maxsize=16)
-def droplet_table(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> DropletTable:
-    """Return the table of droplets; parameters, `Raises` and times are those of `droplet_series`."""
+def droplet_table(
+    radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
+) -> DropletTable:
+    """Return the table of droplets; parameters, `Raises` and times are
+    those of `droplet_series`.
+    """
     series = droplet_series(radius, gamma, wavelength)
     cells = _ENTRIES * len(series.cosines)
     w = np.linspace(0.0, 1.0, cells + 1)
@@ -252,7 +280,9 @@ def droplet_table(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0
         values[part], slopes[part] = series.values(angle[part]), series.slopes(angle[part])
     slopes *= 2 / (w * w + (1 - w) ** 2) / cells
     half = angle[np.argmax(values < 0.5 * values[0])]
-    return DropletTable(np.stack([values, slopes], axis=1).ravel(), float(np.tan(0.5 * half)), len(series.cosines))
+    return DropletTable(
+        np.stack([values, slopes], axis=1).ravel(), float(np.tan(0.5 * half)), len(series.cosines)
+    )
 
 
 def fraction_cut(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> float:

@@ -5,7 +5,9 @@ from airlight.errors import InputError as InputError
 
 
 class NoDriverError(RuntimeError):
-    """There is no OpenGL that can draw shaders. The message says why; what to install is the command line's to say."""
+    """There is no OpenGL that can draw shaders. The message says why; what to install is
+    the command line's to say.
+    """
 
 
 def root_of(error: BaseException) -> BaseException:

@@ -1,48 +1,57 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Filters of whole images: Gaussian, bilateral and joint bilateral, by passes or levels; means of tiles; up-sampling.
+"""Filters of whole images: Gaussian, bilateral and joint bilateral, by passes or levels;
+means of tiles; up-sampling.
 
-**Guides: images** whose differences between two pixels say how alike these are, in units of a width.
+**Guides: images** whose differences between two pixels say how alike these
+are, in units of a width.
 
-**How the pixels of an image lie**, images with a margin, from which taps beside the image read, and sums over taps.
+**How the pixels of an image lie**, images with a margin, from which taps beside the image
+read, and sums over taps.
 
 **The bilateral and the joint bilateral filter as they are defined: every pixel, every tap.**
 
-Tomasi and Manduchi 1998; Petschnigg et al. 2004 and Eisemann and Durand 2004 for guides. A tap gathers each channel of
-image and guides and takes one exponential; there are (2 r + 1)^2 taps with r = ceil(support hd).
+Tomasi and Manduchi 1998; Petschnigg et al. 2004 and Eisemann and Durand 2004 for guides. A tap
+gathers each channel of image and guides and takes one exponential; there are (2 r + 1)^2 taps with
+r = ceil(support hd).
 
 **Filters along rows and then along columns:** 2 (2 r + 1) taps a pixel in place of (2 r + 1)^2.
 
-The Gaussian is a product, so that this is the same filter, also at the borders, where the taps that are left are
-normalised. With guides it is an approximation (Pham and van Vliet 2005): a tap off the row and the column is weighed
-through a pixel on the column, by its guide. The two passes do not commute, so neither do filter and transposition.
+The Gaussian is a product, so that this is the same filter, also at the borders, where the taps that
+are left are normalised. With guides it is an approximation (Pham and van Vliet 2005): a tap off the
+row and the column is weighed through a pixel on the column, by its guide. The two passes do not
+commute, so neither do filter and transposition.
 
 The width may differ from pixel to pixel. Then a pixel takes as many taps as its own width asks for.
 
 **The bilateral filter of an image that takes few values**, exactly, as a sum of Gaussians.
 
-A visibility by N light samples takes the N + 1 values l / N. With W_l(p) the Gaussian of the image that is 1 where f is
-l / N and 0 elsewhere,
+A visibility by N light samples takes the N + 1 values l / N. With W_l(p) the Gaussian of the image
+that is 1 where f is l / N and 0 elsewhere,
 
     g(p) = f(p) + sum_l G_hr(f(p) - l / N) (l / N - f(p)) W_l(p) / sum_l G_hr(f(p) - l / N) W_l(p):
 
-the same sum as the brute force, in another order. The Gaussians are separable and the range weights are N + 1 a pixel,
-so that it costs 2 (2 r + 1) (N + 1) sums and no exponential a tap in place of (2 r + 1)^2 exponentials: for hd = 5 and
-N = 5 that is 372 in place of 961 taps of ten times the operations. (Porikli 2008 and Yang, Tan, Ahuja 2009 do the same
-with quantised images, where it is an approximation.) A frame of `fence` by `soft-shafts` with 800 x 600 pixels takes
-2.9 s of processor time, and 6.3 s with the brute force (two cores, in turns, 29 November 2026).
+the same sum as the brute force, in another order. The Gaussians are separable and the range weights
+are N + 1 a pixel, so that it costs 2 (2 r + 1) (N + 1) sums and no exponential a tap in place of (2
+r + 1)^2 exponentials: for hd = 5 and N = 5 that is 372 in place of 961 taps of ten times the
+operations. (Porikli 2008 and Yang, Tan, Ahuja 2009 do the same with quantised images, where it is
+an approximation.) A frame of `fence` by `soft-shafts` with 800 x 600 pixels takes 2.9 s of
+processor time, and 6.3 s with the brute force (two cores, in turns, 29 November 2026).
 
 **The mean over a tile of 4 x 4 pixels**, each of which has another of sixteen samples.
 
-A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to one side. The window
-therefore has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns: the two taps at its ends have the same
-sample, and each sample has the weight 1. Where a guide leaves out some taps, those that are left are normalised.
+A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to
+one side. The window therefore has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns:
+the two taps at its ends have the same sample, and each sample has the weight 1. Where a guide
+leaves out some taps, those that are left are normalised.
 
-**Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes one of all, with a depth test.
+**Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes one
+of all, with a depth test.
 
-Kopf, Cohen, Lischinski, Uyttendaele 2007; the depth test of realTiSoftLS (Ali 2016) is reconstructed from captions. A
-pixel takes the four pixels of the small image about it with the weights of bilinear interpolation, each times the
-weight of the difference of their depths. Where none of the four is like the pixel, as at a bar that is thinner than
-`scale` pixels, the one whose depth is nearest stands alone: no weight is made up.
+Kopf, Cohen, Lischinski, Uyttendaele 2007; the depth test of realTiSoftLS (Ali 2016) is
+reconstructed from captions. A pixel takes the four pixels of the small image about it with the
+weights of bilinear interpolation, each times the weight of the difference of their depths. Where
+none of the four is like the pixel, as at a bar that is thinner than `scale` pixels, the one whose
+depth is nearest stands alone: no weight is made up.
 
 The pixels of the small image are rays through the pixels `scale` i + `scale` // 2 of the large one.
 """
@@ -59,7 +68,8 @@ from airlight.realtime.numerics.functions import exp2_bounded
 
 _LEAST, _MOST = 1e-30, 1e30  # depths beyond stand for one another: a depth of 0, the sky [m]
 _SCALE = 0.8493218002880191  # sqrt(log2(e) / 2): exp(-t^2/2) = 2^-(_SCALE t)^2
-_FAINTEST = -120.0  # the exponent at which weights stop to fall: 2^-120 = 8e-37 changes no sum in float32
+# the exponent at which weights stop to fall: 2^-120 = 8e-37 changes no sum in float32
+_FAINTEST = -120.0
 
 
 @dataclass(frozen=True)
@@ -71,16 +81,20 @@ class Guide:
 
 
 def depth_guide(depth: Metres, width: float) -> Guide:
-    """Return the guide of a depth [m]: its logarithm, so that the `width` is a relative difference of depths [1].
+    """Return the guide of a depth [m]: its logarithm, so that the `width` is a relative
+    difference of depths [1].
 
-    The sky, at infinity, is like itself and unlike all surfaces, and so are depths that are 0 or no numbers.
+    The sky, at infinity, is like itself and unlike all surfaces, and so are depths
+    that are 0 or no numbers.
     """
     finite = dr.select(depth < _MOST, dr.maximum(depth, _LEAST), _MOST)
     return Guide(dr.log(dr.select(dr.isnan(depth), _LEAST, finite)), width)
 
 
 def airlight_guide(airlight: PerRay, width: float) -> Guide:
-    """Return the guide of a radiance that spans decades, log(1 + L / mean L); the `width` is one of that logarithm."""
+    """Return the guide of a radiance that spans decades, log(1 + L / mean L); the `width`
+    is one of that logarithm.
+    """
     summed = sum(channels(airlight))
     mean = dr.mean(summed)
     return Guide(dr.log(1 + summed / dr.maximum(mean, 1e-30)), width)
@@ -131,13 +145,16 @@ class Margined:
     """Images with a margin of `right` and `down` pixels on each side, evaluated."""
 
     values: list[Any]  #: channels of the image, 0 in the margin
-    guides: list[tuple[Any, float]]  #: channels of the guides, each with its width; unlike all pixels in the margin
+    #: channels of the guides, each with its width; unlike all pixels in the margin
+    guides: list[tuple[Any, float]]
     inside: Any  #: without guides 1 in the image and 0 in the margin, otherwise None
     place: Any  #: where the pixels of the image are
     row: int  #: from one row to the next
 
 
-def with_margin(image: Any, guides: tuple[Guide, ...], raster: Raster, *, right: int, down: int) -> Margined:
+def with_margin(
+    image: Any, guides: tuple[Guide, ...], raster: Raster, *, right: int, down: int
+) -> Margined:
     """Return an image and its guides with a margin in which no pixel is like one of the image."""
     Float = type(channels(image)[0])
     width = raster.width + 2 * right
@@ -150,7 +167,11 @@ def with_margin(image: Any, guides: tuple[Guide, ...], raster: Raster, *, right:
         return whole
 
     values = [wide(channel, 0) for channel in channels(image)]
-    wide_guides = [(wide(channel, _UNLIKE), guide.width) for guide in guides for channel in channels(guide.values)]
+    wide_guides = [
+        (wide(channel, _UNLIKE), guide.width)
+        for guide in guides
+        for channel in channels(guide.values)
+    ]
     inside = None if guides else wide(dr.full(Float, 1, raster.count), 0)
     dr.eval(values, [channel for channel, _ in wide_guides], inside)
     return Margined(values, wide_guides, inside, place, width)
@@ -167,8 +188,8 @@ class Taps:
     def add(self, exponent: Any, place: Any, total: Any, sums: list[Any]) -> tuple[Any, list[Any]]:
         """Return the sums of weights and of weighted differences with one more tap.
 
-        `exponent`: to base 2 of the weight by distance, at most 0; `place`: where the tap of every pixel is; `total`,
-        `sums`: so far, of the weights and by channel.
+        `exponent`: to base 2 of the weight by distance, at most 0; `place`: where the tap of every
+        pixel is; `total`, `sums`: so far, of the weights and by channel.
         """
         Float = type(self.here[0])
         for (channel, width), middle in zip(self.wide.guides, self.guide_here, strict=True):
@@ -187,7 +208,9 @@ class Taps:
 
     def filtered(self, kind: Any, total: Any, sums: list[Any]) -> Any:
         """Return the image that the sums make, of the type `kind`."""
-        return kind(*(middle + change / total for middle, change in zip(self.here, sums, strict=True)))
+        return kind(
+            *(middle + change / total for middle, change in zip(self.here, sums, strict=True))
+        )
 
 
 def taps_of(wide: Margined) -> Taps:
@@ -201,19 +224,23 @@ def taps_of(wide: Margined) -> Taps:
 
 
 def reach(hd: float, support: float) -> int:
-    """Return how many pixels a filter reaches: `support` standard deviations of `hd` pixels each."""
+    """Return how many pixels a filter reaches: `support` standard
+    deviations of `hd` pixels each.
+    """
     return math.ceil(support * hd)
 
 
-def bilateral(image: PerRay, raster: Raster, *, hd: float, guides: tuple[Guide, ...], support: float = 3.0) -> PerRay:
+def bilateral(
+    image: PerRay, raster: Raster, *, hd: float, guides: tuple[Guide, ...], support: float = 3.0
+) -> PerRay:
     """Return an image filtered, see `realtime.image_filters`.
 
-    `image`: a number or a colour per pixel, row by row; `raster`: its size; `hd`: standard deviation of the weights in
-    the image [pixels], above 0; `guides`: what says that pixels are alike; with none it is the Gaussian; `support`:
-    half side of the square of taps [`hd`].
+    `image`: a number or a colour per pixel, row by row; `raster`: its size; `hd`: standard
+    deviation of the weights in the image [pixels], above 0; `guides`: what says that pixels are
+    alike; with none it is the Gaussian; `support`: half side of the square of taps [`hd`].
 
-    Valid for finite images. Reconstructed from captions of Ali 2016 where the guide is the image itself (his SBFS) or a
-    depth (his SoftBiF-VS).
+    Valid for finite images. Reconstructed from captions of Ali 2016 where the guide is the image
+    itself (his SBFS) or a depth (his SoftBiF-VS).
     """
     r, across = reach(hd, support), falloff(hd)
     taps = taps_of(with_margin(image, guides, raster, right=r, down=r))
@@ -228,7 +255,12 @@ def bilateral(image: PerRay, raster: Raster, *, hd: float, guides: tuple[Guide, 
 
     nothing = dr.zeros(Float, raster.count)
     _, _, total, sums = dr.while_loop(
-        state=(mi.Int32(-r), wide.place - (r * wide.row + r), nothing, [+nothing for _ in taps.here]),
+        state=(
+            mi.Int32(-r),
+            wide.place - (r * wide.row + r),
+            nothing,
+            [+nothing for _ in taps.here],
+        ),
         cond=lambda down, start, total, sums: down <= r,
         body=add_row,
         labels=("down", "start", "total", "sums"),
@@ -237,13 +269,19 @@ def bilateral(image: PerRay, raster: Raster, *, hd: float, guides: tuple[Guide, 
 
 
 def separable(
-    image: PerRay, raster: Raster, *, hd: Any, guides: tuple[Guide, ...] = (), support: float = 3.0, most: float = 0.0
+    image: PerRay,
+    raster: Raster,
+    *,
+    hd: Any,
+    guides: tuple[Guide, ...] = (),
+    support: float = 3.0,
+    most: float = 0.0,
 ) -> PerRay:
     """Return an image filtered along rows and then along columns.
 
-    `image`, `raster`, `guides`, `support`: as for `realtime.image_filters.bilateral`; `hd`: standard
-    deviation [pixels], above 0: one number, or an array with an entry per pixel; `most`: with an array, its upper bound
-    [pixels].
+    `image`, `raster`, `guides`, `support`: as for `realtime.image_filters.bilateral`; `hd`:
+    standard deviation [pixels], above 0: one number, or an array with an entry per pixel; `most`:
+    with an array, its upper bound [pixels].
     """
     for right in (True, False):
         r = reach(hd if isinstance(hd, float | int) else most, support)
@@ -254,7 +292,9 @@ def separable(
     return image
 
 
-def _pass(wide: Margined, kind: Any, raster: Raster, r: int, *, hd: Any, support: float, right: bool) -> PerRay:
+def _pass(
+    wide: Margined, kind: Any, raster: Raster, r: int, *, hd: Any, support: float, right: bool
+) -> PerRay:
     taps, across = taps_of(wide), falloff(hd)
     Float, step = type(wide.values[0]), 1 if right else wide.row
     total, sums = dr.zeros(Float, raster.count), [dr.zeros(Float, raster.count) for _ in taps.here]
@@ -283,25 +323,36 @@ def _pass(wide: Margined, kind: Any, raster: Raster, r: int, *, hd: Any, support
 
 
 def bilateral_of_levels(
-    image: PerRay, raster: Raster, *, levels: int, hd: float, hr: float, support: float = 3.0, there: PerRay = True
+    image: PerRay,
+    raster: Raster,
+    *,
+    levels: int,
+    hd: float,
+    hr: float,
+    support: float = 3.0,
+    there: PerRay = True,
 ) -> PerRay:
     """Return `realtime.image_filters.bilateral` of an image of numbers with itself as its guide.
 
-    `image`: numbers l / `levels` with l from 0 to `levels`, row by row; `raster`: its size; `levels`: N, the number of
-    light samples; `hd`, `hr`: standard deviations [pixels], [1]; `hr` may be infinite; `support`: half side of the
-    square of taps [`hd`]; `there`: which pixels take part; the others, for instance the sky, change nothing and stay
-    what they are.
+    `image`: numbers l / `levels` with l from 0 to `levels`, row by row; `raster`: its size;
+    `levels`: N, the number of light samples; `hd`, `hr`: standard deviations [pixels], [1]; `hr`
+    may be infinite; `support`: half side of the square of taps [`hd`]; `there`: which pixels take
+    part; the others, for instance the sky, change nothing and stay what they are.
     """
     r = reach(hd, support)
     fractions = [math.exp(-0.5 * (offset / hd) ** 2) for offset in range(r + 1)]
     Float = type(image)
 
     def gaussians(channels: list[Any], step: int, place: Any, of: Any) -> list[Any]:
-        sums = [of(level, dr.gather(Float, channel, place)) for level, channel in enumerate(channels)]
+        sums = [
+            of(level, dr.gather(Float, channel, place)) for level, channel in enumerate(channels)
+        ]
         for offset in range(1, r + 1):
             for side in (place + offset * step, place - offset * step):
                 for level, channel in enumerate(channels):
-                    sums[level] = dr.fma(fractions[offset], of(level, dr.gather(Float, channel, side)), sums[level])
+                    sums[level] = dr.fma(
+                        fractions[offset], of(level, dr.gather(Float, channel, side)), sums[level]
+                    )
         return sums
 
     # A pixel of the image holds its level plus 1; the margin holds 0, which is no level.
@@ -313,7 +364,12 @@ def bilateral_of_levels(
         lambda level, value: dr.select(dr.abs(value - (level + 1)) < 0.5, Float(1), 0),
     )
     below = [with_margin(counted, (), raster, right=0, down=r) for counted in along_rows]
-    counts = gaussians([margined.values[0] for margined in below], below[0].row, below[0].place, lambda _, value: value)
+    counts = gaussians(
+        [margined.values[0] for margined in below],
+        below[0].row,
+        below[0].place,
+        lambda _, value: value,
+    )
     total, change = Float(0), Float(0)
     for level, count in enumerate(counts):
         difference = level / levels - image
@@ -330,8 +386,8 @@ _EXPONENTS = (-1, 0, 0, 0, -1)  # of the weights along a row, to base 2
 def tile_average(image: PerRay, raster: Raster, *, guides: tuple[Guide, ...] = ()) -> PerRay:
     """Return the mean over the window about every pixel, weighted by guides.
 
-    `image`: a number, a colour or a vector per pixel, row by row; `raster`: its size; `guides`: what says that pixels
-    are alike.
+    `image`: a number, a colour or a vector per pixel, row by row; `raster`: its size; `guides`:
+    what says that pixels are alike.
     """
     taps = taps_of(with_margin(image, guides, raster, right=2, down=2))
     wide = taps.wide
@@ -350,14 +406,22 @@ _ALIKE = 1e-3  # a sum of weights below this says that no pixel is alike
 
 
 def upsample(
-    small: PerRay, small_guide: Guide, guide: PerRay, raster: Raster, *, scale: int, column: Any, row: Any
+    small: PerRay,
+    small_guide: Guide,
+    guide: PerRay,
+    raster: Raster,
+    *,
+    scale: int,
+    column: Any,
+    row: Any,
 ) -> PerRay:
     """Return the values of pixels of a large image.
 
-    `small`: a number or a colour per pixel of the small image, row by row, evaluated; `small_guide`: its guide of
-    numbers, for instance `realtime.image_filters.depth_guide`, evaluated; `guide`: the values of that guide at
-    the pixels that are asked for; `raster`: the size of the small image; `scale`: pixels of the large image from one of
-    the small image to the next; `column`, `row`: of the pixels that are asked for, in the large image, in any order.
+    `small`: a number or a colour per pixel of the small image, row by row, evaluated;
+    `small_guide`: its guide of numbers, for instance `realtime.image_filters.depth_guide`,
+    evaluated; `guide`: the values of that guide at the pixels that are asked for; `raster`: the
+    size of the small image; `scale`: pixels of the large image from one of the small image to the
+    next; `column`, `row`: of the pixels that are asked for, in the large image, in any order.
     """
     Float = type(guide)
     x, left, right = _between(Float, column, scale, raster.width)
@@ -369,14 +433,19 @@ def upsample(
         for at_column, horizontal in ((left, 1 - x), (right, x)):
             place = at_row * raster.width + at_column
             difference = dr.gather(Float, small_guide.values, place) - guide
-            fraction = vertical * horizontal * weight(-falloff(small_guide.width) * dr.square(difference))
+            fraction = (
+                vertical * horizontal * weight(-falloff(small_guide.width) * dr.square(difference))
+            )
             total += fraction
             sums = [
                 dr.fma(fraction, dr.gather(Float, channel, place), so_far)
                 for channel, so_far in zip(channels(small), sums)
             ]
             nearer = dr.abs(difference) < least
-            least, nearest = dr.select(nearer, dr.abs(difference), least), dr.select(nearer, place, nearest)
+            least, nearest = (
+                dr.select(nearer, dr.abs(difference), least),
+                dr.select(nearer, place, nearest),
+            )
     alike = total > _ALIKE
     return type(small)(
         *(
@@ -387,13 +456,17 @@ def upsample(
 
 
 def small_pixels(raster: Raster, scale: int, width: int) -> Any:
-    """Return the numbers of the pixels of the large image, of a `width` [pixels], that the small image is made of."""
+    """Return the numbers of the pixels of the large image, of a `width` [pixels], that
+    the small image is made of.
+    """
     column, row = raster.places()
     return (scale * row + scale // 2) * width + scale * column + scale // 2
 
 
 def _between(Float: Any, place: Any, scale: int, size: int) -> tuple[Any, Any, Any]:
-    """Return where a pixel lies between two of the small image, from 0 to 1, and these two, which may be the same."""
+    """Return where a pixel lies between two of the small image, from 0 to 1, and these
+    two, which may be the same.
+    """
     along = (Float(place) - scale // 2) / scale
     before = dr.clip(dr.floor(along), 0, size - 1)
     first = mi.UInt32(before)

@@ -1,34 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Sums over the lit intervals of rays, as a walk along them finds their ends.
 
-A walk comes to the boundaries of shadow in the order of a ray. At each the light comes back, or ends, or nothing
-changes (two shadows overlap). With :math:`[a_i, b_i]` the intervals between, the sum is
+A walk comes to the boundaries of shadow in the order of a ray. At each the light comes back, or
+ends, or nothing changes (two shadows overlap). With :math:`[a_i, b_i]` the intervals between, the
+sum is
 
 .. math:: \sum_i \int_{a_i}^{b_i} f(x) dx :
 
-of positive terms, one for each interval, where a sum of :math:`\pm F(x_n)` over the boundaries loses digits.
+of positive terms, one for each interval, where a sum of :math:`\pm F(x_n)` over the
+boundaries loses digits.
 
-Each ray holds its last interval, from `begin` to `end`, and whether it `waits` to be added to the sum:
+Each ray holds its last interval, from `begin` to `end`, and whether it
+`waits` to be added to the sum:
 
 - the light comes back: the interval opens here (`open_interval`), and nothing may wait;
-- the light ends: the interval closes here and waits (`close_interval`), and no other may have waited;
+- the light ends: the interval closes here and waits (`close_interval`), and
+  no other may have waited;
 - the ray ends: the waiting interval is added, and the one that is lit up to there (`sum_at_end`).
 
-A walk that lets an interval wait until the next one closes has to remember where the next one opened.
+A walk that lets an interval wait until the next one closes has to remember
+where the next one opened.
 
-Waiting makes walks fast. Sixteen rays or more go in step, and all wait for each of them; an integral costs as much as
-many steps. Each method therefore chooses when to call `add_waiting`, and rays whose intervals end a few steps apart are
-served at once: `realtime.methods.shadow_planes.sweep` does it at every fourth plane, `realtime.methods.epipolar.walk`
-when every ray has an interval or is at its end, and `realtime.methods.light_volumes.walk` when an interval does not go
-on in the next face of the map.
+Waiting makes walks fast. Sixteen rays or more go in step, and all wait for each of them; an
+integral costs as much as many steps. Each method therefore chooses when to call `add_waiting`, and
+rays whose intervals end a few steps apart are served at once:
+`realtime.methods.shadow_planes.sweep` does it at every fourth plane,
+`realtime.methods.epipolar.walk` when every ray has an interval or is at its end, and
+`realtime.methods.light_volumes.walk` when an interval does not go on in the next face of the map.
 
-Places are whatever rises or falls along a ray, distances or quotients D/x; `integral` takes them as they are.
+Places are whatever rises or falls along a ray, distances or quotients D/x;
+`integral` takes them as they are.
 
-**A queue of the nearest crossings** puts boundaries in order where a walk meets them out of order, in registers, with
-the nearest first. A crossing has a key, which says how near it is, and may have a gain, which says what changes there.
-Every place of the queue is compared at every insertion, without branches: two to five instructions a place. A crossing
-that finds no place is returned, so a caller knows that it must go over its crossings again for the farther ones.
-Crossings of one key stay in the order in which they came.
+**A queue of the nearest crossings** puts boundaries in order where a walk meets them out of order,
+in registers, with the nearest first. A crossing has a key, which says how near it is, and may have
+a gain, which says what changes there. Every place of the queue is compared at every insertion,
+without branches: two to five instructions a place. A crossing that finds no place is returned, so a
+caller knows that it must go over its crossings again for the farther ones. Crossings of one key
+stay in the order in which they came.
 """
 
 from collections.abc import Callable
@@ -52,8 +60,8 @@ class LitIntervals:
 def no_intervals(zero, start) -> LitIntervals:
     """Return the state of rays at their start.
 
-    `zero`: the sum of nothing, one for each ray; `start`: where rays start, one for each [m]: there an interval opens
-    if they are lit.
+    `zero`: the sum of nothing, one for each ray; `start`: where rays start, one for each [m]: there
+    an interval opens if they are lit.
     """
     return LitIntervals(zero, start, +start, dr.full(mi.Bool, False, dr.width(zero)))
 
@@ -67,19 +75,25 @@ def open_interval(intervals: LitIntervals, begin, opens) -> LitIntervals:
 
 
 def close_interval(intervals: LitIntervals, end, closes, *, begin=None) -> LitIntervals:
-    """Return intervals behind the place `end` [m] where the light ends if it `closes` one; no other may have waited.
+    """Return intervals behind the place `end` [m] where the light ends if it `closes` one;
+    no other may have waited.
 
     `begin` is where it began [m], None for where `open_interval` put it.
     """
     if begin is not None:
         intervals = open_interval(intervals, begin, closes)
-    return replace(intervals, end=dr.select(closes, end, intervals.end), waits=intervals.waits | closes)
+    return replace(
+        intervals, end=dr.select(closes, end, intervals.end), waits=intervals.waits | closes
+    )
 
 
-def add_waiting(intervals: LitIntervals, integral: Callable[[Any, Any], Any], due=True) -> LitIntervals:
+def add_waiting(
+    intervals: LitIntervals, integral: Callable[[Any, Any], Any], due=True
+) -> LitIntervals:
     """Return intervals with what waits added to the sum where it is `due`.
 
-    `integral` is a function (begin, end) -> value of one interval; rays that add nothing step over it.
+    `integral` is a function (begin, end) -> value of one interval; rays that
+    add nothing step over it.
     """
     total = dr.if_stmt(
         args=(intervals.total, intervals.begin, intervals.end),
@@ -90,15 +104,22 @@ def add_waiting(intervals: LitIntervals, integral: Callable[[Any, Any], Any], du
     return replace(intervals, total=total, waits=intervals.waits & ~mi.Bool(due))
 
 
-def sum_at_end(intervals: LitIntervals, integral: Callable[[Any, Any], Any], end, *, opened, lit, active):
-    """Return the sum at the end of rays that are `active`: with what waits, and where `lit` what is open up to there.
+def sum_at_end(
+    intervals: LitIntervals, integral: Callable[[Any, Any], Any], end, *, opened, lit, active
+):
+    """Return the sum at the end of rays that are `active`: with what waits, and where `lit`
+    what is open up to there.
 
-    `integral` is the function of both ends [m] of an interval, `end` that of the rays, and `opened` where the last
-    interval began [m]. A loop, not two branches: most rays have one of the two and are served at once.
+    `integral` is the function of both ends [m] of an interval, `end` that of the rays, and `opened`
+    where the last interval began [m]. A loop, not two branches: most rays have one of the two and
+    are served at once.
     """
 
     def body(total, waits, lit):
-        begin, until = dr.select(waits, intervals.begin, opened), dr.select(waits, intervals.end, end)
+        begin, until = (
+            dr.select(waits, intervals.begin, opened),
+            dr.select(waits, intervals.end, end),
+        )
         return total + integral(begin, until), waits & False, waits & lit
 
     total, _, _ = dr.while_loop(
@@ -119,7 +140,9 @@ class Crossings:
 
 
 def filled(key: float, places: int, Float, width: int) -> Crossings:
-    """Return a queue of so many places that holds one key in all of them, without gain, for `width` lanes."""
+    """Return a queue of so many places that holds one key in all of them, without
+    gain, for `width` lanes.
+    """
     keys, gains = ([dr.full(Float, value, width) for _ in range(places)] for value in (key, 0))
     return Crossings(keys, gains)
 
@@ -127,14 +150,15 @@ def filled(key: float, places: int, Float, width: int) -> Crossings:
 def insert(queue: Crossings, key, gain):
     """Put a crossing in its place: the larger its key, the nearer it is.
 
-    Returns `queue`: the nearest, as many as before; `key`, `gain`: of the crossing that is left without a place, the
-    farthest of all.
+    Returns `queue`: the nearest, as many as before; `key`, `gain`: of the crossing that is left
+    without a place, the farthest of all.
     """
     keys, gains, new = [], [], key
     for held, held_gain in zip(queue.key, queue.gain, strict=True):
         keys.append(dr.maximum(held, key))
         key = dr.minimum(held, key)
-        # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
+        # Compare with the new key, not with the one that it displaced: equal
+        # keys must keep their order.
         before = new > held
         gains.append(dr.select(before, gain, held_gain))
         gain = dr.select(before, held_gain, gain)
@@ -142,13 +166,21 @@ def insert(queue: Crossings, key, gain):
 
 
 def exchange(queue: Crossings, key, gain):
-    """Put a crossing in its place and take out the nearest of all: the queue, and the key and gain of that."""
+    """Put a crossing in its place and take out the nearest of all: the queue, and
+    the key and gain of that.
+    """
     queue, last, last_gain = insert(queue, key, gain)
-    return Crossings([*queue.key[1:], last], [*queue.gain[1:], last_gain]), queue.key[0], queue.gain[0]
+    return (
+        Crossings([*queue.key[1:], last], [*queue.gain[1:], last_gain]),
+        queue.key[0],
+        queue.gain[0],
+    )
 
 
 def pop(queue: Crossings, none: float, active):
-    """Take out the nearest crossing where `active`, and put the key `none` behind the last: as `exchange` does."""
+    """Take out the nearest crossing where `active`, and put the key `none` behind the
+    last: as `exchange` does.
+    """
     Float = type(queue.key[0])
     moved = Crossings([*queue.key[1:], Float(none)], [*queue.gain[1:], Float(0)])
     return dr.select(active, moved, queue), queue.key[0], queue.gain[0]

@@ -27,7 +27,8 @@ class Memory:
 
 
 def usable_memory() -> Memory | None:
-    """Return the GPU's memory with a CUDA variant, else the machine's or what its container may use of it.
+    """Return the GPU's memory with a CUDA variant, else the machine's or what its
+    container may use of it.
 
     None if the system does not tell.
     """
@@ -36,7 +37,9 @@ def usable_memory() -> Memory | None:
         return None if size is None else Memory(size, "the GPU has")
     sizes = []
     with suppress(AttributeError, ValueError, OSError):
-        sizes.append(Memory(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), "this machine has"))
+        sizes.append(
+            Memory(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), "this machine has")
+        )
     sizes += [Memory(size, "this container may use") for size in _cgroup_limits()]
     return min(sizes, key=lambda memory: memory.size, default=None)
 
@@ -44,8 +47,9 @@ def usable_memory() -> Memory | None:
 def check_memory(what: str, needed: int, advice: str) -> None:
     """Raise an error if work needs more memory than there is.
 
-    `what`: what the user asked for, as the message begins; `needed`: memory that the work needs [bytes]; `advice`: what
-    the user can do, as the message ends. Raises InputError if there is less memory.
+    `what`: what the user asked for, as the message begins; `needed`: memory that the work needs
+    [bytes]; `advice`: what the user can do, as the message ends. Raises InputError if there is less
+    memory.
     """
     memory = usable_memory()
     if memory is not None and needed > memory.size:
@@ -53,7 +57,9 @@ def check_memory(what: str, needed: int, advice: str) -> None:
 
 
 def _cgroup_limits() -> list[int]:
-    """Return the limits of this process's control groups and of those above them [bytes]: versions 1 and 2."""
+    """Return the limits of this process's control groups and of those above them
+    [bytes]: versions 1 and 2.
+    """
     limits = []
     with suppress(OSError):
         for line in _OWN_CGROUPS.read_text().splitlines():
@@ -72,7 +78,9 @@ def _cgroup_limits() -> list[int]:
 
 
 def _gpu_memory() -> int | None:
-    """Return the memory of the GPU that Dr.Jit uses [bytes], as its driver tells; None if it does not."""
+    """Return the memory of the GPU that Dr.Jit uses [bytes], as its driver
+    tells; None if it does not.
+    """
     with suppress(OSError, AttributeError):
         cuda = ctypes.CDLL(os.environ.get("DRJIT_LIBCUDA_PATH") or "libcuda.so.1")
         device, size = ctypes.c_int(), ctypes.c_size_t()

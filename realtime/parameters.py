@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Typed parameters: each stands once, with its default, its choices or range, its unit and a sentence of help.
+"""Typed parameters: each stands once, with its default, its choices or range, its
+unit and a sentence of help.
 
-A method has a frozen dataclass of them, derived from `Parameters`, whose fields are made by `parameter`. Conversion of
-words, checks, their messages, `airlight list methods` and the tables of the documentation all follow from the fields.
+A method has a frozen dataclass of them, derived from `Parameters`, whose fields are made by
+`parameter`. Conversion of words, checks, their messages, `airlight list methods` and the tables of
+the documentation all follow from the fields.
 
 >>> from dataclasses import dataclass
 >>> @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Parameters:
     Raises
     ------
     InputError
-        When it is made, for a value outside its choices or range, and for values that contradict one another.
+        When it is made, for a value outside its choices or range, and for values
+        that contradict one another.
     """
 
     def __post_init__(self) -> None:
@@ -62,7 +65,9 @@ class Limits:
 
 
 def parameter(default: Any, help: str, **limits: Any) -> Any:
-    """Return the field of a parameter with its `default`; `help` and `limits` are the fields of `Limits`."""
+    """Return the field of a parameter with its `default`; `help` and `limits`
+    are the fields of `Limits`.
+    """
     return field(default=default, metadata={"limits": Limits(help, **limits)})
 
 
@@ -82,14 +87,19 @@ def values(parameters: Parameters) -> dict[str, Any]:
 
 
 def read_parameters(
-    method: str, kind: type[Parameters], given: Mapping[str, Any], *, others: Iterable[str] = (), see: str = ""
+    method: str,
+    kind: type[Parameters],
+    given: Mapping[str, Any],
+    *,
+    others: Iterable[str] = (),
+    see: str = "",
 ) -> Any:
     """Return the parameters of a method from values or words, the others with their defaults.
 
-    `method`: its name, for messages; `kind`: the class of its parameters; `given`: values by name; a word is converted
-    to the type of the default; `others`: names that are known elsewhere, and `see`: a method that has more, for
-    messages. Raises InputError for an unknown name (the nearest is named), a value of the wrong type, and what
-    `Parameters` refuses.
+    `method`: its name, for messages; `kind`: the class of its parameters; `given`: values by name;
+    a word is converted to the type of the default; `others`: names that are known elsewhere, and
+    `see`: a method that has more, for messages. Raises InputError for an unknown name (the nearest
+    is named), a value of the wrong type, and what `Parameters` refuses.
     """
     known = defaults(kind)
     converted = {}
@@ -98,7 +108,9 @@ def read_parameters(
             names = [*known, *others]
             wanted = ", ".join(names) or "none"
             more = nearest(name, names) or (see and f"; for what its paper does, see {see}")
-            raise InputError(f"method {method}: got a parameter {name!r}, expected one of: {wanted}{more}")
+            raise InputError(
+                f"method {method}: got a parameter {name!r}, expected one of: {wanted}{more}"
+            )
         converted[name] = _converted(f"method {method}: {name}", value, known[name])
     return kind(**converted)
 
@@ -108,7 +120,9 @@ def wanted_values(item: Field) -> str:
     limits = limits_of(item)
     if limits.choices:
         return "one of " + ", ".join(str(choice) for choice in limits.choices)
-    return limits.wanted or _range(limits, item.default) + (f" [{limits.unit}]" if limits.unit else "")
+    return limits.wanted or _range(limits, item.default) + (
+        f" [{limits.unit}]" if limits.unit else ""
+    )
 
 
 def _range(limits: Limits, default: Any) -> str:
@@ -116,7 +130,9 @@ def _range(limits: Limits, default: Any) -> str:
         return "true or false" if isinstance(default, bool) else "a word"
     words = "a whole number" if isinstance(default, int) else "a finite number"
     if limits.least is not None:
-        words += f" of at least {limits.least:g}" if limits.most is None else f" from {limits.least:g}"
+        words += (
+            f" of at least {limits.least:g}" if limits.most is None else f" from {limits.least:g}"
+        )
     if limits.above is not None:
         words += f" above {limits.above:g}"
     if limits.most is not None:
@@ -153,7 +169,9 @@ def _allowed(limits: Limits, default: Any, value: Any) -> bool:
 
 
 def _of_kind(value: Any, default: Any) -> bool:
-    """Return whether a value is of the kind of a default: a bool is no number, and NumPy's numbers are numbers."""
+    """Return whether a value is of the kind of a default: a bool is no number, and
+    NumPy's numbers are numbers.
+    """
     kind = next((kind for kind in (bool, Integral, Real, str) if isinstance(default, kind)), object)
     return isinstance(value, kind) and isinstance(value, bool) == isinstance(default, bool)
 

@@ -1,31 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The geometry of a ray and a light: the foot of the perpendicular, the height, the lit part of the ray, and how much.
+"""The geometry of a ray and a light: the foot of the perpendicular, the height, the lit part
+of the ray, and how much.
 
-With v = l - w origin, the homogeneous vector from the camera to the light (`realtime.scene.lights`), and a unit
-direction d, ``foot = v . d`` and ``height = |v x d|``. For a light at infinity, w = 0, v has unit length, and they are
-the cosine and the sine of the angle between ray and light. The textbook form
-sqrt(|v|^2 - foot^2) cancels where the ray passes close to the light: at height 1e-3 |v| it has no correct digit left in
-float32, and so has a difference of products of rounded numbers. Foot, height and the ends of what a light reaches are
-found once for a ray and light: all of that is computed in float64, from the aim of the ray as the camera has it
-(`realtime.scene.camera`), and rounded at the end. Each component of the cross product is a difference of two products,
-a b - c d, and Kahan's form with fused multiply-add gives it to 1.5 units in the last place, so that v x d is at right
-angles to d however close to the light the ray passes:
+With v = l - w origin, the homogeneous vector from the camera to the light
+(`realtime.scene.lights`), and a unit direction d, ``foot = v . d`` and ``height = |v x d|``. For a
+light at infinity, w = 0, v has unit length, and they are the cosine and the sine of the angle
+between ray and light. The textbook form sqrt(|v|^2 - foot^2) cancels where the ray passes close to
+the light: at height 1e-3 |v| it has no correct digit left in float32, and so has a difference of
+products of rounded numbers. Foot, height and the ends of what a light reaches are found once for a
+ray and light: all of that is computed in float64, from the aim of the ray as the camera has it
+(`realtime.scene.camera`), and rounded at the end. Each component of the cross product is a
+difference of two products, a b - c d, and Kahan's form with fused multiply-add gives it to 1.5
+units in the last place, so that v x d is at right angles to d however close to the light the ray
+passes:
 
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
 
-A light sample with the normal n lights what lies before its plane, with the cosine of the angle to n for a profile.
-From the light to the point of the ray at x, s = x - foot from the foot, leads (v x d) x d + s d, hence
+A light sample with the normal n lights what lies before its plane, with the cosine of the angle to
+n for a profile. From the light to the point of the ray at x, s = x - foot from the foot, leads (v x
+d) x d + s d, hence
 
     r cos = axial s + offset,     axial = n . d,     offset = n . ((v x d) x d).
 
-Where that is 0 the ray meets the plane. The vector in brackets has the length of the height, so that the cosine is
-right to rounding as close to the light as v x d is.
+Where that is 0 the ray meets the plane. The vector in brackets has the length of the height, so
+that the cosine is right to rounding as close to the light as v x d is.
 
 **Where a ray enters and leaves a cone about a spot's axis.**
 
-With v = light - origin, a unit direction d and a unit axis a, let w = v x d, whose length is the height h of the ray,
-and let w x d = d (v . d) - v be the vector from the light to the foot point. The point at the distance s from the foot
-lies in the cone of half angle b where
+With v = light - origin, a unit direction d and a unit axis a, let w = v x d, whose length is the
+height h of the ray, and let w x d = d (v . d) - v be the vector from the light to the foot point.
+The point at the distance s from the foot lies in the cone of half angle b where
 
     axial s + offset >= cos(b) sqrt(s^2 + h^2),     axial = a . d,     offset = a . (w x d).
 
@@ -33,29 +37,31 @@ Squared, this is A s^2 + 2 B s + C >= 0 with
 
     A = axial^2 - cos^2,   B = axial offset,   C = offset^2 - cos^2 h^2,   B^2 - A C = cos^2 D,   D = offset^2 + h^2 A.
 
-**The discriminant.** A ray that grazes the cone has two roots close to each other, and D cancels. But d, (w x d)/h and
-w/h are three unit vectors at right angles, so with across = a . w
+**The discriminant.** A ray that grazes the cone has two roots close to each other, and D cancels.
+But d, (w x d)/h and w/h are three unit vectors at right angles, so with across = a . w
 
     axial^2 + (offset/h)^2 + (across/h)^2 = 1,     hence     D = h^2 sin^2 - across^2.
 
-One difference is left, zero where the ray is tangent. A fraction e of h^2 that rounding adds to it changes a chord that
-is sqrt(e) of the distance from nothing to that: half of float64's digits are lost there, and float32 has its own. A
-common factor of d is one of h and across both.
+One difference is left, zero where the ray is tangent. A fraction e of h^2 that rounding adds to it
+changes a chord that is sqrt(e) of the distance from nothing to that: half of float64's digits are
+lost there, and float32 has its own. A common factor of d is one of h and across both.
 
-**The roots.** The end where A s + B > 0 is where the ray enters the cone, the other where it leaves it,
+**The roots.** The end where A s + B > 0 is where the ray enters the cone, the
+other where it leaves it,
 
     enter = (-B + cos sqrt(D)) / A,     leave = (-B - cos sqrt(D)) / A.
 
-Where A is close to 0 one of them cancels, which then is C/q, q = -B - sign(B) cos sqrt(D) the numerator of the other.
-But C cancels too, by up to axial^2 where the ray is tangent. The first form therefore serves for A < -cos^2/2, that is
-axial^2 < cos^2/2, and C/q elsewhere: neither loses more than 2/cos^2. A itself cancels for rays along lines on the
-cone. From h^2 A = D - offset^2 it has all digits where the ray is tangent, and keeps those that axial^2 - cos^2 loses
-of rays along a narrow beam, where axial and cos are both close to 1.
+Where A is close to 0 one of them cancels, which then is C/q, q = -B - sign(B) cos sqrt(D) the
+numerator of the other. But C cancels too, by up to axial^2 where the ray is tangent. The first form
+therefore serves for A < -cos^2/2, that is axial^2 < cos^2/2, and C/q elsewhere: neither loses more
+than 2/cos^2. A itself cancels for rays along lines on the cone. From h^2 A = D - offset^2 it has
+all digits where the ray is tangent, and keeps those that axial^2 - cos^2 loses of rays along a
+narrow beam, where axial and cos are both close to 1.
 
-**The nappe.** Squaring adds the nappe behind the light. For A < 0 both roots are on the same one, where axial s +
-offset has the sign it has in their middle s = -B/A, hence that of offset: the solution is the interval between them, or
-nothing. For A >= 0 there is one root on each, and the solution is a half line: from `enter` on if axial > 0, else up to
-`leave`.
+**The nappe.** Squaring adds the nappe behind the light. For A < 0 both roots are on the same one,
+where axial s + offset has the sign it has in their middle s = -B/A, hence that of offset: the
+solution is the interval between them, or nothing. For A >= 0 there is one root on each, and the
+solution is a half line: from `enter` on if axial > 0, else up to `leave`.
 """
 
 from dataclasses import dataclass
@@ -88,10 +94,11 @@ def axis_geometry(w, direction, axis) -> AxisGeometry:
 
 
 def cone_interval(ray: AxisGeometry, cone: Cone):
-    """Return the signed distances from the foot at which rays enter and leave a cone [m]; both -inf if they miss it.
+    """Return the signed distances from the foot at which rays enter and leave a cone [m];
+    both -inf if they miss it.
 
-    Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is in the cone on one
-    side of it, or nowhere.
+    Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is
+    in the cone on one side of it, or nowhere.
     """
     discriminant = ray.square * cone.square_sin - dr.square(ray.across)
     # For a ray through the light only the signs remain, times `_TINY`.
@@ -99,7 +106,9 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)
     root = cone.cos * dr.sqrt(dr.maximum(discriminant, _TINY))
     q = -(b + dr.mulsign(root, b))
-    scaled = dr.fma(_TINY, dr.abs(ray.axial) - cone.cos, dr.fma(-ray.offset, ray.offset, discriminant))
+    scaled = dr.fma(
+        _TINY, dr.abs(ray.axial) - cone.cos, dr.fma(-ray.offset, ray.offset, discriminant)
+    )
     inverse = dr.maximum(ray.square, _TINY) / scaled
     far, near = q * inverse, c / q
     middle, half = -b * inverse, root * inverse
@@ -115,15 +124,16 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
 
 
 def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
-    """Return `slant`, `slide` and `gap`: the distance from the axis is sqrt((slant s - slide)^2 + gap^2) [m].
+    """Return `slant`, `slide` and `gap`: the distance from the axis is sqrt((slant
+    s - slide)^2 + gap^2) [m].
 
-    Along d, (w x d)/h and w/h the point at s is (s, h, 0) from the light, the axis is (axial, offset/h, across/h), and
-    the distance is the length of their cross product,
+    Along d, (w x d)/h and w/h the point at s is (s, h, 0) from the light, the axis is (axial,
+    offset/h, across/h), and the distance is the length of their cross product,
 
         sqrt((across/h)^2 (s^2 + h^2) + (axial h - (offset/h) s)^2).
 
-    With n^2 = (offset/h)^2 + (across/h)^2 = 1 - axial^2 this is the sum of squares above for slant = n, slide =
-    axial offset / n, gap = |across| / n.
+    With n^2 = (offset/h)^2 + (across/h)^2 = 1 - axial^2 this is the sum of squares above for
+    slant = n, slide = axial offset / n, gap = |across| / n.
     """
     size = dr.sqrt(dr.fma(ray.offset, ray.offset, dr.square(ray.across)))
     # For a ray through the light only the sine remains, which loses digits only near the axis.
@@ -135,44 +145,56 @@ def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
     return {"slant": slant, "slide": slide, "gap": gap}
 
 
-_PARALLEL = 1e-6  #: sine between a ray and the axis of a spot below which their distance is the same everywhere
+#: sine between a ray and the axis of a spot below which their distance is the same everywhere
+_PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
 class RayGeometry:
     """Where a light lies as seen from a camera ray; every field has one entry per ray."""
 
-    foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]; w = 0: a cosine
+    #: signed distance along the ray of the foot of the perpendicular from the
+    #: light [m]; w = 0: a cosine
+    foot: Any
     height: Any  #: distance from the light to the ray [m]; w = 0: a sine
     axial: Any = None  #: spot, light sample: cosine between the ray and the axis, or the normal
-    offset: Any = None  #: spot, light sample: component along that of the vector from the light to the foot [m]
-    enter: Any = None  #: spot, light sample: distance at which the ray enters what is lit, -inf if it misses it [m]
-    leave: Any = None  #: spot, light sample: distance at which it leaves it, -inf if it misses it [m]
+    #: spot, light sample: component along that of the vector from the light to the foot [m]
+    offset: Any = None
+    #: spot, light sample: distance at which the ray enters what is lit, -inf if it misses it [m]
+    enter: Any = None
+    #: spot, light sample: distance at which it leaves it, -inf if it misses it [m]
+    leave: Any = None
     beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
     beam_leave: Any = None
     slant: Any = None  #: soft spot only: sine between the ray and the axis
-    slide: Any = None  #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
-    gap: Any = None  #: soft spot only: distance between the ray and the axis, as unbounded lines [m]
+    #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
+    slide: Any = None
+    #: soft spot only: distance between the ray and the axis, as unbounded lines [m]
+    gap: Any = None
 
     def lit_segment(self, x0, x1) -> tuple[Any, Any]:
         """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
 
-        All of the ray is lit, except for a spot, which lights the part inside its cone, and a light sample, which
-        lights what lies before its plane. `x1` may be infinite.
+        All of the ray is lit, except for a spot, which lights the part inside its cone, and a light
+        sample, which lights what lies before its plane. `x1` may be infinite.
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
 
     def distance_to_light(self, x):
-        """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light to the point at `x` [m]."""
+        """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light
+        to the point at `x` [m].
+        """
         s = x - self.foot
         return dr.sqrt(dr.fma(s, s, self.height * self.height))
 
     def smooth_subsegments(self, light: Light, x0, x1):
-        """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; others are one piece.
+        """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the
+        beam; others are one piece.
 
-        A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
-        The last piece of an unbounded ray that stays in the beam is empty and lies at its beginning: at infinity
-        kernels would multiply 0 by infinity. Valid for any segment.
+        A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the
+        more like a kink. The last piece of an unbounded ray that stays in the beam is empty and
+        lies at its beginning: at infinity kernels would multiply 0 by infinity. Valid for any
+        segment.
         """
         if light.beam is None:
             return [(x0, x1)]
@@ -182,10 +204,16 @@ class RayGeometry:
         misses = crosses & (inner0 >= inner1)
         inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
         stays = dr.isinf(inner1)
-        return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
+        return [
+            (x0, inner0),
+            (inner0, inner1),
+            (dr.select(stays, x0, inner1), dr.select(stays, x0, x1)),
+        ]
 
     def falloff_beside(self, light: Light, s):
-        """Return `falloff` at `s` = x - foot [m]: for a light sample, x lacks the digits close to it."""
+        """Return `falloff` at `s` = x - foot [m]: for a light sample, x
+        lacks the digits close to it.
+        """
         if light.facing is None:
             return self.falloff(light, self.foot + s)
         square = dr.fma(s, s, dr.square(self.height))
@@ -194,9 +222,10 @@ class RayGeometry:
     def falloff(self, light: Light, x):
         """Return the relative intensity of a light at the point at `x`, for one that varies [1].
 
-        A light sample has the cosine at its normal, 0 behind its plane. A spot has Mitsuba's profile, linear
-        in the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff -
-        beam). The angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
+        A light sample has the cosine at its normal, 0 behind its plane. A spot has Mitsuba's
+        profile, linear in the angle: one inside the beam, zero outside the cut-off; between the
+        two, (cutoff - angle) / (cutoff - beam). The angle is that of the distances from the axis
+        and along it: near the axis a cosine alone has lost it.
         """
         s = x - self.foot
         if light.facing is not None:
@@ -211,10 +240,11 @@ class RayGeometry:
 
 
 def ray_geometry(origin, direction, light: Light) -> RayGeometry:
-    """Return foot and height of rays with respect to one light, and where they are in what it lights.
+    """Return foot and height of rays with respect to one light, and where
+    they are in what it lights.
 
-    `origin`, `direction`: camera rays [m] in any precision; `direction` may have any length, and its errors are those
-    of the height; `light`: any light; the result has its precision.
+    `origin`, `direction`: camera rays [m] in any precision; `direction` may have any length, and
+    its errors are those of the height; `light`: any light; the result has its precision.
 
     Valid for any ray. A ray through the light, or parallel to the light, has height 0.
     """
@@ -224,7 +254,10 @@ def ray_geometry(origin, direction, light: Light) -> RayGeometry:
     d, w = aim * inverse, _cross(v, aim) * inverse
     fields = {"foot": dr.dot(v, d), "height": dr.norm(w)}
     if light.facing is not None:
-        axial, offset = dr.dot(light.facing.exact_normal, d), dr.dot(light.facing.exact_normal, dr.cross(w, d))
+        axial, offset = (
+            dr.dot(light.facing.exact_normal, d),
+            dr.dot(light.facing.exact_normal, dr.cross(w, d)),
+        )
         meets = fields["foot"] - offset / axial
         # A ray along the plane is before it as a whole, or nowhere.
         along = axial == 0

@@ -11,7 +11,8 @@ import pytest
 
 from tests.helpers.clock import Clock
 
-# A process that a shell starts in the background ignores Ctrl-C, and so would the commands that tests interrupt.
+# A process that a shell starts in the background ignores Ctrl-C, and so would the
+# commands that tests interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -28,7 +29,10 @@ def pytest_addoption(parser):
 @pytest.hookimpl(trylast=True)  # what pytest found comes first
 def pytest_sessionfinish(session):
     """Fail a run in which a test was skipped for a reason that is not allowed."""
-    allowed, reporter = session.config.option.allowed_skips, session.config.pluginmanager.get_plugin("terminalreporter")
+    allowed, reporter = (
+        session.config.option.allowed_skips,
+        session.config.pluginmanager.get_plugin("terminalreporter"),
+    )
     if allowed is None or reporter is None:  # a worker: the process that started it sees all skips
         return
     lines = allowed.read_text(encoding="utf-8").splitlines()
@@ -54,7 +58,8 @@ def variant() -> str:
     from airlight.reports.machine.environment import LEAST_THREADS, activate
 
     chosen = activate()
-    # Workers have a core each: more threads would wait for one another. `tests/realtime/frame/test_threads.py` has all.
+    # Workers have a core each: more threads would wait for one another.
+    # `tests/realtime/frame/test_threads.py` has all.
     if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
         import drjit as dr
 
@@ -68,7 +73,9 @@ def variant() -> str:
 
 @pytest.fixture(autouse=True)
 def _shared_cache(tmp_path_factory, monkeypatch):
-    """Keep the tests away from the user's cache, and let them share one of their own, with all workers of the run."""
+    """Keep the tests away from the user's cache, and let them share one of their own,
+    with all workers of the run.
+    """
     folder = tmp_path_factory.getbasetemp()
     folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(folder / "airlight-cache"))
@@ -91,6 +98,8 @@ def clock(variant, monkeypatch) -> Clock:
 
 @pytest.fixture(autouse=True, scope="module")
 def _nothing_left_behind():
-    """Free the scenes of a module before the next one: Dr.Jit's virtual calls go over all objects that are alive."""
+    """Free the scenes of a module before the next one: Dr.Jit's virtual calls go over
+    all objects that are alive.
+    """
     yield
     gc.collect()

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the launcher `./airlight` makes its environment once, repairs a broken one, and says what to type.
+"""Claim: the launcher `./airlight` makes its environment once, repairs a broken
+one, and says what to type.
 
-A Python and an apt-get that only say what they were asked stand for the machine's. `reports/machine/test_install.py`
-tests what installs the packages. The real installation needs a network; it happens wherever `./airlight test` runs on a
-fresh clone.
+A Python and an apt-get that only say what they were asked stand for the machine's.
+`reports/machine/test_install.py` tests what installs the packages. The real installation needs a
+network; it happens wherever `./airlight test` runs on a fresh clone.
 """
 
 import os
@@ -20,8 +21,9 @@ pytestmark = [
     pytest.mark.claim("launcher"),
 ]
 
-# Stands for every Python of the machine and, through a symbolic link, of the environment. It logs what it is asked
-# and fails on request: a file `no-ensurepip` or `install-fails` beside it says which.
+# Stands for every Python of the machine and, through a symbolic link, of the environment. It logs
+# what it is asked and fails on request: a file `no-ensurepip` or `install-fails` beside it says
+# which.
 _PYTHON = """#!/bin/sh
 here=$(dirname "$(readlink -f "$0")")
 case "$*" in
@@ -41,7 +43,9 @@ echo "apt-get $*" >>"$(dirname "$0")/log"
 
 @pytest.fixture
 def machine(tmp_path):
-    """A folder of programs that stand for the machine's, and a copy of the launcher in a project beside it."""
+    """A folder of programs that stand for the machine's, and a copy of the
+    launcher in a project beside it.
+    """
     project, programs = tmp_path / "a project", tmp_path / "programs"
     project.mkdir()
     programs.mkdir()
@@ -49,7 +53,18 @@ def machine(tmp_path):
     for name in ("uv.lock", "pyproject.toml"):
         (project / name).write_text(f"{name}\n")
     _program(programs / "python3.11", _PYTHON)
-    for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "flock"]:
+    for name in [
+        "sh",
+        "cksum",
+        "dirname",
+        "basename",
+        "readlink",
+        "mkdir",
+        "ln",
+        "rm",
+        "cat",
+        "flock",
+    ]:
         if found := shutil.which(name):
             (programs / name).symlink_to(found)
     _program(programs / "id", "#!/bin/sh\necho 1000\n")
@@ -77,12 +92,19 @@ def _log(machine: Path) -> list[str]:
 
 def test_the_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
-    assert (first.returncode, first.stdout) == (0, "ran <-P> <-m> <airlight> <report> <--scenes> <a b,c> <*> with\n")
+    assert (first.returncode, first.stdout) == (
+        0,
+        "ran <-P> <-m> <airlight> <report> <--scenes> <a b,c> <*> with\n",
+    )
     assert _log(machine) == ["venv", "install"]
     assert first.stderr.count("\n") == 1
     (machine / "link").symlink_to(machine / "a project" / "airlight")
     second = _start(machine, "--version", launcher=machine / "link")
-    assert (second.returncode, second.stdout, second.stderr) == (0, "ran <-P> <-m> <airlight> <--version> with\n", "")
+    assert (second.returncode, second.stdout, second.stderr) == (
+        0,
+        "ran <-P> <-m> <airlight> <--version> with\n",
+        "",
+    )
     assert _log(machine) == []
 
 
@@ -96,7 +118,9 @@ def test_new_versions_are_installed_on_top_with_all_extras_that_were_added(machi
 
 
 def test_an_extra_is_added_once_to_what_is_there(machine):
-    """The command that needs it starts the launcher again, and is told what was added: it does not ask twice."""
+    """The command that needs it starts the launcher again, and is told what was
+    added: it does not ask twice.
+    """
     _start(machine, "list")
     assert _log(machine) == ["venv", "install"]
     added = _start(machine, "sweep", "x.toml", AIRLIGHT_EXTRAS="sweep")
@@ -184,7 +208,10 @@ def test_libraries_are_installed_for_root_and_named_for_others(machine):
     _program(machine / "programs" / "apt-get", _APT)
     first = _start(machine, "doctor")
     assert first.returncode == 0
-    assert "missing: sudo apt-get install -y libllvm19 libatomic1; other" in first.stderr.splitlines()[-1]
+    assert (
+        "missing: sudo apt-get install -y libllvm19 libatomic1; other"
+        in first.stderr.splitlines()[-1]
+    )
     _log(machine)
     shutil.rmtree(machine / "a project" / ".venv")
     _program(machine / "programs" / "id", "#!/bin/sh\necho 0\n")

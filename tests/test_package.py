@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: the lock pins all that is needed, an import sets nothing, help is light, and a wheel holds the packages.
+"""Claims: the lock pins all that is needed, an import sets nothing, help is light, and a
+wheel holds the packages.
 
 Who may import whom, style and types are checked by `.ci/lint`.
 """
@@ -22,7 +23,9 @@ PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
 
 
 def _python(code: str, cwd: Path = ROOT) -> str:
-    ran = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=cwd, capture_output=True, text=True)
+    ran = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=cwd, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     return ran.stdout
 
@@ -41,9 +44,18 @@ def _uv(*words: str) -> str:
 def test_the_lock_pins_what_the_project_declares_with_files_of_the_public_index():
     _uv("lock", "--check")
     packages = tomllib.loads((ROOT / "uv.lock").read_text())["package"]
-    files = [file for each in packages for file in (*each.get("wheels", ()), *filter(None, [each.get("sdist")]))]
-    assert {each["source"].get("registry") for each in packages} == {None, "https://pypi.org/simple"}
-    assert all(file["url"].startswith("https://files.pythonhosted.org/") and file["hash"] for file in files)
+    files = [
+        file
+        for each in packages
+        for file in (*each.get("wheels", ()), *filter(None, [each.get("sdist")]))
+    ]
+    assert {each["source"].get("registry") for each in packages} == {
+        None,
+        "https://pypi.org/simple",
+    }
+    assert all(
+        file["url"].startswith("https://files.pythonhosted.org/") and file["hash"] for file in files
+    )
 
 
 @pytest.mark.claim("locked-dependencies")
@@ -56,7 +68,9 @@ def test_the_launcher_installs_what_the_lock_says_and_nothing_else(extras):
         package, *checksums = line.split("--hash=")
         wanted = Requirement(package)
         if wanted.marker is None or wanted.marker.evaluate():
-            expected.add((wanted.name, str(wanted.specifier), frozenset(each.strip() for each in checksums)))
+            expected.add(
+                (wanted.name, str(wanted.specifier), frozenset(each.strip() for each in checksums))
+            )
     found = [line.split(" --hash=") for line in requirements(extras)]
     assert {(*each.partition("==")[::2], frozenset(files)) for each, *files in found} == {
         (name, version.removeprefix("=="), files) for name, version, files in expected
@@ -66,14 +80,27 @@ def test_the_launcher_installs_what_the_lock_says_and_nothing_else(extras):
 def test_importing_everything_sets_no_variant_and_fails_nowhere():
     paths = [path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]
     parts = [path.relative_to(ROOT).with_suffix("").parts for path in paths]
-    names = ["airlight", *(".".join(("airlight", *each)).removesuffix(".__init__") for each in parts)]
+    names = [
+        "airlight",
+        *(".".join(("airlight", *each)).removesuffix(".__init__") for each in parts),
+    ]
     code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"
     _python(code + "import mitsuba; assert mitsuba.variant() is None, mitsuba.variant()")
 
 
 @pytest.mark.claim("help-is-light")
 def test_help_imports_nothing_heavy():
-    heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
+    heavy = (
+        "mitsuba",
+        "drjit",
+        "numpy",
+        "scipy",
+        "mpmath",
+        "matplotlib",
+        "colour",
+        "OpenEXR",
+        "jinja2",
+    )
     code = (
         "import sys, airlight\n"
         "from airlight.reports.commands.start import main\n"
@@ -93,13 +120,17 @@ def hostile(tmp_path):
         (tmp_path / name).mkdir()
     (tmp_path / "reference" / "__init__.py").touch()
     (tmp_path / "validation.py").write_text("raise SystemExit('a module of the user')\n")
-    (tmp_path / "script.py").write_text("import reference, airlight\nprint(airlight.SCENES['open-fog'].name)\n")
+    (tmp_path / "script.py").write_text(
+        "import reference, airlight\nprint(airlight.SCENES['open-fog'].name)\n"
+    )
     return tmp_path
 
 
 def test_packages_of_the_same_names_beside_a_script_are_not_taken_for_ours(hostile):
     for command in (["script.py"], ["-m", "airlight", "list", "papers"]):
-        ran = subprocess.run([sys.executable, *command], cwd=hostile, capture_output=True, text=True)
+        ran = subprocess.run(
+            [sys.executable, *command], cwd=hostile, capture_output=True, text=True
+        )
         assert ran.returncode == 0, ran.stderr
 
 
@@ -123,7 +154,9 @@ def wheel(tmp_path_factory):
         shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
     build = "import sys, setuptools.build_meta as backend; print(backend.build_wheel(sys.argv[1]))"
     command = [sys.executable, "-c", build, str(folder / "dist")]
-    ran = subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True)
+    ran = subprocess.run(
+        command, cwd=folder, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     return next((folder / "dist").glob("*.whl")), tracked
 
@@ -131,11 +164,21 @@ def wheel(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.claim("wheel-holds-the-packages")
 def test_a_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel):
-    """Templates, schemas and data are not forgotten, tests are not taken, and `airlight` is the only name."""
+    """Templates, schemas and data are not forgotten, tests are not taken, and
+    `airlight` is the only name.
+    """
     path, tracked = wheel
     with zipfile.ZipFile(path) as archive:
-        held = {name for name in archive.namelist() if not name.endswith("/") and ".dist-info/" not in name}
-    own = {name.removeprefix("src/") for name in tracked if name.startswith("src/") and (ROOT / name).is_file()}
+        held = {
+            name
+            for name in archive.namelist()
+            if not name.endswith("/") and ".dist-info/" not in name
+        }
+    own = {
+        name.removeprefix("src/")
+        for name in tracked
+        if name.startswith("src/") and (ROOT / name).is_file()
+    }
     assert held == own | {f"airlight/{name}" for name in tracked if name.split("/")[0] in PACKAGES}
 
 
@@ -147,12 +190,22 @@ def test_an_installed_wheel_does_its_work_beside_folders_of_its_names(wheel, hos
     site, home = hostile / "site", hostile / "home"
     with zipfile.ZipFile(path) as archive:
         archive.extractall(site)
-    assert {each.name for each in site.iterdir() if not each.name.endswith(".dist-info")} == {"airlight"}
+    assert {each.name for each in site.iterdir() if not each.name.endswith(".dist-info")} == {
+        "airlight"
+    }
     (hostile / "mine.py").write_text("def fog(view):\n    return 0.01 + 0 * view.direction.x\n")
-    # -S and the folders of packages: what an editable installation has put into this environment is not there.
+    # -S and the folders of packages: what an editable installation has put into this
+    # environment is not there.
     packages = [place for place in sys.path if place.endswith(("site-packages", "dist-packages"))]
-    world = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "AIRLIGHT"))}
-    world |= {"PYTHONPATH": os.pathsep.join([str(site), *packages]), "AIRLIGHT_CACHE_DIR": str(home)}
+    world = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "AIRLIGHT"))
+    }
+    world |= {
+        "PYTHONPATH": os.pathsep.join([str(site), *packages]),
+        "AIRLIGHT_CACHE_DIR": str(home),
+    }
     small = ["--size", "16x12"]
     for words in (
         ["list"],
@@ -164,6 +217,8 @@ def test_an_installed_wheel_does_its_work_beside_folders_of_its_names(wheel, hos
         ran = subprocess.run(command, cwd=hostile, env=world, capture_output=True, text=True)
         assert ran.returncode == 0, ran.stderr
     code = "import airlight; print(airlight.__file__); airlight.render('open-fog', 'unshadowed', size=(4, 3))"
-    ran = subprocess.run([sys.executable, "-S", "-c", code], cwd=hostile, env=world, capture_output=True, text=True)
+    ran = subprocess.run(
+        [sys.executable, "-S", "-c", code], cwd=hostile, env=world, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.startswith(str(site))

@@ -1,19 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: every method is as accurate as its baseline says, in every scene; a fault of a thousandth is found."""
+"""Claim: every method is as accurate as its baseline says, in every scene; a fault
+of a thousandth is found.
+"""
 
 import copy
 
 import pytest
 
 from tests.evidence import baselines
-from tests.evidence.baselines import FOLDER, SCATTER_ONCE, compare_baseline, measure_baseline, read_baseline, updated
+from tests.evidence.baselines import (
+    FOLDER,
+    SCATTER_ONCE,
+    compare_baseline,
+    measure_baseline,
+    read_baseline,
+    updated,
+)
 
 QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
 
 
 @pytest.mark.claim("baselines", tolerance="the band of each number in its baseline")
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCATTER_ONCE]
+    "name",
+    [
+        name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
+        for name in SCATTER_ONCE
+    ],
 )
 def test_errors_are_those_of_the_baseline(name, variant):
     moves = compare_baseline(read_baseline(name), measure_baseline(name))
@@ -39,7 +52,9 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)
     assert {"airlight relative_rmse", "airlight p50", "airlight p99", "airlight max"} <= set(moved)
     # Configurations that were not measured are missed, too.
-    assert {move.what for move in moves if move.label != plain.label} == {"a baseline without its configuration"}
+    assert {move.what for move in moves if move.label != plain.label} == {
+        "a baseline without its configuration"
+    }
 
 
 def test_every_scene_has_a_baseline_and_every_baseline_its_scene():
@@ -48,7 +63,10 @@ def test_every_scene_has_a_baseline_and_every_baseline_its_scene():
         data = read_baseline(name)
         assert data["scene"] == name
         assert data["because"]
-        assert all("refused" in e or e["airlight"]["nonfinite"] == 0 for e in data["configurations"].values())
+        assert all(
+            "refused" in e or e["airlight"]["nonfinite"] == 0
+            for e in data["configurations"].values()
+        )
 
 
 LABEL = "unshadowed (uniform)"  # wrong by tens of per cent: far above the floor of rounding
@@ -57,7 +75,8 @@ LABEL = "unshadowed (uniform)"  # wrong by tens of per cent: far above the floor
 @pytest.mark.parametrize(
     ("layer", "name", "factor", "moves"),
     [
-        # The band of an average is 2 %, that of a maximum twice as wide; the reference has none beyond its six digits.
+        # The band of an average is 2 %, that of a maximum twice as wide; the reference has
+        # none beyond its six digits.
         ("airlight", "p99", 0.97, 1),
         ("airlight", "p99", 1.03, 1),
         ("airlight", "p99", 1.01, 0),
@@ -70,7 +89,11 @@ LABEL = "unshadowed (uniform)"  # wrong by tens of per cent: far above the floor
 def test_what_moves(layer, name, factor, moves):
     kept = read_baseline("open-fog")
     measured = copy.deepcopy(kept)
-    place = measured["reference"]["airlight"] if layer == "reference" else measured["configurations"][LABEL][layer]
+    place = (
+        measured["reference"]["airlight"]
+        if layer == "reference"
+        else measured["configurations"][LABEL][layer]
+    )
     place[name] *= factor
     assert len(compare_baseline(kept, measured)) == moves
     assert (updated(kept, measured, "why") is not None) == bool(moves)
@@ -85,5 +108,9 @@ def test_an_update_keeps_what_did_not_move():
     measured["configurations"][LABEL]["airlight"]["p99"] *= 2
     data = updated(kept, measured, "Edges are\n  sharper")
     assert (data["revision"], data["because"]) == (kept["revision"] + 1, "Edges are sharper")
-    differ = [label for label, entry in data["configurations"].items() if entry != kept["configurations"][label]]
+    differ = [
+        label
+        for label, entry in data["configurations"].items()
+        if entry != kept["configurations"][label]
+    ]
     assert differ == [LABEL]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes, measurements and statistics: the only package that sees both the methods and the reference.
+"""Scenes, measurements and statistics: the only package that sees both the
+methods and the reference.
 
 Read in this order:
 
@@ -11,8 +12,10 @@ Read in this order:
 - `columns.py`: records that know their columns: heading, unit, meaning;
 - `readers.py`: values in files of users;
 - `clock.py`, `timing.py`: times and memory of any work, and the record of a time;
-- `estimates/`: the reference of a scene by each estimator, budgets, and the agreement of the estimators;
-- `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;
+- `estimates/`: the reference of a scene by each estimator, budgets, and the
+  agreement of the estimators;
+- `study/`: scenes x sizes x changes x configurations: what each combination
+  costs and how wrong it is;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
 - `kernels/`: errors, cost and stability of airlight kernels;
 - `papers/`: the claims of papers as data, and the experiments that decide them;
@@ -21,7 +24,8 @@ Read in this order:
 - `engine/`: images of other renderers: whether they are right, and what is wrong with them;
 - `fog_model/`: the single scattering of an image as a function of what describes the fog;
 - `fit/`: which parameters of the fog explain an image;
-- `motion/`: independent renders and sequences of frames: bias apart from noise, flicker, lag, ghosts.
+- `motion/`: independent renders and sequences of frames: bias apart from
+  noise, flicker, lag, ghosts.
 
 `baselines/` holds what `airlight study scaling` measured once.
 """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The clock and the scales: what work on the device takes, and how much memory it holds.
 
-A time runs from the call until the arrays are ready on the device (`drjit.sync_thread`), by `analytic.clock`: a user
-also waits for launch and replay. Repeated times come after a warm-up, in which kernels are compiled and recorded, as
-medians with quartiles.
+A time runs from the call until the arrays are ready on the device (`drjit.sync_thread`), by
+`analytic.clock`: a user also waits for launch and replay. Repeated times come after a warm-up, in
+which kernels are compiled and recorded, as medians with quartiles.
 """
 
 import ctypes
@@ -22,8 +22,8 @@ import numpy as np
 from airlight.analytic.clock import Spent, stopwatch
 from airlight.validation.timing import Timing
 
-#: In which pieces of work take turns: five ends of rounds show a change of the machine that lasts a fifth of a run, and
-#: the median of five is not moved by two that it spoiled.
+#: In which pieces of work take turns: five ends of rounds show a change of the machine that lasts a
+#: fifth of a run, and the median of five is not moved by two that it spoiled.
 ROUNDS = 5
 
 _MIB = 1024  # of the numbers in `status` [KiB]
@@ -41,23 +41,35 @@ def timed(work: Callable[[], T]) -> tuple[T, Spent]:
 
 
 def time_repeated(
-    work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200, warm_up: int = 2
+    work: Callable[[], Any],
+    *,
+    seconds: float = 0.6,
+    least: int = 5,
+    most: int = 200,
+    warm_up: int = 2,
 ) -> Timing:
     """Time a piece of work repeatedly.
 
-    It takes about so many `seconds`, and `least` to `most` repetitions, after some runs of `warm_up`: the first
-    compiles and records, the second is the first replay.
+    It takes about so many `seconds`, and `least` to `most` repetitions, after some runs of
+    `warm_up`: the first compiles and records, the second is the first replay.
     """
     (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most, warm_up=warm_up)
     return timing
 
 
 def time_in_turns(
-    works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200, warm_up: int = 2
+    works: Sequence[Callable[[], Any]],
+    *,
+    seconds: float = 3.0,
+    least: int = 5,
+    most: int = 200,
+    warm_up: int = 2,
 ) -> list[Timing]:
-    """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
+    """Time several pieces of work in turns, so that other load on the machine
+    affects all of them alike.
 
-    Parameters are those of `time_repeated`; `seconds` are of all works together, `least` and `most` of each.
+    Parameters are those of `time_repeated`; `seconds` are of all works together,
+    `least` and `most` of each.
     """
     for _ in range(warm_up):
         for work in works:
@@ -76,12 +88,15 @@ class Piece(Generic[T]):
     rounds: int | None = None  #: in how many rounds it takes part, None for all
 
 
-def in_turns(pieces: Sequence[Piece[T]], *, rounds: int = ROUNDS, most: int = 200) -> list[list[list[T]]]:
-    """Do pieces of work in turns and return what they gave, by piece, by round in which it takes part, by repetition.
+def in_turns(
+    pieces: Sequence[Piece[T]], *, rounds: int = ROUNDS, most: int = 200
+) -> list[list[list[T]]]:
+    """Do pieces of work in turns and return what they gave, by piece, by round in which it
+    takes part, by repetition.
 
-    In each round every piece is repeated for its part of its seconds, so that what it left in the caches of the machine
-    is there as in an animation. A piece that takes part in few rounds has them evenly among all. `most` is the largest
-    number of repetitions in all rounds together.
+    In each round every piece is repeated for its part of its seconds, so that what it left in the
+    caches of the machine is there as in an animation. A piece that takes part in few rounds has
+    them evenly among all. `most` is the largest number of repetitions in all rounds together.
     """
     results: list[list[list[T]]] = [[] for _ in pieces]
     for number in range(rounds):
@@ -104,20 +119,23 @@ def _spent(work: Callable[[], Any]) -> Spent:
 
 def timing_of(spent: Sequence[Spent]) -> Timing:
     """Return median and quartiles of what repetitions took, and their least processor time."""
-    low, median, high = (float(value) for value in np.percentile([each.ms for each in spent], [25, 50, 75]))
+    low, median, high = (
+        float(value) for value in np.percentile([each.ms for each in spent], [25, 50, 75])
+    )
     return Timing(median, low, high, len(spent), min(each.cpu_ms for each in spent) or None)
 
 
 def peak_memory(work: Callable[[], Any]) -> float | None:
     """Return how much more memory the process holds at the peak of `work` than before it [MiB].
 
-    Memory that `work` frees before it ends counts; memory that was freed before does not. None where the system does
-    not say: only Linux lets a process forget an earlier peak.
+    Memory that `work` frees before it ends counts; memory that was freed before does not. None
+    where the system does not say: only Linux lets a process forget an earlier peak.
     """
     dr.sync_thread()
     gc.collect()
     dr.flush_malloc_cache()
-    with suppress(OSError, AttributeError):  # what the allocator keeps free would hide what small frames take
+    # what the allocator keeps free would hide what small frames take
+    with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
     try:
         Path("/proc/self/clear_refs").write_text(_FORGET)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Records that know their columns: heading, unit and meaning stand at the field, for every table, figure and file.
+"""Records that know their columns: heading, unit and meaning stand at the field, for
+every table, figure and file.
 
     @dataclass(frozen=True)
     class Cost:
         frame: float | None = column("frame", "ms", "a frame while nothing moves")
         error: Metrics | None = None        # a record within: its columns are `error.rmse` and so on
 
-A value within a record within a record has a key with dots, the path of the value in the JSON of the record too.
+A value within a record within a record has a key with dots, the path of the value in
+the JSON of the record too.
 """
 
 import math
@@ -36,13 +38,21 @@ class Column:
 
 
 def column(
-    heading: str = "", unit: str | None = None, meaning: str = "", *, default: Any = MISSING, factory: Any = MISSING
+    heading: str = "",
+    unit: str | None = None,
+    meaning: str = "",
+    *,
+    default: Any = MISSING,
+    factory: Any = MISSING,
 ) -> Any:
-    """Return a field of a data class with its heading (its name with spaces by default), its unit and its meaning.
+    """Return a field of a data class with its heading (its name with spaces by default),
+    its unit and its meaning.
 
     Its `default`, or what the `factory` makes, is the value where none is given.
     """
-    return field(default=default, default_factory=factory, metadata={_COLUMN: (heading, unit, meaning)})
+    return field(
+        default=default, default_factory=factory, metadata={_COLUMN: (heading, unit, meaning)}
+    )
 
 
 @cache
@@ -56,7 +66,9 @@ def columns_of(record: type) -> tuple[Column, ...]:
 
 @cache
 def described(record: type) -> dict[str, Column]:
-    """Return the descriptions of the fields of a data class by name; one that is no number and no text has no kind."""
+    """Return the descriptions of the fields of a data class by name; one that is no number
+    and no text has no kind.
+    """
     hints, found = get_type_hints(record), {}
     for each in fields(record):
         kind = _kind(hints[each.name])
@@ -68,7 +80,9 @@ def described(record: type) -> dict[str, Column]:
 
 
 def values_of(record: Any) -> dict[str, Any]:
-    """Return the values of a record by the keys of its columns, and `NAME.KEY` for what its mappings hold."""
+    """Return the values of a record by the keys of its columns, and `NAME.KEY`
+    for what its mappings hold.
+    """
     return flat({each.name: getattr(record, each.name) for each in fields(record)})
 
 
@@ -92,7 +106,8 @@ def flat(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return records, containers, arrays and numbers as JSON holds them: no NumPy types, None for what is not finite.
+    """Return records, containers, arrays and numbers as JSON holds them: no NumPy types,
+    None for what is not finite.
 
     A field that `repr` does not show, such as an image, is left out.
     """
@@ -110,7 +125,8 @@ def plain(value: Any) -> Any:
 
 
 def record_of(data: Any, kind: type[_Record]) -> _Record:
-    """Return a record of plain data, or of values by name; keys that it does not know are passed over.
+    """Return a record of plain data, or of values by name; keys that it does
+    not know are passed over.
 
     Raises `msgspec.ValidationError` for what does not fit its types.
     """

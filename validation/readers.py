@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readers of values in files of users, TOML and JSON: each takes what a value is, for messages, and the value.
+"""Readers of values in files of users, TOML and JSON: each takes what a value is, for
+messages, and the value.
 
 A reader returns the value, or raises InputError with what was given and what is expected.
 """
@@ -21,23 +22,35 @@ def read_toml(what: str, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(f"{what}: there is no file {path}; expected a TOML file, see docs/many-scenes.md") from None
+        raise InputError(
+            f"{what}: there is no file {path}; expected a TOML file, see docs/many-scenes.md"
+        ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{what} {path}: it cannot be read: {error}") from error
 
 
 def read_csv(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of a CSV file with the numbers of their lines; empty lines and those that begin with # go."""
+    """Return the rows of a CSV file with the numbers of their lines; empty lines and
+    those that begin with # go.
+    """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
-            rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
+            rows = [
+                (reader.line_num, [cell.strip() for cell in cells])
+                for cells in reader
+                if any(cells)
+            ]
     except (OSError, UnicodeDecodeError, csv.Error) as reason:
-        raise InputError(f"{path} cannot be read as a CSV file: {reason}; give a text file") from None
+        raise InputError(
+            f"{path} cannot be read as a CSV file: {reason}; give a text file"
+        ) from None
     rows = [(line, cells) for line, cells in rows if not cells[0].startswith("#")]
     for line, cells in rows[1:]:
         if len(cells) != len(rows[0][1]):
-            raise InputError(f"{path}, line {line}: {len(cells)} cells in a file of {len(rows[0][1])} columns")
+            raise InputError(
+                f"{path}, line {line}: {len(cells)} cells in a file of {len(rows[0][1])} columns"
+            )
     return rows
 
 
@@ -52,7 +65,8 @@ def read_list(what: str, value: Any, least: int = 1) -> list[Any]:
     """Return a list of at least so many entries."""
     if not isinstance(value, list) or len(value) < least:
         raise InputError(
-            f"{what}: got {value!r}, expected a list" + (f" with at least {least} entries" if least else "")
+            f"{what}: got {value!r}, expected a list"
+            + (f" with at least {least} entries" if least else "")
         )
     return value
 
@@ -87,30 +101,41 @@ def each_once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
     return items
 
 
-def read_named(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str) -> dict[str, Any]:
+def read_named(
+    prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str
+) -> dict[str, Any]:
     """Return the values that a table has of some names; it may have some others, and no more."""
     for name in data:
         if name not in (names := (*readers, *others)):
-            raise InputError(f"got {prefix}{name}, expected one of {', '.join(names)}{nearest(name, names)}")
+            raise InputError(
+                f"got {prefix}{name}, expected one of {', '.join(names)}{nearest(name, names)}"
+            )
     return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
 
 
 def several(read: Reader, least: int = 1) -> Reader:
     """Return a reader of a list, in which nothing is there twice."""
-    return lambda what, value: each_once(what, tuple(read(what, item) for item in read_list(what, value, least)))
+    return lambda what, value: each_once(
+        what, tuple(read(what, item) for item in read_list(what, value, least))
+    )
 
 
 def by_name(read: Reader) -> Reader:
     """Return a reader of a table whose values are alike."""
-    return lambda what, value: {name: read(f"{what}.{name}", each) for name, each in read_table(what, value).items()}
+    return lambda what, value: {
+        name: read(f"{what}.{name}", each) for name, each in read_table(what, value).items()
+    }
 
 
-def named_values(option: str, words: Iterable[str], read: Callable[[str], Value], wanted: str) -> dict[str, Value]:
+def named_values(
+    option: str, words: Iterable[str], read: Callable[[str], Value], wanted: str
+) -> dict[str, Value]:
     """Return values by name from words of the form 'NAME=VALUE'.
 
-    `option`: where the words stand, for messages; `words`: what the user wrote; `read`: returns the value of a text
-    that is not empty, or raises ValueError; `wanted`: what a word should look like, for messages. Raises InputError if
-    a word has another form, or two words give one name different values.
+    `option`: where the words stand, for messages; `words`: what the user wrote; `read`: returns the
+    value of a text that is not empty, or raises ValueError; `wanted`: what a word should look like,
+    for messages. Raises InputError if a word has another form, or two words give one name different
+    values.
     """
     values: dict[str, Value] = {}
     for word in words:
@@ -123,5 +148,7 @@ def named_values(option: str, words: Iterable[str], read: Callable[[str], Value]
             raise InputError(f"{option}: got {word!r}, expected {wanted}") from None
         if values.setdefault(name, value) != value:
             first = next(each.strip() for each in words if each.partition("=")[0].strip() == name)
-            raise InputError(f"{option}: got {first} and {word.strip()}, expected one of them: each name once")
+            raise InputError(
+                f"{option}: got {first} and {word.strip()}, expected one of them: each name once"
+            )
     return values

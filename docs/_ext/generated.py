@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that are made from the program and from a report.
 
-A mark `*Generated: NAME WORDS*` of a page is replaced by Markdown that the function of that name in `listed`,
-`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. A
-plain viewer shows the marks; `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages. Links to
-Python files of the project, which have no pages, become the names of the files. A notebook is read as the Markdown of
-its cells and of what they printed and showed.
+A mark `*Generated: NAME WORDS*` of a page is replaced by Markdown that the function of that name in
+`listed`, `measured`, `shown` or `tested` returns, before the page is read, so that nothing on the
+pages is copied by hand. A plain viewer shows the marks; `.venv/bin/python -m sphinx -W --keep-going
+docs airlight-docs` builds the pages. Links to Python files of the project, which have no pages,
+become the names of the files. A notebook is read as the Markdown of its cells and of what they
+printed and showed.
 """
 
 import json
@@ -21,7 +22,9 @@ from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).resolve().parents[2]
 _MARK = re.compile(r"\*Generated: ([a-z-]+)((?: [\w-]+)*)\*")
-_SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
+_SOURCE = re.compile(
+    r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)"
+)
 #: Documents in the folder above, and the pages that show them.
 _PAGES = {"../DESIGN.md": "conventions.md"}
 
@@ -55,7 +58,11 @@ def _notebook(text: str) -> str:
             if "text/html" in data:
                 parts.append("```{raw} html\n" + "".join(data["text/html"]) + "\n```")
             else:
-                parts.append("```text\n" + "".join(output.get("text") or data["text/plain"]).rstrip() + "\n```")
+                parts.append(
+                    "```text\n"
+                    + "".join(output.get("text") or data["text/plain"]).rstrip()
+                    + "\n```"
+                )
     return "\n\n".join(parts) + "\n"
 
 
@@ -68,8 +75,12 @@ def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
     content[0] = fill(text)
 
 
-def _escape(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Keep the underscore at the end of a parameter's name, which reStructuredText would take for a link."""
+def _escape(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Keep the underscore at the end of a parameter's name, which
+    reStructuredText would take for a link.
+    """
     lines[:] = [re.sub(r"^:param (\w+)_:", r":param \1\\_:", line) for line in lines]
 
 

@@ -21,7 +21,9 @@ LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tile
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
-    """Return a Markdown table whose first columns, of words, stand to the left and the others, of numbers, right."""
+    """Return a Markdown table whose first columns, of words, stand to the left and the
+    others, of numbers, right.
+    """
     rule = ["---" if number < words else "---:" for number in range(len(headers))]
     return "\n".join("| " + " | ".join(row) + " |" for row in [headers, rule, *rows]) + "\n"
 
@@ -74,9 +76,17 @@ def names() -> str:
 
 
 def signatures() -> str:
-    """Return the functions and classes of `import airlight` with their docstrings, and the results that they return."""
-    paths = {f"{each.__module__}.{each.__name__}": each for each in _public().values() if _documented(each)}
-    classes = {path: inspect.isclass(value) for path, value in paths.items()} | dict.fromkeys(_RESULTS, True)
+    """Return the functions and classes of `import airlight` with their docstrings, and the
+    results that they return.
+    """
+    paths = {
+        f"{each.__module__}.{each.__name__}": each
+        for each in _public().values()
+        if _documented(each)
+    }
+    classes = {path: inspect.isclass(value) for path, value in paths.items()} | dict.fromkeys(
+        _RESULTS, True
+    )
     shown = [
         f".. autoclass:: {path}\n   :members:" if is_class else f".. autofunction:: {path}"
         for path, is_class in classes.items()
@@ -107,7 +117,10 @@ def methods() -> str:
 
 def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Table:
     """Return a table whose names are code, with links where they have an address."""
-    rows = (Row(row.values | {"name": Name(row.values["name"], address(row.values["name"]))}) for row in shown.rows)
+    rows = (
+        Row(row.values | {"name": Name(row.values["name"], address(row.values["name"]))})
+        for row in shown.rows
+    )
     return replace(shown, rows=tuple(rows))
 
 
@@ -134,7 +147,11 @@ def history() -> str:
 
 def _fields(record: Any) -> str:
     rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(record)]
-    return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
+    return (
+        table(("`--set`", "values", "what it does"), rows, 3)
+        if rows
+        else "The method has no parameters."
+    )
 
 
 def _parameter(item: Any) -> tuple[str, str]:
@@ -143,7 +160,9 @@ def _parameter(item: Any) -> tuple[str, str]:
 
     limits = limits_of(item)
     if isinstance(item.default, str) and limits.choices:
-        values = ", ".join(f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices)))
+        values = ", ".join(
+            f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices))
+        )
     else:
         values = f"{item.default}; {wanted_values(item)}"
     what = _cell(limits.help)
@@ -161,7 +180,9 @@ def studies() -> str:
     """Return the studies with what each measures."""
     from airlight.reports.studies.registry import STUDIES, summary
 
-    return table(("study", "what it measures"), [(f"`{name}`", _cell(summary(name))) for name in STUDIES], 2)
+    return table(
+        ("study", "what it measures"), [(f"`{name}`", _cell(summary(name))) for name in STUDIES], 2
+    )
 
 
 def sweep_columns() -> str:
@@ -186,10 +207,15 @@ def commands() -> str:
 
 
 def report_keys(*parts: str) -> str:
-    """Return tables of the keys of parts of `report.json`, or of the file itself, from its records."""
+    """Return tables of the keys of parts of `report.json`, or of the file
+    itself, from its records.
+    """
     found = []
     for part in parts or ("report",):
         record = record_types()[part.title().replace("-", "")]
         rows = [(f"`{name}`", what) for name, what in meanings(record).items()]
-        found.append((f"**{part.replace('-', ' ')}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
+        found.append(
+            (f"**{part.replace('-', ' ')}**\n\n" if parts else "")
+            + table(("key", "what it is"), rows, 2)
+        )
     return "\n".join(found)

@@ -47,13 +47,18 @@ def data() -> dict[str, Any]:
 
 @cache
 def kept_scenes() -> tuple[KeptScene, ...]:
-    """Return the kept numbers of every scene; other keys of a method and its errors have their usual values."""
+    """Return the kept numbers of every scene; other keys of a method and its errors
+    have their usual values.
+    """
 
     def row(entry: Mapping[str, Any]) -> dict[str, Any]:
         error = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
         return {**entry, "error": error}
 
-    scenes = ({**scene, "methods": [row(entry) for entry in scene["methods"]]} for scene in data()["scenes"])
+    scenes = (
+        {**scene, "methods": [row(entry) for entry in scene["methods"]]}
+        for scene in data()["scenes"]
+    )
     return tuple(record_of(scene, KeptScene) for scene in scenes)
 
 
@@ -65,11 +70,15 @@ def provenance() -> str:
     sizes = dict.fromkeys("{} x {}".format(*scene.size) for scene in kept_scenes())
     timed = "{} x {}".format(*report["timed"])
     return (
-        f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
+        f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} "
+        "threads, "
         f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
-        f"`{command}`. Times are medians of whole frames of {timed} pixels, kernels compiled before, the "
-        "geometry static; `light moved`: a frame after it moved. Errors are those of the airlight of images of "
-        f"{' and '.join(sizes)} pixels against the `quadrature` reference: relative RMSE and bias over the mean, and "
+        f"`{command}`. Times are medians of whole frames of {timed} pixels, kernels compiled "
+        "before, the "
+        "geometry static; `light moved`: a frame after it moved. Errors are those of the airlight "
+        "of images of "
+        f"{' and '.join(sizes)} pixels against the `quadrature` reference: relative RMSE and bias "
+        "over the mean, and "
         "quantiles of |test - ref| / max(ref, 0.001 mean(ref)).*"
     )
 
@@ -93,7 +102,9 @@ def method(name: str) -> str:
                 continue
             label = _inside(entry.label)
             if entry.reason or entry.error is None:
-                notes.append(f"- {scene.name}, {label}: {entry.reason or entry.note or 'not measured'}")
+                notes.append(
+                    f"- {scene.name}, {label}: {entry.reason or entry.note or 'not measured'}"
+                )
             else:
                 row = method_row(entry)
                 rows.append(Row(row.values | {"scene": Name(scene.name), "label": label}))
@@ -125,10 +136,16 @@ def kernel_costs(phase: str) -> str:
         return "No costs of kernels are at hand: `airlight study kernels` measures them."
     costs = []
     for cost in (record_of(each, KernelCost) for each in kernels["costs"]):
-        default = next(iter(KERNELS[cost.family].parameters.values()), None) if cost.family in KERNELS else None
+        default = (
+            next(iter(KERNELS[cost.family].parameters.values()), None)
+            if cost.family in KERNELS
+            else None
+        )
         if cost.phase == phase and cost.size in (default, None):
             costs.append(replace(cost, device=cost.time))
-    return markdown(cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max"))
+    return markdown(
+        cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max")
+    )
 
 
 def left_out() -> str:
@@ -144,7 +161,9 @@ def _percent(found: Fraction) -> str:
 
 
 def scenes() -> str:
-    """Return the gallery: every built-in scene with its picture, what it is for and what it holds."""
+    """Return the gallery: every built-in scene with its picture, what it
+    is for and what it holds.
+    """
     from airlight.validation.scenes.registry import SCENES
 
     kept = {scene.name: scene for scene in kept_scenes()}
@@ -156,13 +175,20 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
     words += [record.purpose, "", f"- Published: {record.published}."]
     if kept:
         count, lights = kept.counts, kept.plan["lights"]
-        words.append(f"- {count['shapes']} shapes, {count['triangles']} triangles, lights: {lights}.")
+        words.append(
+            f"- {count['shapes']} shapes, {count['triangles']} triangles, lights: {lights}."
+        )
         words.append(f"- Medium: {kept.plan['medium']}; extinction: {kept.plan['extinction']}.")
         reference = kept.reference
         if reference.relative_bound is not None:
             bound = number(reference.relative_bound, 2)
-            words.append(f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative bound {bound}.")
-        words.append(f"- Single scattering leaves out {_percent(kept.multiple.medium)} of the airlight.")
+            words.append(
+                f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative bound "
+                f"{bound}."
+            )
+        words.append(
+            f"- Single scattering leaves out {_percent(kept.multiple.medium)} of the airlight."
+        )
     return "\n".join([*words, ""])
 
 
@@ -173,37 +199,54 @@ def cycles() -> str:
     right = [row for row in record["rows"] if row["injected"] == "right"]
     said = (
         f"{sum(row['right'] for row in faults)} of {len(faults)} faults are named first; "
-        f"{sum(row['right'] for row in right)} of {len(right)} right images are called right ({record['measured']}, "
+        f"{sum(row['right'] for row in right)} of {len(right)} right images are called right "
+        f"({record['measured']}, "
         f"Blender {record['blender']}, 160 x 120 pixels)."
     )
     return _faults(said, record["rows"])
 
 
 def numpy_faults() -> str:
-    """Return the faults that were set in a renderer in NumPy, and what the diagnosis said of each."""
+    """Return the faults that were set in a renderer in NumPy, and what
+    the diagnosis said of each.
+    """
     record = json.loads((DATA / "numpy-faults.json").read_text(encoding="utf-8"))
     rows = record["rows"]
     said = (
-        f"{sum(row['right'] for row in rows)} of {len(rows)} images are called what they are ({record['measured']}, "
+        f"{sum(row['right'] for row in rows)} of {len(rows)} images are called what they are "
+        f"({record['measured']}, "
         f"64 x 48 pixels, {100 * record['noise']:g} % of noise, the kind of pixel not told)."
     )
     return _faults(said, rows)
 
 
 def diagnosis_limits() -> str:
-    """Return how often the diagnosis names a fault of a right image, and finds that of a faulty one, by its limits."""
+    """Return how often the diagnosis names a fault of a right image, and finds that of a
+    faulty one, by its limits.
+    """
     record = json.loads((DATA / "diagnosis-calibration.json").read_text(encoding="utf-8"))
     width, height = record["size"]
     said = (
-        f"The limits are an evidence of {record['evidence']:g} and {100 * record['left']:g} % of the error "
+        f"The limits are an evidence of {record['evidence']:g} and {100 * record['left']:g} % of "
+        "the error "
         f"({record['measured']}, {width} x {height} pixels, `{record['command']}`)."
     )
-    head = ("right, first scenes", "faults, first scenes", "right, other scenes", "faults, other scenes")
+    head = (
+        "right, first scenes",
+        "faults, first scenes",
+        "right, other scenes",
+        "faults, other scenes",
+    )
     parts = [
-        table([first, *head], [[key, *_counted(record[part], key)] for key in record[part]["measured"]])
+        table(
+            [first, *head],
+            [[key, *_counted(record[part], key)] for key in record[part]["measured"]],
+        )
         for first, part in (("error of the engine", "by_error"), ("least evidence", "by_limit"))
     ]
-    return "\n\n".join([said, "Right images that were given a name, and faults that were named first:", *parts])
+    return "\n\n".join(
+        [said, "Right images that were given a name, and faults that were named first:", *parts]
+    )
 
 
 def _counted(counts: dict[str, Any], key: str) -> list[str]:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of pages that show pictures of the gallery, `docs/gallery/`, each with the command that makes it."""
+"""Parts of pages that show pictures of the gallery, `docs/gallery/`, each with
+the command that makes it.
+"""
 
 import json
 from functools import cache
@@ -34,7 +36,9 @@ def pictures(method: str) -> str:
         "error": f"The relative error of {method}",
         "sketch": f"How {method} works, seen from the side",
     }
-    images = "\n".join(f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items())
+    images = "\n".join(
+        f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items()
+    )
     return f"```{{container}} {('card', 'pair', 'triple')[len(present) - 1]}\n{images}\n```\n\n*{_caption(present)}*"
 
 
@@ -48,9 +52,11 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
     if error is None:
         return f"Rendered by `{rendered['command']}`."
     text = (
-        f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
+        f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red "
+        "where it is too "
         f"bright, white below 1e-4 of the reference, full colour from 1 on; relative RMSE "
-        f"{number(error['relative_rmse'], 2)} at {error['frame_ms']:.0f} ms a frame of 480 x 360 pixels, on two "
+        f"{number(error['relative_rmse'], 2)} at {error['frame_ms']:.0f} ms a frame of 480 x 360 "
+        "pixels, on two "
         "threads of a processor that also did other work."
     )
     if "sketch" not in present:
@@ -62,4 +68,8 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
 def scene_picture(name: str) -> str:
     """Return the picture of a scene with its command; nothing where it has none."""
     entry = kept().get(f"scene-{name}")
-    return "" if entry is None else f"![The scene {name}](gallery/{entry['file']})\n\n```sh\n{entry['command']}\n```\n"
+    return (
+        ""
+        if entry is None
+        else f"![The scene {name}](gallery/{entry['file']})\n\n```sh\n{entry['command']}\n```\n"
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The part of a page that lists every claim with the tests that protect it, and the last run of all tests."""
+"""The part of a page that lists every claim with the tests that protect it, and
+the last run of all tests.
+"""
 
 import ast
 import json
@@ -13,7 +15,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def tested_claims() -> str:
-    """Return the claims of `docs/claims.toml` by topic, each with its tests, their tier and what they allow.
+    """Return the claims of `docs/claims.toml` by topic, each with its tests, their
+    tier and what they allow.
 
     A claim without a test, or a test of a claim that is not listed, ends the build.
     """
@@ -24,7 +27,9 @@ def tested_claims() -> str:
             tests.setdefault(claim, []).append(line)
     listed = {claim for claims in topics.values() for claim in claims}
     if wrong := sorted(listed ^ set(tests)):
-        raise ExtensionError(f"docs/claims.toml: claims without a test, or tests of no claim: {', '.join(wrong)}")
+        raise ExtensionError(
+            f"docs/claims.toml: claims without a test, or tests of no claim: {', '.join(wrong)}"
+        )
     lines = []
     for topic, claims in topics.items():
         lines += [f"## {topic}", ""]
@@ -38,7 +43,9 @@ def _marks(path: Path) -> Iterator[tuple[str, str]]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     module = path.relative_to(ROOT).as_posix()
     of_all = [
-        node for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
+        node
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
     ]
     marked = [("", of_all)] + [
         (f"::{node.name}", [*of_all, *node.decorator_list])
@@ -48,8 +55,12 @@ def _marks(path: Path) -> Iterator[tuple[str, str]]:
     for name, expressions in marked:
         words = " ".join(ast.unparse(each) for each in expressions)
         tiers = [tier for tier in ("statistical", "slow") if f"mark.{tier}" in words] or ["default"]
-        for call in (node for each in expressions for node in ast.walk(each) if isinstance(node, ast.Call)):
-            if ast.unparse(call.func) == "pytest.mark.claim" and (name or call in ast.walk(of_all[0])):
+        for call in (
+            node for each in expressions for node in ast.walk(each) if isinstance(node, ast.Call)
+        ):
+            if ast.unparse(call.func) == "pytest.mark.claim" and (
+                name or call in ast.walk(of_all[0])
+            ):
                 allowed = [ast.literal_eval(option.value) for option in call.keywords]
                 line = f"- `{module}{name}` ({', '.join([*tiers, *allowed])})"
                 for claim in call.args:
@@ -62,8 +73,9 @@ def last_run() -> str:
     if not path.exists():
         return "No run of all tests is on record."
     run = json.loads(path.read_text(encoding="utf-8"))
-    words = (
-        f"{run['passed']} passed, {run['failed']} failed, {run['skipped']} skipped in {run['seconds'] / 60:.0f} minutes"
-    )
+    outcome = ", ".join(f"{run[name]} {name}" for name in ("passed", "failed", "skipped"))
+    words = f"{outcome} in {run['seconds'] / 60:.0f} minutes"
     compiled = f"kernels compiled {'quickly' if run.get('compilation') == 'quick' else 'in full'}"
-    return f"{run['date'][:10]}, commit {run['commit'][:12]}, {run['machine']}, {compiled}: {words}."
+    return (
+        f"{run['date'][:10]}, commit {run['commit'][:12]}, {run['machine']}, {compiled}: {words}."
+    )

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The description of a scene as properties of `bpy`, Blender's module: all that Cycles needs besides the meshes.
+"""The description of a scene as properties of `bpy`, Blender's module: all that Cycles
+needs besides the meshes.
 
-`render_cycles.py` creates what is listed here and assigns the properties by their names. Blender 5.0.1 was tried.
+`render_cycles.py` creates what is listed here and assigns the properties by their names.
+Blender 5.0.1 was tried.
 """
 
 import math
@@ -9,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-#: Properties of the scene: one scattering or reflection, no limit on values, means over pixels, linear values.
+#: Properties of the scene: one scattering or reflection, no limit on values, means
+#: over pixels, linear values.
 _SCENE: dict[str, Any] = {
     "render.engine": "CYCLES",
     "unit_settings.scale_length": 1.0,
     "cycles.max_bounces": 0,  # counted after the first scattering or reflection
     "cycles.diffuse_bounces": 0,
     "cycles.volume_bounces": 0,
-    "cycles.transparent_max_bounces": 1024,  # the bounds of media are crossed as transparent surfaces
+    # the bounds of media are crossed as transparent surfaces
+    "cycles.transparent_max_bounces": 1024,
     "cycles.sample_clamp_direct": 0.0,
     "cycles.sample_clamp_indirect": 0.0,
     "cycles.light_sampling_threshold": 0.0,
@@ -44,13 +48,15 @@ _KINDS = {"point": "POINT", "spot": "SPOT", "directional": "SUN"}
 
 
 def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
-    """Return the objects to create in Blender and the properties to assign, from a description by `describe_scene`.
+    """Return the objects to create in Blender and the properties to assign, from a
+    description by `describe_scene`.
 
-    `scene`, `image_settings` and `layered_image_settings` are properties by name. `camera` and each of `lights` have
-    `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`. `world` and each of `media`, by mesh, have
-    `phase` and `inputs` of a node "Volume Coefficients", None where there is no medium. `materials`, by mesh, have
-    `inputs` of a node "Diffuse BSDF" and say whether it is `two_sided`, black from behind otherwise. `objects` are
-    properties of every mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
+    `scene`, `image_settings` and `layered_image_settings` are properties by name. `camera` and each
+    of `lights` have `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`.
+    `world` and each of `media`, by mesh, have `phase` and `inputs` of a node "Volume Coefficients",
+    None where there is no medium. `materials`, by mesh, have `inputs` of a node "Diffuse BSDF" and
+    say whether it is `two_sided`, black from behind otherwise. `objects` are properties of every
+    mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
     """
     camera = described["camera"]
     width, height = camera["size"]
@@ -71,18 +77,25 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
                 "dof.use_dof": False,
             },
             # Blender's cameras look along -z, with y up in the image.
-            "matrix_world": _matrix(camera["right"], camera["up"], _negative(camera["forward"]), camera["position"]),
+            "matrix_world": _matrix(
+                camera["right"], camera["up"], _negative(camera["forward"]), camera["position"]
+            ),
         },
         "lights": [_light(light) for light in described["lights"]],
         "world": None if medium is None else _volume(medium),
         "media": {bounded["name"]: _volume(bounded) for bounded in described["bounded_media"]},
         "materials": {surface["name"]: _material(surface) for surface in described["surfaces"]},
-        "objects": {"cycles.shadow_terminator_offset": 0.0, "cycles.shadow_terminator_geometry_offset": 0.0},
+        "objects": {
+            "cycles.shadow_terminator_offset": 0.0,
+            "cycles.shadow_terminator_geometry_offset": 0.0,
+        },
     }
 
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
-    """Return a light; its power is that of a point light as bright in all directions as on its axis."""
+    """Return a light; its power is that of a point light as bright in all
+    directions as on its axis.
+    """
     if light["kind"] == "area":
         return {"cannot": "area lights were not tried in Cycles"}
     if light["kind"] == "spot" and light["beam_angle"] < light["cutoff_angle"]:
@@ -101,7 +114,8 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     else:
         data |= {"shadow_soft_size": 0.0, "use_soft_falloff": False}
     if light["kind"] == "spot":
-        data |= {"spot_size": 2 * math.radians(light["cutoff_angle"]), "spot_blend": 0.0}  # the whole angle
+        # the whole angle
+        data |= {"spot_size": 2 * math.radians(light["cutoff_angle"]), "spot_blend": 0.0}
     backward = _negative(light.get("axis", (0.0, 0.0, -1.0)))
     side = np.cross(backward, np.eye(3)[int(np.argmin(np.abs(backward)))])
     side /= np.linalg.norm(side)
@@ -117,7 +131,10 @@ def _volume(medium: dict[str, Any]) -> dict[str, Any]:
         return {"cannot": "height fog and grids were not tried in Cycles"}
     if phase["name"] not in _PHASES:
         return {"cannot": f"Cycles has no {phase['name']} phase function"}
-    inputs = {"Scatter Coefficients": medium["sigma_s"], "Absorption Coefficients": medium["sigma_a"]}
+    inputs = {
+        "Scatter Coefficients": medium["sigma_s"],
+        "Absorption Coefficients": medium["sigma_a"],
+    }
     if phase["name"] != "rayleigh":
         inputs["Anisotropy"] = phase.get("g", 0.0)  # g > 0 scatters forward
     return {"phase": _PHASES[phase["name"]], "inputs": inputs}
@@ -126,7 +143,10 @@ def _volume(medium: dict[str, Any]) -> dict[str, Any]:
 def _material(surface: dict[str, Any]) -> dict[str, Any]:
     if surface["textured"] or not surface["diffuse"]:
         return {"cannot": "a surface with one colour that is diffuse is needed"}
-    return {"inputs": {"Color": [*surface["reflectance"], 1.0], "Roughness": 0.0}, "two_sided": surface["two_sided"]}
+    return {
+        "inputs": {"Color": [*surface["reflectance"], 1.0], "Roughness": 0.0},
+        "two_sided": surface["two_sided"],
+    }
 
 
 def _negative(vector: Any) -> list[float]:
@@ -135,4 +155,6 @@ def _negative(vector: Any) -> list[float]:
 
 def _matrix(x: Any, y: Any, z: Any, place: Any) -> list[list[float]]:
     """Return the rows of the matrix whose columns are three axes and a place."""
-    return [[float(x[i]), float(y[i]), float(z[i]), float(place[i])] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
+    return [[float(x[i]), float(y[i]), float(z[i]), float(place[i])] for i in range(3)] + [
+        [0.0, 0.0, 0.0, 1.0]
+    ]

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Render a scene of airlight by Blender's Cycles, from what `airlight describe` says of it and nothing else.
+"""Render a scene of airlight by Blender's Cycles, from what `airlight describe`
+says of it and nothing else.
 
     airlight describe sphere-spot --size 160x120 --json -o sphere-spot.glb > sphere-spot.json
     python3.11 render_cycles.py sphere-spot.json sphere-spot.glb sphere-spot.exr --samples 512
     airlight compare sphere-spot sphere-spot.exr
 
-The interpreter needs the module `bpy` (`pip install bpy==5.0.1` for Python 3.11), or run
-`blender --background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is Blender's
-multi-layer EXR, whose layer `ViewLayer.Volume Direct` is the airlight. Rendered with Blender 5.0.1.
+The interpreter needs the module `bpy` (`pip install bpy==5.0.1` for Python 3.11), or run `blender
+--background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is
+Blender's multi-layer EXR, whose layer `ViewLayer.Volume Direct` is the airlight. Rendered with
+Blender 5.0.1.
 
-`cycles_properties.py` gives every number as a property of `bpy`; this file creates what is listed there and assigns it.
+`cycles_properties.py` gives every number as a property of `bpy`; this file creates what is
+listed there and assigns it.
 """
 
 import argparse
@@ -37,7 +40,12 @@ def main() -> None:
     parser.add_argument("output", help="the EXR file")
     parser.add_argument("--samples", type=int, default=512, help="paths per pixel")
     parser.add_argument("--layers", action="store_true", help="write a multi-layer file")
-    parser.add_argument("--filter", choices=FILTERS, default="box", help="the pixel filter; Cycles' own is the latter")
+    parser.add_argument(
+        "--filter",
+        choices=FILTERS,
+        default="box",
+        help="the pixel filter; Cycles' own is the latter",
+    )
     chosen = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
     properties = read(chosen.described)
     properties["scene"]["cycles.pixel_filter_type"] = FILTERS[chosen.filter]
@@ -59,7 +67,8 @@ def read(path: str) -> dict[str, Any]:
 def build(properties: dict[str, Any], gltf: str) -> None:
     """Make the scene."""
     scene = bpy.context.scene
-    bpy.data.batch_remove(list(bpy.data.objects))  # the cube, the lamp and the camera that Blender starts with
+    # the cube, the lamp and the camera that Blender starts with
+    bpy.data.batch_remove(list(bpy.data.objects))
     assign(scene, properties["scene"])
     shapes(properties, gltf)
     scene.camera = placed("camera", bpy.data.cameras.new("camera"), properties["camera"])

@@ -5,8 +5,9 @@
     python render_luxcore.py open-fog.json open-fog.glb open-fog.exr --samples 4096
     airlight compare open-fog open-fog.exr
 
-The interpreter needs the packages `pyluxcore` and `numpy`. Rendered with pyluxcore 2.11.2. Its media have Schlick's
-phase function alone, and its spots shine by 1/cos brighter off the axis: scenes with others are refused.
+The interpreter needs the packages `pyluxcore` and `numpy`. Rendered with pyluxcore 2.11.2. Its
+media have Schlick's phase function alone, and its spots shine by 1/cos brighter off the axis:
+scenes with others are refused.
 """
 
 import argparse
@@ -63,19 +64,25 @@ def properties(values: dict) -> pyluxcore.Properties:
     """Return settings in LuxCore's type."""
     properties = pyluxcore.Properties()
     for key, value in values.items():
-        properties.Set(pyluxcore.Property(key, list(value) if isinstance(value, list | tuple) else value))
+        properties.Set(
+            pyluxcore.Property(key, list(value) if isinstance(value, list | tuple) else value)
+        )
     return properties
 
 
 def media(described: dict) -> dict:
     """Return the medium of all space."""
     if described["bounded_media"]:
-        raise SystemExit("this script knows a medium of all space alone: choose a scene without bounded media")
+        raise SystemExit(
+            "this script knows a medium of all space alone: choose a scene without bounded media"
+        )
     medium = described["medium"]
     if medium is None:
         return {}
     if medium["phase"]["name"] != "isotropic":
-        raise SystemExit("LuxCore has Schlick's phase function: choose a scene with an isotropic medium")
+        raise SystemExit(
+            "LuxCore has Schlick's phase function: choose a scene with an isotropic medium"
+        )
     prefix = "scene.volumes.fog."
     return {
         prefix + "type": "homogeneous",
@@ -90,8 +97,9 @@ def media(described: dict) -> dict:
 def camera(described: dict) -> dict:
     """Return a pinhole; the angle of view is that of the longer side.
 
-    LuxCore takes row j for H - 1 - j, not H - j, counted in pixels from the other end: its images are a pixel too low.
-    The window of the film, -1 to 1 along the longer side, is moved by that pixel.
+    LuxCore takes row j for H - 1 - j, not H - j, counted in pixels from the other end: its images
+    are a pixel too low. The window of the film, -1 to 1 along the longer side, is moved by that
+    pixel.
     """
     camera = described["camera"]
     width, height = camera["size"]
@@ -118,7 +126,10 @@ def lights(described: list[dict]) -> dict:
     settings: dict = {}
     for number, light in enumerate(described):
         if light["kind"] != "point":
-            raise SystemExit(f"a {light['kind']} light of LuxCore is another one: choose a scene with point lights")
+            raise SystemExit(
+                f"a {light['kind']} light of LuxCore is another one: choose a scene with point "
+                "lights"
+            )
         prefix = f"scene.lights.lamp{number}."
         settings |= {
             prefix + "type": "point",
@@ -129,7 +140,9 @@ def lights(described: list[dict]) -> dict:
 
 
 def shapes(scene: pyluxcore.Scene, described: dict, path: str) -> None:
-    """Add the meshes of a .glb file, turned back to the scene's axes, with a diffuse material each."""
+    """Add the meshes of a .glb file, turned back to the scene's axes, with
+    a diffuse material each.
+    """
     with open(path, "rb") as stream:
         data = stream.read()
     length = struct.unpack_from("<I", data, 12)[0]

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reservoir of lights: of some candidates of each ray one is kept by chance, and one shadow ray is cast for it.
+"""A reservoir of lights: of some candidates of each ray one is kept by chance, and one
+shadow ray is cast for it.
 
-`airlight render fireflies --size 64x48 --method docs/examples/reservoirs.py:Reservoirs --set candidates=16 -o fog.png`
+`airlight render fireflies --size 64x48 --method docs/examples/reservoirs.py:Reservoirs --set
+candidates=16 -o fog.png`
 
-A candidate y is a light, taken by its power with the probability q, and an even fraction of the angle at it. With f(y)
-its radiance without shadows, its weight is w = |f(y)| / q, |f| the mean of the channels. The reservoir keeps a
-candidate with the probability w over the sum of all weights so far, and in the end
+A candidate y is a light, taken by its power with the probability q, and an even fraction of the
+angle at it. With f(y) its radiance without shadows, its weight is w = |f(y)| / q, |f| the mean of
+the channels. The reservoir keeps a candidate with the probability w over the sum of all weights so
+far, and in the end
 
     L = f(y) V(y) / |f(y)|  (1/M) sum of the M weights,        V the visibility,
 
-has the airlight for its mean, with any M (Talbot, Cline, Egbert 2005; Bitterli et al. 2020, eq. 6). Reservoirs of
-neighbours and of the last frame are not used: reuse makes pixels alike, and biased where visibility differs.
+has the airlight for its mean, with any M (Talbot, Cline, Egbert 2005; Bitterli et al. 2020, eq. 6).
+Reservoirs of neighbours and of the last frame are not used: reuse makes pixels alike, and biased
+where visibility differs.
 """
 
 from dataclasses import dataclass
@@ -39,10 +43,14 @@ class Reservoirs(airlight.Method):
     def check(self, scene):
         """Refuse lights at infinity, which have no angle."""
         if not all(light.w for light in scene.lights):
-            raise airlight.InputError("reservoirs: needs lights that have a place; remove the directional ones")
+            raise airlight.InputError(
+                "reservoirs: needs lights that have a place; remove the directional ones"
+            )
 
     def preparation(self, scene):
-        """Return a function of what draws the lights of each table: of points, of spots, of samples of area lights."""
+        """Return a function of what draws the lights of each table: of points, of spots,
+        of samples of area lights.
+        """
         return lambda now: tuple(map(airlight.light_choice, airlight.light_tables(now.lights)))
 
     def render(self, view, state, kernel):
@@ -76,11 +84,15 @@ class Reservoirs(airlight.Method):
         if view.features.shadows:
             lit &= view.visible(point, light)
         mean = dr.mean(color)
-        return dr.select(lit, color * (weights / (self.candidates * dr.select(mean > 0, mean, 1))), 0)
+        return dr.select(
+            lit, color * (weights / (self.candidates * dr.select(mean > 0, mean, 1))), 0
+        )
 
 
 def unshadowed(view, light, place):
-    """Return the radiance of one sample of a light without shadows [W/(m^2 sr)], and where it is [m]."""
+    """Return the radiance of one sample of a light without shadows [W/(m^2
+    sr)], and where it is [m].
+    """
     rays = view.lit_by(light)
     span = airlight.marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(place, span.width, span.begin))

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the mask of blue noise of the marchers: `python docs/tools/blue_noise.py realtime/numerics/blue_noise.npy`.
+"""Makes the mask of blue noise of the marchers: `python docs/tools/blue_noise.py
+realtime/numerics/blue_noise.npy`.
 
-64 x 64 pixels in 16 frames that repeat, by the void-and-cluster method (Ulichney 1993) in space and time (Wolfe,
-Morrical, Akenine-Moller, Ramamoorthi 2022): two values are near each other in the same frame, by exp(-d^2/(2 1.9^2)),
-or in the same pixel, by exp(-n^2/(2 1.9^2)) for frames n apart, and nowhere else. Ranks of all values become ranks by
-frame, so that each frame has each of the 256 levels 16 times: the numbers of a frame are even.
+64 x 64 pixels in 16 frames that repeat, by the void-and-cluster method (Ulichney 1993) in space and
+time (Wolfe, Morrical, Akenine-Moller, Ramamoorthi 2022): two values are near each other in the same
+frame, by exp(-d^2/(2 1.9^2)), or in the same pixel, by exp(-n^2/(2 1.9^2)) for frames n apart, and
+nowhere else. Ranks of all values become ranks by frame, so that each frame has each of the 256
+levels 16 times: the numbers of a frame are even.
 """
 
 import sys

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Render a scene of airlight by Cycles with a fault in it: as `render_cycles.py`, and one thing is set wrong.
+"""Render a scene of airlight by Cycles with a fault in it: as `render_cycles.py`,
+and one thing is set wrong.
 
     airlight describe sphere-spot --size 160x120 --json -o sphere-spot.glb > sphere-spot.json
-    python3.11 cycles_faults.py sphere-spot.json sphere-spot.glb folder --samples 256 --faults no-shadow g-lobe
-    airlight compare sphere-spot folder/no-shadow.exr --diagnose
+    python3.11 cycles_faults.py sphere-spot.json sphere-spot.glb folder --samples 256 --faults
+    no-shadow g-lobe airlight compare sphere-spot folder/no-shadow.exr --diagnose
 
-No pixel of an image is changed: the faults are in what Blender is told, before it renders or writes. Its PNG files are
-read back as numbers, as someone does who takes them for linear. `--list` prints each fault, the name that a diagnosis
-should give it, and what was done.
+No pixel of an image is changed: the faults are in what Blender is told, before it renders or
+writes. Its PNG files are read back as numbers, as someone does who takes them for linear. `--list`
+prints each fault, the name that a diagnosis should give it, and what was done.
 """
 
 import argparse
@@ -34,16 +35,25 @@ _PNG = {"file_format": "PNG", "color_mode": "RGB", "color_depth": "16"}
 def main() -> None:
     """Read the command line and render."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("described", nargs="?", help="what `airlight describe SCENE --json` printed")
+    parser.add_argument(
+        "described", nargs="?", help="what `airlight describe SCENE --json` printed"
+    )
     parser.add_argument("gltf", nargs="?", help="what `-o` wrote, for the meshes")
     parser.add_argument("folder", nargs="?", help="where the EXR files go")
-    parser.add_argument("--faults", nargs="*", choices=FAULTS, help="those that the scene can have, by default")
+    parser.add_argument(
+        "--faults", nargs="*", choices=FAULTS, help="those that the scene can have, by default"
+    )
     parser.add_argument("--samples", type=int, default=256, help="paths per pixel")
     parser.add_argument("--list", action="store_true", help="print the faults as JSON")
     chosen = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
     if chosen.list:
         print(
-            json.dumps({name: {"injected": injected, "words": words} for name, (injected, words, _) in FAULTS.items()})
+            json.dumps(
+                {
+                    name: {"injected": injected, "words": words}
+                    for name, (injected, words, _) in FAULTS.items()
+                }
+            )
         )
         return
     os.makedirs(chosen.folder, exist_ok=True)
@@ -54,7 +64,9 @@ def main() -> None:
             faulty(name, properties, after, chosen)
 
 
-def faulty(name: str, properties: Properties, after: Callable[[], Any] | None, chosen: argparse.Namespace) -> None:
+def faulty(
+    name: str, properties: Properties, after: Callable[[], Any] | None, chosen: argparse.Namespace
+) -> None:
     """Render a scene with a fault; `after` changes what Blender has made of the properties."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     build(properties, chosen.gltf)
@@ -91,20 +103,32 @@ def right(properties: Properties) -> None:
 
 def scene(**values: Any) -> Callable[[Properties], None]:
     """Set properties of the scene; dots in names are double underscores."""
-    return lambda properties: properties["scene"].update({name.replace("__", "."): v for name, v in values.items()})
+    return lambda properties: properties["scene"].update(
+        {name.replace("__", "."): v for name, v in values.items()}
+    )
 
 
 def volumes(change: Callable[[dict[str, Any]], Any]) -> Callable[[Properties], Any]:
     """Change the inputs of all media."""
 
     def changed(properties: Properties) -> Any:
-        media = [medium for medium in (properties["world"], *properties["media"].values()) if medium is not None]
-        return NOT_HERE if [change(medium["inputs"]) for medium in media].count(NOT_HERE) == len(media) else None
+        media = [
+            medium
+            for medium in (properties["world"], *properties["media"].values())
+            if medium is not None
+        ]
+        return (
+            NOT_HERE
+            if [change(medium["inputs"]) for medium in media].count(NOT_HERE) == len(media)
+            else None
+        )
 
     return changed
 
 
-def coefficients(change: Callable[[float, float], tuple[float, float]]) -> Callable[[Properties], Any]:
+def coefficients(
+    change: Callable[[float, float], tuple[float, float]],
+) -> Callable[[Properties], Any]:
     """Change scattering and absorption of all media by a function of both."""
 
     def changed(inputs: dict[str, Any]) -> None:
@@ -164,7 +188,9 @@ def other_unit(factor: float) -> Callable[[Properties], Any]:
 
 
 def mirrored(properties: Properties) -> Any:
-    """Mirror the world at the plane through the camera that is upright in the image: another handedness."""
+    """Mirror the world at the plane through the camera that is upright in the
+    image: another handedness.
+    """
     camera = Matrix(properties["camera"]["matrix_world"])
     mirror = camera @ Matrix.Diagonal((-1, 1, 1, 1)) @ camera.inverted()
     for light in properties["lights"]:
@@ -188,7 +214,9 @@ def meshes() -> list[bpy.types.Object]:
 def turned(properties: Properties) -> None:
     """Turn the camera upside down."""
     camera = properties["camera"]
-    camera["matrix_world"] = [list(row) for row in Matrix(camera["matrix_world"]) @ Matrix.Rotation(math.pi, 4, "Z")]
+    camera["matrix_world"] = [
+        list(row) for row in Matrix(camera["matrix_world"]) @ Matrix.Rotation(math.pi, 4, "Z")
+    ]
 
 
 def shifted(pixels: float) -> Callable[[Properties], None]:
@@ -260,7 +288,9 @@ def pane(fill: Callable[[bpy.types.NodeTree], bpy.types.NodeSocket]) -> Callable
 
 
 def darker_corners(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
-    """Return a pane that lets the fourth power of the cosine to the camera's axis through, as a lens does."""
+    """Return a pane that lets the fourth power of the cosine to the camera's axis
+    through, as a lens does.
+    """
     view, apart = tree.nodes.new("ShaderNodeCameraData"), tree.nodes.new("ShaderNodeSeparateXYZ")
     power, glass = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeBsdfTransparent")
     power.operation, power.inputs[1].default_value = "POWER", 4
@@ -277,7 +307,10 @@ def glow(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
     """Return a pane that shines."""
     shine, glass = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeBsdfTransparent")
     both = tree.nodes.new("ShaderNodeAddShader")
-    shine.inputs["Color"].default_value, shine.inputs["Strength"].default_value = (1, 1, 1, 1), 0.003
+    shine.inputs["Color"].default_value, shine.inputs["Strength"].default_value = (
+        (1, 1, 1, 1),
+        0.003,
+    )
     tree.links.new(shine.outputs[0], both.inputs[0])
     tree.links.new(glass.outputs[0], both.inputs[1])
     return both.outputs[0]
@@ -297,7 +330,9 @@ def png(transform: str, **more: Any) -> Callable[[Properties], None]:
 
 def bounces(count: int) -> Callable[[Properties], None]:
     """Let light scatter again."""
-    return scene(cycles__max_bounces=count, cycles__volume_bounces=count, cycles__diffuse_bounces=count)
+    return scene(
+        cycles__max_bounces=count, cycles__volume_bounces=count, cycles__diffuse_bounces=count
+    )
 
 
 def with_lamp_in_view(change: Callable[[Properties], None]) -> Callable[[Properties], Any]:
@@ -305,9 +340,15 @@ def with_lamp_in_view(change: Callable[[Properties], None]) -> Callable[[Propert
 
     def changed(properties: Properties) -> Any:
         eye = Matrix(properties["camera"]["matrix_world"])
-        places = [eye.inverted() @ Matrix(light["matrix_world"]).translation for light in properties["lights"]]
+        places = [
+            eye.inverted() @ Matrix(light["matrix_world"]).translation
+            for light in properties["lights"]
+        ]
         half = math.tan(0.5 * properties["camera"]["data"]["angle"])
-        seen = [place.z < 0 and max(abs(place.x), 1.3 * abs(place.y)) < -half * place.z for place in places]
+        seen = [
+            place.z < 0 and max(abs(place.x), 1.3 * abs(place.y)) < -half * place.z
+            for place in places
+        ]
         return change(properties) if any(seen) else NOT_HERE
 
     return changed
@@ -317,18 +358,42 @@ NEAR = "POINT", "SPOT"
 FAULTS: dict[str, Fault] = {
     "right": ("right", "nothing", right),
     "factor-2": ("factor", "lamps of twice the power", lights(scaled("energy", 2), *NEAR)),
-    "factor-4-pi": ("factor", "I watts in the place of 4 pi I", lights(scaled("energy", 0.25 / math.pi), *NEAR)),
+    "factor-4-pi": (
+        "factor",
+        "I watts in the place of 4 pi I",
+        lights(scaled("energy", 0.25 / math.pi), *NEAR),
+    ),
     "factor-1.05": ("factor", "Film Exposure 1.05", scene(cycles__film_exposure=1.05)),
-    "extinction-1.5": ("extinction", "both coefficients 1.5 times", coefficients(lambda s, a: (1.5 * s, 1.5 * a))),
-    "extinction-0.9": ("extinction", "both coefficients 0.9 times", coefficients(lambda s, a: (0.9 * s, 0.9 * a))),
-    "absorption-0": ("absorption", "Volume Scatter alone: no absorption", coefficients(lambda s, a: (s, 0.0))),
-    "absorption-3": ("absorption", "the absorption three times", coefficients(lambda s, a: (s, 3 * a))),
+    "extinction-1.5": (
+        "extinction",
+        "both coefficients 1.5 times",
+        coefficients(lambda s, a: (1.5 * s, 1.5 * a)),
+    ),
+    "extinction-0.9": (
+        "extinction",
+        "both coefficients 0.9 times",
+        coefficients(lambda s, a: (0.9 * s, 0.9 * a)),
+    ),
+    "absorption-0": (
+        "absorption",
+        "Volume Scatter alone: no absorption",
+        coefficients(lambda s, a: (s, 0.0)),
+    ),
+    "absorption-3": (
+        "absorption",
+        "the absorption three times",
+        coefficients(lambda s, a: (s, 3 * a)),
+    ),
     "sigma-s": (
         "sigma-s",
         "sigma_t as Scatter, absorption on top",
         coefficients(lambda s, a: (s + a, a * (s + a) / s)),
     ),
-    "albedo-1": ("albedo", "sigma_t as Scatter Coefficients, no absorption", coefficients(lambda s, a: (s + a, 0.0))),
+    "albedo-1": (
+        "albedo",
+        "sigma_t as Scatter Coefficients, no absorption",
+        coefficients(lambda s, a: (s + a, 0.0)),
+    ),
     "albedo-twice": (
         "albedo",
         "the albedo twice: Volume Scatter of colour albedo and density sigma_s",
@@ -336,7 +401,11 @@ FAULTS: dict[str, Fault] = {
     ),
     "g-sign": ("g-sign", "Anisotropy -g", anisotropy(lambda g: -g)),
     "g-lobe": ("g", "Anisotropy 0.3 more", anisotropy(lambda g: g + 0.3)),
-    "g-0": ("phase", "Anisotropy 0, which is isotropic, as a new node has it", anisotropy(lambda g: 0.0)),
+    "g-0": (
+        "phase",
+        "Anisotropy 0, which is isotropic, as a new node has it",
+        anisotropy(lambda g: 0.0),
+    ),
     "multiple": ("multiple", "32 bounces", bounces(32)),
     "near-1": ("near-plane", "Clip Start 1 m", camera(clip_start=1.0)),
     "near-0.1": ("near-plane", "Clip Start 0.1 m, Blender's own", camera(clip_start=0.1)),
@@ -344,17 +413,33 @@ FAULTS: dict[str, Fault] = {
     "no-shadow": ("no-shadow", "meshes without Ray Visibility for shadows", shadowless),
     "linear-falloff": ("distance-law", "Light Falloff Linear", falloff("Linear")),
     "constant-falloff": ("distance-law", "Light Falloff Constant", falloff("Constant")),
-    "spot-half": ("spot-angle", "the half angle as Spot Size", lights(scaled("spot_size", 0.5), "SPOT")),
+    "spot-half": (
+        "spot-angle",
+        "the half angle as Spot Size",
+        lights(scaled("spot_size", 0.5), "SPOT"),
+    ),
     "spot-1.1": ("spot-angle", "Spot Size 1.1 times", lights(scaled("spot_size", 1.1), "SPOT")),
     "spot-blend": (
         "spot-falloff",
         "Spot Blend 0.15, Blender's own",
         lights(lambda data: data.update(spot_blend=0.15), "SPOT"),
     ),
-    "spot-blend-1": ("spot-falloff", "Spot Blend 1", lights(lambda data: data.update(spot_blend=1.0), "SPOT")),
-    "radius-0.3": ("light-radius", "Radius 0.3 m", lights(lambda data: data.update(shadow_soft_size=0.3), "POINT")),
+    "spot-blend-1": (
+        "spot-falloff",
+        "Spot Blend 1",
+        lights(lambda data: data.update(spot_blend=1.0), "SPOT"),
+    ),
+    "radius-0.3": (
+        "light-radius",
+        "Radius 0.3 m",
+        lights(lambda data: data.update(shadow_soft_size=0.3), "POINT"),
+    ),
     "moved": ("light-position", "the lamp 16 cm off", moved),
-    "fov-axis": ("fov-axis", "Sensor Fit Vertical with the horizontal angle", camera(sensor_fit="VERTICAL")),
+    "fov-axis": (
+        "fov-axis",
+        "Sensor Fit Vertical with the horizontal angle",
+        camera(sensor_fit="VERTICAL"),
+    ),
     "shift-0.5": ("shift", "half a pixel", shifted(0.5)),
     "shift-1": ("shift", "a pixel", shifted(1.0)),
     "mirrored": ("flip", "the world mirrored", mirrored),

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults that are set in Blender's Cycles, and what the diagnosis says of them: `docs/data/cycles-faults.json`.
+"""Faults that are set in Blender's Cycles, and what the diagnosis says of them:
+`docs/data/cycles-faults.json`.
 
-`python docs/tools/cycles_round_trips.py --python PYTHON --images FOLDER` describes scenes, lets an interpreter with
-`bpy` render them with faults by `cycles_faults.py`, diagnoses what is in the folder and writes the answers into the
-record, from which docs/your-engine.md is built. Images that are there are not rendered again.
+`python docs/tools/cycles_round_trips.py --python PYTHON --images FOLDER` describes scenes, lets an
+interpreter with `bpy` render them with faults by `cycles_faults.py`, diagnoses what is in the
+folder and writes the answers into the record, from which docs/your-engine.md is built. Images that
+are there are not rendered again.
 """
 
 import argparse
@@ -18,7 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 RECORD = ROOT / "docs/data/cycles-faults.json"
 _RENDERER = str(Path(__file__).with_name("cycles_faults.py"))
 #: Scenes that are rendered, and how to load them.
-SCENES = {"sphere-spot": "sphere-spot", "open-fog": "open-fog", "lobe-fog": "docs/examples/lobe-fog.xml"}
+SCENES = {
+    "sphere-spot": "sphere-spot",
+    "open-fog": "open-fog",
+    "lobe-fog": "docs/examples/lobe-fog.xml",
+}
 _SIZE = (160, 120)
 
 
@@ -32,7 +38,8 @@ def answers(
     name
         A name in `SCENES`.
     folder
-        Folder of its images; `faults.json` next to it lists the injected faults, if `python` is None.
+        Folder of its images; `faults.json` next to it lists the injected
+        faults, if `python` is None.
     python
         An interpreter that has `bpy`; None: only images that are there are diagnosed.
     samples
@@ -58,7 +65,11 @@ def answers(
             continue  # a scene that cannot have it
         (diagnosis,) = diagnose_file(path, scene, pixel="area", light=light)
         first = diagnosis.ranked[0]
-        print(f"{name}, {fault}: {diagnosis.first}, {diagnosis.residual:.2%}, {diagnosis.left:.2%} left", flush=True)
+        print(
+            f"{name}, {fault}: {diagnosis.first}, {diagnosis.residual:.2%}, {diagnosis.left:.2%} "
+            "left",
+            flush=True,
+        )
         yield {
             "scene": name,
             "fault": fault,
@@ -108,7 +119,9 @@ def render_faults(
     described, gltf = folder / "described.json", folder / "meshes.glb"
     described.write_text(json.dumps(describe_scene(loaded)), encoding="utf-8")
     write_gltf(gltf, loaded)
-    wanted = [fault for fault in faults or _listed(python, root) if not (folder / f"{fault}.exr").exists()]
+    wanted = [
+        fault for fault in faults or _listed(python, root) if not (folder / f"{fault}.exr").exists()
+    ]
     if wanted:
         options = ["--samples", str(samples), "--faults", *wanted]
         command = [python, _RENDERER, str(described), str(gltf), str(folder), *options]
@@ -117,7 +130,9 @@ def render_faults(
 
 def _listed(python: str, root: Path) -> dict[str, Any]:
     command = [python, _RENDERER, "--list"]
-    listed: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    listed: dict[str, Any] = json.loads(
+        subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    )
     return listed
 
 
@@ -127,16 +142,26 @@ def main() -> None:
     from airlight.reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--images", type=Path, required=True, help="folder of images, one folder for each scene")
-    parser.add_argument("--python", help="an interpreter that has `bpy`; without it only what is there is diagnosed")
+    parser.add_argument(
+        "--images", type=Path, required=True, help="folder of images, one folder for each scene"
+    )
+    parser.add_argument(
+        "--python", help="an interpreter that has `bpy`; without it only what is there is diagnosed"
+    )
     parser.add_argument("--samples", type=int, default=192, help="paths per pixel")
-    parser.add_argument("--scenes", nargs="*", choices=SCENES, default=list(SCENES), help="others keep their rows")
+    parser.add_argument(
+        "--scenes", nargs="*", choices=SCENES, default=list(SCENES), help="others keep their rows"
+    )
     chosen = parser.parse_args()
     activate()
     for name in chosen.scenes:
-        for row in answers(name, chosen.images / name, python=chosen.python, samples=chosen.samples):
+        for row in answers(
+            name, chosen.images / name, python=chosen.python, samples=chosen.samples
+        ):
             kept = json.loads(RECORD.read_text(encoding="utf-8"))["rows"] if RECORD.exists() else []
-            rows = [each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])] + [row]
+            rows = [
+                each for each in kept if (each["scene"], each["fault"]) != (name, row["fault"])
+            ] + [row]
             rows.sort(key=lambda each: list(SCENES).index(each["scene"]))
             record = {"measured": f"{datetime.now(UTC):%Y-%m-%d}", "blender": "5.0.1", "rows": rows}
             write_text(RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")

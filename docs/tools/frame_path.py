@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The files of `realtime` that a frame passes: `python docs/tools/frame_path.py SCENE METHOD`.
 
-Those in which a function runs from the loaded Mitsuba scene to the image, in the order of their first call.
+Those in which a function runs from the loaded Mitsuba scene to the image, in the
+order of their first call.
 """
 
 import sys
@@ -22,9 +23,15 @@ def files_of_frame(scene: str, method: str) -> list[str]:
     activate()
     loaded, passed = load_scene(scene, (64, 48)).scene, dict[str, None]()
     find_method(method)  # its files are loaded here: what runs while they are is no part of a frame
-    sys.setprofile(lambda frame, event, _: passed.setdefault(frame.f_code.co_filename) if event == "call" else None)
+    sys.setprofile(
+        lambda frame, event, _: (
+            passed.setdefault(frame.f_code.co_filename) if event == "call" else None
+        )
+    )
     try:
-        render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"]))
+        render_frame(
+            frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"])
+        )
     finally:
         sys.setprofile(None)
     paths = (Path(name).resolve() for name in passed)

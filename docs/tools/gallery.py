@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the pictures of README and documentation: `python docs/tools/gallery.py [NAME ..]`.
 
-A name is a picture's, a scene's or a method's; without one all are made, except for the page of a report, which takes a
-browser and a report in `airlight-report`. `docs/gallery/gallery.json` lists the file, the command and what it shows.
-How each method works is drawn in `method-NAME-sketch.png`, which no program makes.
+A name is a picture's, a scene's or a method's; without one all are made, except for the page of a
+report, which takes a browser and a report in `airlight-report`. `docs/gallery/gallery.json` lists
+the file, the command and what it shows. How each method works is drawn in `method-NAME-sketch.png`,
+which no program makes.
 """
 
 import io
@@ -46,20 +47,32 @@ COARSER = 3  #: by which error maps of area lights are coarser
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 SIZE, SMALL = (640, 480), (480, 360)
 SAMPLES = 16
-_SOFT = ("ray-march", ("shadow=map", "steps=64", "points=64"), 4)  # fewer light samples show as bands
+# fewer light samples show as bands
+_SOFT = ("ray-march", ("shadow=map", "steps=64", "points=64"), 4)
 _CLOUDS = ("cloud-octaves", (), 1)  # seconds a frame
-#: How a scene is shown where `shadow-planes` would be slow or refused: method, settings, rays a pixel.
+#: How a scene is shown where `shadow-planes` would be slow or refused:
+#: method, settings, rays a pixel.
 _OTHERWISE = {
     "tangle": ("light-volumes", ("map=1024",), SAMPLES),
     "smoke": ("ray-march", (), 4),
     **dict.fromkeys(("penumbra-plane", "fence", "soft-hall", "overlap"), _SOFT),
     **dict.fromkeys(
-        ("cloud-slab", "stratocumulus", "cumulus", "cumulus-detail", "step-cloud", "ring", "two-lobes"), _CLOUDS
+        (
+            "cloud-slab",
+            "stratocumulus",
+            "cumulus",
+            "cumulus-detail",
+            "step-cloud",
+            "ring",
+            "two-lobes",
+        ),
+        _CLOUDS,
     ),
 }
 #: Scenes that are seen from elsewhere, as `--change` takes it.
 _SEEN_FROM = {"two-lobes": ("camera.origin=-931.0,-713.0,1213.0", "camera.target=23.0,31.0,889.0")}
-#: The scene in which a method is shown, and its settings, where that is not `hall` and its defaults.
+#: The scene in which a method is shown, and its settings, where that is not
+#: `hall` and its defaults.
 _METHOD_SCENES = {
     "soft-shafts": ("penumbra-plane", ()),
     "cloud-octaves": ("cumulus", ()),
@@ -90,7 +103,9 @@ class Picture:
 
     @property
     def file(self) -> str:
-        """The name of its file: JPEG for what is rendered, PNG where colours must stay as they are."""
+        """The name of its file: JPEG for what is rendered, PNG where
+        colours must stay as they are.
+        """
         return f"{self.name}.{'png' if self.kind == 'error' else 'jpg'}"
 
     @property
@@ -99,16 +114,24 @@ class Picture:
         if self.kind not in ("scene", "method"):
             return f"python docs/tools/gallery.py {self.name}"
         width, height = SIZE if self.kind == "scene" else SMALL
-        words = [f"airlight render {self.scene} --method {self.method}", *(f"--set {word}" for word in self.settings)]
+        words = [
+            f"airlight render {self.scene} --method {self.method}",
+            *(f"--set {word}" for word in self.settings),
+        ]
         words += [f"--change {word}" for word in self.changes]
-        words += [f"--size {width}x{height}", f"--samples {self.samples}" if self.samples > 1 else ""]
+        words += [
+            f"--size {width}x{height}",
+            f"--samples {self.samples}" if self.samples > 1 else "",
+        ]
         return " ".join([*filter(None, words), f"-o {self.scene.removesuffix('.xml')}.png"])
 
 
 def scene_picture(scene: str) -> Picture:
     """Return the picture of a built-in scene."""
     method, settings, samples = _OTHERWISE.get(scene, ("shadow-planes", (), SAMPLES))
-    return Picture(f"scene-{scene}", "scene", scene, method, settings, samples, _SEEN_FROM.get(scene, ()))
+    return Picture(
+        f"scene-{scene}", "scene", scene, method, settings, samples, _SEEN_FROM.get(scene, ())
+    )
 
 
 def method_pictures(method: str) -> tuple[Picture, ...]:
@@ -137,10 +160,14 @@ def chosen_pictures(names: Iterable[str]) -> list[Picture]:
     known = list(pictures())
     chosen: dict[str, Picture] = {}
     for name in names:
-        found = [p for p in known if p.name == name or (name in (p.scene, p.method) and name in p.name)]
+        found = [
+            p for p in known if p.name == name or (name in (p.scene, p.method) and name in p.name)
+        ]
         if not found:
             near = nearest(name, [picture.name for picture in known])
-            raise InputError(f"gallery: got {name!r}, expected the name of a picture, a scene or a method{near}")
+            raise InputError(
+                f"gallery: got {name!r}, expected the name of a picture, a scene or a method{near}"
+            )
         chosen |= {picture.name: picture for picture in found}
     return list(chosen.values()) or [picture for picture in known if picture.kind != "page"]
 
@@ -161,7 +188,10 @@ def make(wanted: list[Picture]) -> None:
             "versions": {name: made_by[name] for name in ("airlight", "mitsuba", "drjit")},
             "made": datetime.now(UTC).date().isoformat(),
         } | measured
-        write_text(LIST, json.dumps({"pictures": dict(sorted(kept.items()))}, indent=1, allow_nan=False) + "\n")
+        write_text(
+            LIST,
+            json.dumps({"pictures": dict(sorted(kept.items()))}, indent=1, allow_nan=False) + "\n",
+        )
         print(FOLDER / picture.file, flush=True)
 
 
@@ -177,7 +207,8 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         return _rendered(picture, SIZE), {}
     if picture.kind == "method":
         return _rendered(picture, SMALL), {}
-    # The reference of an area light takes minutes: a third of the pixels along each side, drawn larger.
+    # The reference of an area light takes minutes: a third of the pixels along
+    # each side, drawn larger.
     coarser = COARSER if read_scene(load_scene(picture.scene, (8, 6)).scene).area_lights else 1
     loaded, frame = _frame(picture, (SMALL[0] // coarser, SMALL[1] // coarser))
     reference = reference_image(loaded.scene).airlight
@@ -186,7 +217,9 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     whole = read_scene(load_scene(picture.scene, SMALL).scene)
     milliseconds = time_frame(prepared(whole, chosen)).frame.median_ms
-    picture_of = _with_scale(colours.repeat(coarser, axis=0).repeat(coarser, axis=1), error, milliseconds)
+    picture_of = _with_scale(
+        colours.repeat(coarser, axis=0).repeat(coarser, axis=1), error, milliseconds
+    )
     return picture_of, {"relative_rmse": error, "frame_ms": milliseconds}
 
 
@@ -196,9 +229,19 @@ def _with_scale(colours: Pixels, error: float, milliseconds: float) -> Pixels:
     below = Image.new("RGB", (width, 46), "white")
     below.paste(Image.fromarray(error_scale()).resize((width // 2, 12)), (10, 6))
     write = ImageDraw.Draw(below)
-    for place, words in ((0.0, "-100 %"), (0.25, "-1 %"), (0.5, "0.01 %"), (0.75, "+1 %"), (1.0, "+100 %")):
+    for place, words in (
+        (0.0, "-100 %"),
+        (0.25, "-1 %"),
+        (0.5, "0.01 %"),
+        (0.75, "+1 %"),
+        (1.0, "+100 %"),
+    ):
         write.text(
-            (10 + place * width / 2, 22), words, fill="black", anchor="ma" if 0 < place < 1 else "la", font_size=11
+            (10 + place * width / 2, 22),
+            words,
+            fill="black",
+            anchor="ma" if 0 < place < 1 else "la",
+            font_size=11,
         )
     said = f"rel. RMSE {number(100 * error, 2)} %, {milliseconds:.0f} ms"
     write.text((width - 10, 12), said, fill="black", anchor="ra", font_size=14)
@@ -211,20 +254,29 @@ def _page() -> Pixels:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        raise MissingError("gallery: report-page is taken by playwright, which the extra `test` installs") from error
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+        raise MissingError(
+            "gallery: report-page is taken by playwright, which the extra `test` installs"
+        ) from error
+    chromium = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
     if chromium is None:
-        raise MissingError("gallery: report-page is taken by Chromium; install Debian's package chromium")
+        raise MissingError(
+            "gallery: report-page is taken by Chromium; install Debian's package chromium"
+        )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         window = browser.new_page(viewport={"width": 1300, "height": 1000}, color_scheme="light")
         window.goto((REPORT / "report.html").resolve().as_uri())
         window.wait_for_selector("html[data-drawn]", timeout=120_000, state="attached")
-        window.locator("#viewer-0 input[type=range]").fill("2")  # so that shafts are seen in a small picture
+        # so that shafts are seen in a small picture
+        window.locator("#viewer-0 input[type=range]").fill("2")
         window.wait_for_selector("#viewer-0[data-drawn$=' 2']")
         shot = window.screenshot()
         browser.close()
-    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS))
+    return np.asarray(
+        Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS)
+    )
 
 
 def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:
@@ -261,7 +313,9 @@ def _coded(pixels: Pixels, name: str) -> bytes:
         # No dithering: error maps are read by colour, and noise would not compress.
         for colours in (256, 128, 64, 32):
             buffer = io.BytesIO()
-            image.quantize(colours, dither=Image.Dither.NONE).save(buffer, format="PNG", optimize=True)
+            image.quantize(colours, dither=Image.Dither.NONE).save(
+                buffer, format="PNG", optimize=True
+            )
             if buffer.tell() <= LARGEST:
                 break
         return buffer.getvalue()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The picture of the live view in the documentation: `python docs/tools/live_view.py [FILE.png]`.
 
-It starts `airlight view`, opens its page in Chromium by Playwright (the extra `test`), and waits for the reference.
+It starts `airlight view`, opens its page in Chromium by Playwright (the extra `test`), and
+waits for the reference.
 """
 
 import shutil
@@ -25,7 +26,9 @@ def take_picture(path: Path) -> None:
         assert process.stdout is not None
         address = process.stdout.readline().strip()
         with sync_playwright() as running:
-            browser = running.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+            browser = running.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+            )
             page = browser.new_page(viewport={"width": 1060, "height": 740})
             page.goto(address)
             page.wait_for_selector("html[data-frame]")
@@ -46,4 +49,6 @@ def take_picture(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    take_picture(Path(sys.argv[1]) if len(sys.argv) > 1 else _ROOT / "docs" / "data" / "live-view.png")
+    take_picture(
+        Path(sys.argv[1]) if len(sys.argv) > 1 else _ROOT / "docs" / "data" / "live-view.png"
+    )

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Data of a report for the documentation: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
+"""Data of a report for the documentation: `python docs/tools/measured_data.py
+[--report DIR] [--kernels FILE]`.
 
-It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on which machine),
-`claims`, `scenes` (each with `counts`, `reference`, `multiple` and `methods`) and `kernels` (costs and errors of
-`airlight study kernels`, or null).
+It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on
+which machine), `claims`, `scenes` (each with `counts`, `reference`, `multiple` and `methods`) and
+`kernels` (costs and errors of `airlight study kernels`, or null).
 """
 
 import argparse
@@ -26,11 +27,26 @@ _METHOD = (
     *("scene", "label", "method", "kernel", "parameters", "width", "height", "knows_shadows"),
     *("status", "reason", "note"),
 )
-_COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
+_COST = (
+    "kernel",
+    "family",
+    "size",
+    "phase",
+    "g",
+    "device",
+    "wall",
+    "median",
+    "p99",
+    "max",
+    "nonfinite",
+    "refused",
+)
 
 
 def refresh(report: Path | None, kernels: Path | None) -> None:
-    """Write the data again from a report, from the costs of kernels, or both; what is not given stays as it was."""
+    """Write the data again from a report, from the costs of kernels, or both; what is
+    not given stays as it was.
+    """
     kept: dict[str, Any] = {"kernels": None}
     if DATA.exists():
         kept = _read_object(DATA, "the data of the documentation")
@@ -42,7 +58,9 @@ def refresh(report: Path | None, kernels: Path | None) -> None:
     write_text(DATA, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     before, rest = README.read_text(encoding="utf-8").split("<!-- results: begin -->\n")
     after = rest.split("<!-- results: end -->")[1]
-    write_text(README, f"{before}<!-- results: begin -->\n{results(kept)}<!-- results: end -->{after}")
+    write_text(
+        README, f"{before}<!-- results: begin -->\n{results(kept)}<!-- results: end -->{after}"
+    )
 
 
 def results(kept: dict[str, Any]) -> str:
@@ -53,8 +71,10 @@ def results(kept: dict[str, Any]) -> str:
         if entry["times"] and entry["error"] and entry["kernel"] in (None, "exact"):
             chosen.setdefault(entry["method"], entry)
     lines = [
-        f"The scene `{SHOWN}`, {' x '.join(map(str, report['timed']))} pixels, {report['processor']}, "
-        f"{report['threads']} threads, {report['created'][:10]}, by `airlight report`: the median time of a frame, and "
+        f"The scene `{SHOWN}`, {' x '.join(map(str, report['timed']))} pixels, "
+        f"{report['processor']}, "
+        f"{report['threads']} threads, {report['created'][:10]}, by `airlight report`: the median "
+        "time of a frame, and "
         "the error of its airlight against the reference.",
         "",
         "| method | frame \\[ms\\] | relative RMSE |",
@@ -67,7 +87,9 @@ def results(kept: dict[str, Any]) -> str:
 
 
 def _read_object(path: Path, what: str) -> dict[str, Any]:
-    """Return the object in a JSON file; raises InputError if the file is not there or holds something else."""
+    """Return the object in a JSON file; raises InputError if the file is not there
+    or holds something else.
+    """
     data = read_json(path, what)
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected {what}")
@@ -107,7 +129,11 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
-    times = {name: entry["times"][name] for name in ("frame", "airlight", "light_moved")} if entry["times"] else None
+    times = (
+        {name: entry["times"][name] for name in ("frame", "airlight", "light_moved")}
+        if entry["times"]
+        else None
+    )
     error = {name: entry["error"][name] for name in _ERRORS} if entry["error"] else None
     return {name: entry[name] for name in _METHOD} | {"times": times, "error": error}
 
@@ -123,7 +149,9 @@ def counts(name: str) -> dict[str, int]:
 
 
 def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Return the costs of kernels that the documentation keeps; raises InputError if a key is missing."""
+    """Return the costs of kernels that the documentation keeps; raises
+    InputError if a key is missing.
+    """
     try:
         rows = costs["kernels"]["costs"]
         environment = costs["environment"]
@@ -134,13 +162,17 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
             "costs": [{name: row[name] for name in _COST} for row in rows],
         }
     except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: {error} is missing of what `airlight study kernels -o FILE.json` writes") from error
+        raise InputError(
+            f"{path}: {error} is missing of what `airlight study kernels -o FILE.json` writes"
+        ) from error
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--report", type=Path, help="a folder that `airlight report` wrote")
-    parser.add_argument("--kernels", type=Path, help="what `airlight study kernels -o FILE.json` wrote")
+    parser.add_argument(
+        "--kernels", type=Path, help="what `airlight study kernels -o FILE.json` wrote"
+    )
     chosen = parser.parse_args()
     activate()  # counting shapes and triangles loads the scenes
     refresh(chosen.report, chosen.kernels)

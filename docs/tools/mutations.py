@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How many small faults of the code do the default tests not see?
 
-`python docs/tools/mutations.py` draws a sample of mutations in the rooms that decide what users are told, makes each in
-a copy of the checkout, and runs the default tests that run the line. A mutation survives if all of these pass; one on a
-line that no test runs survives too. Survivors are written to `docs/data/mutations.json`: each gets a judgement there,
-in words, since a mutation may change nothing that anybody sees.
+`python docs/tools/mutations.py` draws a sample of mutations in the rooms that decide what users are
+told, makes each in a copy of the checkout, and runs the default tests that run the line. A mutation
+survives if all of these pass; one on a line that no test runs survives too. Survivors are written
+to `docs/data/mutations.json`: each gets a judgement there, in words, since a mutation may change
+nothing that anybody sees.
 
-The mutations are those of Cosmic Ray (`pip install cosmic-ray pytest-cov`): a comparison, an operator or a number is
-replaced, a condition is turned, a loop does not run. They are drawn from all mutations of the rooms with equal chances.
-The tests of a line come from a run of the default tests with coverage, whose contexts say which test runs which line;
-`--baseline` keeps that run for another draw. A line that runs once, when its file is imported, has the tests that run
-anything of the file, and a line that no test runs, or only a process of its own, those that run anything of its folder.
-The fastest are run first, and no more of them than take LONGEST. `--again FILES` tries the survivors of the record by
-all tests of these files, such as new ones, and keeps their judgements.
+The mutations are those of Cosmic Ray (`pip install cosmic-ray pytest-cov`): a comparison, an
+operator or a number is replaced, a condition is turned, a loop does not run. They are drawn from
+all mutations of the rooms with equal chances. The tests of a line come from a run of the default
+tests with coverage, whose contexts say which test runs which line; `--baseline` keeps that run for
+another draw. A line that runs once, when its file is imported, has the tests that run anything of
+the file, and a line that no test runs, or only a process of its own, those that run anything of its
+folder. The fastest are run first, and no more of them than take LONGEST. `--again FILES` tries the
+survivors of the record by all tests of these files, such as new ones, and keeps their judgements.
 """
 
 import argparse
@@ -44,7 +46,8 @@ ROOMS = (
     "validation/study",
     "realtime/methods",
 )
-OPERATORS = (  # each of one kind: two comparisons that differ in equality alone are one mutation here
+# each of one kind: two comparisons that differ in equality alone are one mutation here
+OPERATORS = (
     "AddNot",
     "NumberReplacer",
     "ReplaceAndWithOr",
@@ -65,7 +68,8 @@ OPERATORS = (  # each of one kind: two comparisons that differ in equality alone
     "ReplaceComparisonOperator_GtE_Gt",
     "ZeroIterationForLoop",
 )
-#: A mutation may make a loop that never ends. Tests take longer beside other work; a process starts in ten seconds.
+#: A mutation may make a loop that never ends. Tests take longer beside other work; a
+#: process starts in ten seconds.
 PATIENCE, START = 5.0, 60.0
 LONGEST = 120.0  #: what the tests of a mutation may take together, without START [s]
 
@@ -114,8 +118,11 @@ def mutated(mutation: Mutation, text: str) -> str | None:
     return None if changed in (None, text) else str(changed)
 
 
-def covering_tests(rooms: Sequence[str], folder: Path) -> tuple[dict[tuple[str, int], set[str]], dict[str, float]]:
-    """Return the tests of each line of the rooms, and what each test took [s], from a run whose data are in a folder.
+def covering_tests(
+    rooms: Sequence[str], folder: Path
+) -> tuple[dict[tuple[str, int], set[str]], dict[str, float]]:
+    """Return the tests of each line of the rooms, and what each test took [s], from a run
+    whose data are in a folder.
 
     Without data the default tests are run there.
     """
@@ -127,7 +134,9 @@ def covering_tests(rooms: Sequence[str], folder: Path) -> tuple[dict[tuple[str, 
         options = ["--cov-context=test", "--cov-report=", "--cov-fail-under=0"]
         options.append(f"--junit-xml={folder.resolve()}/tests.xml")
         where = os.environ | {"COVERAGE_FILE": str(folder.resolve() / "coverage")}
-        subprocess.run([ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, env=where, check=True)
+        subprocess.run(
+            [ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, env=where, check=True
+        )
     took: dict[str, float] = {}
     for case in ElementTree.parse(folder / "tests.xml").iter("testcase"):
         place = case.get("classname", "").replace(".", "/")
@@ -139,26 +148,39 @@ def covering_tests(rooms: Sequence[str], folder: Path) -> tuple[dict[tuple[str, 
         name = path.relative_to(ROOT).as_posix()
         for file in (file for file in data.measured_files() if file.endswith("/" + name)):
             for line, contexts in data.contexts_by_lineno(file).items():
-                # A context is 'tests/a/test_b.py::test_c[d]|run'; what is set up for a test is no test.
-                tests[name, line] |= {each.partition("|")[0] for each in contexts if each.endswith("|run")}
+                # A context is 'tests/a/test_b.py::test_c[d]|run'; what is set
+                # up for a test is no test.
+                tests[name, line] |= {
+                    each.partition("|")[0] for each in contexts if each.endswith("|run")
+                }
     return tests, took
 
 
-def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took: Mapping[str, float]) -> list[str]:
+def tests_of(
+    mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took: Mapping[str, float]
+) -> list[str]:
     """Return the tests that run the statement of a mutation, the fastest first."""
     text = (ROOT / mutation.path).read_text(encoding="utf-8")
     around = [each for each in ast.walk(ast.parse(text)) if isinstance(each, ast.stmt)]
-    around = [each for each in around if _begin(each) <= mutation.line <= (each.end_lineno or each.lineno)]
+    around = [
+        each for each in around if _begin(each) <= mutation.line <= (each.end_lineno or each.lineno)
+    ]
     innermost = max(around, key=lambda each: each.lineno)
     body = getattr(innermost, "body", None)
     end = body[0].lineno - 1 if body else innermost.end_lineno or innermost.lineno
-    tests = set().union(*(found.get((mutation.path, line), set()) for line in range(innermost.lineno, end + 1)))
-    at_import = not any(isinstance(each, ast.FunctionDef) and each is not innermost for each in around)
+    tests = set().union(
+        *(found.get((mutation.path, line), set()) for line in range(innermost.lineno, end + 1))
+    )
+    at_import = not any(
+        isinstance(each, ast.FunctionDef) and each is not innermost for each in around
+    )
     if at_import:
         tests = set().union(*(those for (path, _), those in found.items() if path == mutation.path))
     if not tests:  # the line runs in a process of its own, or never
         folder = mutation.path.rpartition("/")[0] + "/"
-        tests = set().union(*(those for (path, _), those in found.items() if path.startswith(folder)))
+        tests = set().union(
+            *(those for (path, _), those in found.items() if path.startswith(folder))
+        )
     chosen, seconds = [], 0.0
     for test in sorted(tests, key=lambda test: took.get(test, 0.0)):
         seconds += took.get(test, 0.0)
@@ -170,7 +192,9 @@ def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took
 
 def _begin(statement: ast.stmt) -> int:
     """Return the first line of a statement, that of its first decorator where it has some."""
-    return min([statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))])
+    return min(
+        [statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))]
+    )
 
 
 def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float) -> Outcome:
@@ -181,9 +205,24 @@ def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float
     lines = [text.splitlines()[mutation.line - 1].strip() for text in (before, after)]
     try:
         path.write_text(after, encoding="utf-8")
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "-n",
+            "0",
+            "-p",
+            "no:cacheprovider",
+            *tests,
+        ]
         limit = START + PATIENCE * seconds
-        status = subprocess.run(command, cwd=copy, capture_output=True, timeout=limit).returncode if tests else 0
+        status = (
+            subprocess.run(command, cwd=copy, capture_output=True, timeout=limit).returncode
+            if tests
+            else 0
+        )
     except subprocess.TimeoutExpired:
         status = 1
     finally:
@@ -192,15 +231,20 @@ def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float
 
 
 def survey(
-    chosen: Sequence[Mutation], tests_for: Callable[[Mutation], tuple[Sequence[str], float]], jobs: int
+    chosen: Sequence[Mutation],
+    tests_for: Callable[[Mutation], tuple[Sequence[str], float]],
+    jobs: int,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of each mutation; `jobs` of them are tried at a time, each in a copy of its own.
+    """Yield the outcome of each mutation; `jobs` of them are tried at a time,
+    each in a copy of its own.
 
     `tests_for`: returns the tests of a mutation, and what they take together [s].
     """
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         copies: SimpleQueue[Path] = SimpleQueue()
-        tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        tracked = subprocess.run(
+            ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout
         for number in range(jobs):
             for name in filter(None, tracked.split("\0")):
                 place = Path(folder, str(number), name)
@@ -225,15 +269,28 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=300, help="how many mutations are drawn")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--jobs", type=int, default=2, help="how many are tried at a time")
-    parser.add_argument("--baseline", type=Path, help="folder that keeps the run of all tests; by default none does")
-    parser.add_argument("--again", nargs="+", metavar="FILE", help="test files that the survivors of the record meet")
+    parser.add_argument(
+        "--baseline", type=Path, help="folder that keeps the run of all tests; by default none does"
+    )
+    parser.add_argument(
+        "--again",
+        nargs="+",
+        metavar="FILE",
+        help="test files that the survivors of the record meet",
+    )
     asked = parser.parse_args()
     if asked.again:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
-        before = [Outcome(**(each | {"mutation": Mutation(**each["mutation"])})) for each in record["survivors"]]
+        before = [
+            Outcome(**(each | {"mutation": Mutation(**each["mutation"])}))
+            for each in record["survivors"]
+        ]
         record["survivors"] = []
         for old, each in zip(
-            before, survey([each.mutation for each in before], lambda _: (asked.again, LONGEST), asked.jobs)
+            before,
+            survey(
+                [each.mutation for each in before], lambda _: (asked.again, LONGEST), asked.jobs
+            ),
         ):
             if each.survived:
                 record["survivors"].append(asdict(replace(old, change=each.change)))

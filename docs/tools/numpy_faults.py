@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults that are set in a renderer of fifty lines of NumPy, and what the diagnosis says of them.
 
-`python docs/tools/numpy_faults.py` renders a scene by marching rays, which shares no code with the reference or with
-the hypotheses, once for each fault; adds 1 % of noise; lets the diagnosis say what is wrong, without telling it what a
-pixel is; and writes `docs/data/numpy-faults.json`, from which docs/your-engine.md has its table of confusion.
+`python docs/tools/numpy_faults.py` renders a scene by marching rays, which shares no code with the
+reference or with the hypotheses, once for each fault; adds 1 % of noise; lets the diagnosis say
+what is wrong, without telling it what a pixel is; and writes `docs/data/numpy-faults.json`, from
+which docs/your-engine.md has its table of confusion.
 """
 
 import argparse
@@ -21,8 +22,10 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[2]
 RECORD = ROOT / "docs/data/numpy-faults.json"
 _SIZE = (64, 48)
-_STEPS = 768  # edges of shadows fall within a step: fog of 8 x 8 pixels is within 0.2 % of that of many steps
-_FAR = 1e4  # where rays to the sky end [m]: of fog without attenuation 1e-4 of the light lies beyond
+# edges of shadows fall within a step: fog of 8 x 8 pixels is within 0.2 % of that of many steps
+_STEPS = 768
+# where rays to the sky end [m]: of fog without attenuation 1e-4 of the light lies beyond
+_FAR = 1e4
 _SIDE = 3  # rays along a side of a pixel
 
 Array = NDArray[np.float64]
@@ -55,7 +58,8 @@ class Engine:
     fog: tuple[float, ...] = (1.0, 1.0)  # factors on the fog of each lamp
     surface: float = 1.0
     shadows: tuple[bool, bool] = (True, True)  # in the fog, on surfaces
-    layer: tuple[float, float] | None = None  # base and scale height of a density that falls exponentially [m]
+    # base and scale height of a density that falls exponentially [m]
+    layer: tuple[float, float] | None = None
     start: float = 0.0
     end: float = math.inf
     planar: bool = False
@@ -94,17 +98,21 @@ def scene_xml(engine: Engine) -> str:
         kind, sigma_t = (
             "heterogeneous",
             (
-                '<volume type="heightfog" name="sigma_t"><transform name="to_world"><scale x="200" y="200" z="91"/>'
+                '<volume type="heightfog" name="sigma_t"><transform name="to_world"><scale x="200" '
+                'y="200" z="91"/>'
                 f'<translate z="-1"/></transform>{numbers}</volume>'
             ),
         )
     lights = "".join(
-        f'<emitter type="point" id="lamp-{n}"><point name="position" value="{_triple(lamp.place)}"/>'
+        f'<emitter type="point" id="lamp-{n}"><point name="position" '
+        f'value="{_triple(lamp.place)}"/>'
         f'<rgb name="intensity" value="{_triple(lamp.intensity)}"/></emitter>'
         if lamp.axis is None
         else f'<emitter type="spot" id="lamp-{n}"><transform name="to_world"><lookat origin="{_triple(lamp.place)}" '
-        f'target="{_triple(np.add(lamp.place, lamp.axis))}" up="0, 1, 0"/></transform><rgb name="intensity" '
-        f'value="{_triple(lamp.intensity)}"/><float name="cutoff_angle" value="{math.degrees(lamp.cutoff):.9g}"/>'
+        f'target="{_triple(np.add(lamp.place, lamp.axis))}" up="0, 1, 0"/></transform><rgb '
+        'name="intensity" '
+        f'value="{_triple(lamp.intensity)}"/><float name="cutoff_angle" '
+        f'value="{math.degrees(lamp.cutoff):.9g}"/>'
         f'<float name="beam_width" value="{math.degrees(lamp.cutoff):.9g}"/></emitter>'
         for n, lamp in enumerate(engine.lamps)
     )
@@ -135,13 +143,18 @@ def _rays(positions: Array) -> tuple[Array, Array]:
     right = np.cross(ahead, [0, 0, 1.0])
     right /= np.linalg.norm(right)
     up, half = np.cross(right, ahead), math.tan(0.5 * FOV)
-    across, along = half * (2 * positions[:, 0] / _SIZE[0] - 1), half * (_SIZE[1] - 2 * positions[:, 1]) / _SIZE[0]
+    across, along = (
+        half * (2 * positions[:, 0] / _SIZE[0] - 1),
+        half * (_SIZE[1] - 2 * positions[:, 1]) / _SIZE[0],
+    )
     way = ahead + across[:, None] * right + along[:, None] * up
     return way / np.linalg.norm(way, axis=1)[:, None], ahead
 
 
 def _to_ball(origin: Array, way: Array) -> Array:
-    """Return the distance at which lines with unit directions enter the ball; infinite where they miss it."""
+    """Return the distance at which lines with unit directions enter the ball;
+    infinite where they miss it.
+    """
     along = np.sum((BALL - origin) * way, axis=-1)
     inner = along**2 - np.sum((BALL - origin) ** 2, axis=-1) + RADIUS**2
     near = along - np.sqrt(np.maximum(inner, 0))
@@ -149,7 +162,9 @@ def _to_ball(origin: Array, way: Array) -> Array:
 
 
 def _light(engine: Engine, lamp: Lamp, point: Array, shadows: bool) -> tuple[Array, Array, Array]:
-    """Return the light of a lamp at points without its colour, the unit direction to it, and the distance."""
+    """Return the light of a lamp at points without its colour, the unit direction
+    to it, and the distance.
+    """
     way = np.array(lamp.place) - point
     r = np.linalg.norm(way, axis=-1)
     way = way / r[..., None]
@@ -184,22 +199,35 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
     floor = np.where((np.abs(place[:, :2]) <= HALF).all(axis=1), floor, np.inf)
     ball = _to_ball(np.broadcast_to(ORIGIN, way.shape), way)
     distance = np.minimum(floor, ball)
-    hit, point = np.isfinite(distance), ORIGIN + np.where(np.isfinite(distance), distance, 0)[:, None] * way
+    hit, point = (
+        np.isfinite(distance),
+        ORIGIN + np.where(np.isfinite(distance), distance, 0)[:, None] * way,
+    )
     flat = way @ axis if engine.planar else 1.0
     seen = np.where(hit, distance * flat, _FAR)
     last = np.minimum(np.maximum(seen, engine.start), engine.end)
     normal = np.where((ball < floor)[:, None], (point - BALL) / RADIUS, [0, 0, 1.0])
     colour = np.where((ball < floor)[:, None], engine.ball, engine.floor)
     length = np.maximum(last - engine.start, 0)
-    left = np.where(hit, np.exp(-engine.segments[0] * _depth(engine, ORIGIN[2] + 0 * last, point[:, 2], length)), 0)
+    left = np.where(
+        hit,
+        np.exp(-engine.segments[0] * _depth(engine, ORIGIN[2] + 0 * last, point[:, 2], length)),
+        0,
+    )
     surface, fog = np.zeros((len(way), 3)), np.zeros((len(way), 3))
     for lamp in engine.lamps:
         sent, to, r = _light(engine, lamp, point + 1e-7 * normal, engine.shadows[1])
         falls = sent * np.maximum(np.sum(normal * to, axis=1), 0) * hit
-        falls = falls * left * np.exp(-engine.segments[1] * _depth(engine, point[:, 2], lamp.place[2] + 0 * r, r))
+        falls = (
+            falls
+            * left
+            * np.exp(-engine.segments[1] * _depth(engine, point[:, 2], lamp.place[2] + 0 * r, r))
+        )
         surface += falls[:, None] * colour / math.pi * lamp.intensity
     for number, given in enumerate(engine.lamps):
-        lamp = replace(given, place=tuple(np.add(given.place, engine.moved))) if number == 0 else given
+        lamp = (
+            replace(given, place=tuple(np.add(given.place, engine.moved))) if number == 0 else given
+        )
         # Steps even in the angle from the lamp: the light near it is then as smooth as elsewhere.
         foot = np.sum((np.array(lamp.place) - ORIGIN) * way, axis=1)
         height = np.linalg.norm(ORIGIN + foot[:, None] * way - lamp.place, axis=1)
@@ -210,8 +238,12 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
             size = height / np.cos(angle) ** 2 * (ends[1] - ends[0]) / engine.steps
             here = ORIGIN + x[:, None] * way
             sent, to, r = _light(engine, lamp, here, engine.shadows[0])
-            depth = engine.segments[0] * _depth(engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0))
-            depth = depth + engine.segments[1] * _depth(engine, here[:, 2], lamp.place[2] + 0 * r, r)
+            depth = engine.segments[0] * _depth(
+                engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0)
+            )
+            depth = depth + engine.segments[1] * _depth(
+                engine, here[:, 2], lamp.place[2] + 0 * r, r
+            )
             value = (
                 sent
                 * engine.phase(np.sum(to * way, axis=1))
@@ -236,7 +268,11 @@ def rendered(engine: Engine, *, area: bool, noise: float, seed: int) -> Array:
             fog, surface, left = _layers(engine, film)
             if any(engine.shifted) or engine.block > 1:
                 film = film - np.array(engine.shifted)
-                film = film // engine.block * engine.block + 0.5 * (engine.block > 1) + film % 1.0 * (engine.block == 1)
+                film = (
+                    film // engine.block * engine.block
+                    + 0.5 * (engine.block > 1)
+                    + film % 1.0 * (engine.block == 1)
+                )
                 fog, _, left = _layers(engine, film)
             total += engine.mixed(fog, surface, left) * engine.exposure / side**2
     image = total.reshape(_SIZE[1], _SIZE[0], 3)
@@ -244,7 +280,9 @@ def rendered(engine: Engine, *, area: bool, noise: float, seed: int) -> Array:
 
 
 def relative_noise(size: float, seed: int) -> Array:
-    """Return the relative noise of an image, (height, width, 1): all channels of a pixel share it."""
+    """Return the relative noise of an image, (height, width, 1): all
+    channels of a pixel share it.
+    """
     return size * np.random.default_rng(seed).standard_normal((_SIZE[1], _SIZE[0], 1))
 
 
@@ -262,9 +300,17 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("extinction", "the extinction 1.5 times", {"sigma_t": 1.5 * 0.17}),
     ("extinction", "a mean free path for the extinction", {"sigma_t": 1 / 0.17}),
     ("albedo", "the albedo decoded by sRGB", {"albedo": _curve((0.91, 0.88, 0.82))}),
-    ("g-sign", "g with the other sign", {"phase": lambda c: (1 - 0.35**2) / (1 + 0.35**2 + 0.7 * c) ** 1.5}),
+    (
+        "g-sign",
+        "g with the other sign",
+        {"phase": lambda c: (1 - 0.35**2) / (1 + 0.35**2 + 0.7 * c) ** 1.5},
+    ),
     ("phase", "an isotropic phase function", {"phase": lambda c: np.ones_like(c)}),
-    ("phase", "Schlick's phase function, k = g", {"phase": lambda c: (1 - 0.35**2) / (1 - 0.35 * c) ** 2}),
+    (
+        "phase",
+        "Schlick's phase function, k = g",
+        {"phase": lambda c: (1 - 0.35**2) / (1 - 0.35 * c) ** 2},
+    ),
     ("phase", "Rayleigh's phase function", {"phase": lambda c: 0.75 * (1 + c * c)}),
     ("light-path", "the way from the light not attenuated", {"segments": (1.0, 0.0)}),
     ("camera-path", "the way to the camera not attenuated", {"segments": (0.0, 1.0)}),
@@ -278,8 +324,16 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("right", "no shadows in the fog: less than the comparison sees", {"shadows": (False, True)}),
     ("light-lag", "the fog lit from where the lamp was", {"moved": (0.25, 0.1, 0.0)}),
     ("fog-shift", "the fog 1.5 pixels too far right", {"shifted": (1.5, 0.0)}),
-    ("opacity", "the fog times its opacity", {"mixed": lambda fog, surface, left: fog * (1 - left) + surface}),
-    ("opacity", "surfaces attenuated twice", {"mixed": lambda fog, surface, left: fog + surface * left}),
+    (
+        "opacity",
+        "the fog times its opacity",
+        {"mixed": lambda fog, surface, left: fog * (1 - left) + surface},
+    ),
+    (
+        "opacity",
+        "surfaces attenuated twice",
+        {"mixed": lambda fog, surface, left: fog + surface * left},
+    ),
     (
         "ambient",
         "ambient light in the fog",
@@ -292,12 +346,24 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
 LAYERED = replace(RIGHT, sigma_t=0.31, layer=(0.2, 1.3))
 FAULTS_OF_LAYERS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("right", "nothing, in height fog", {}),
-    ("homogeneous", "homogeneous fog where height fog was asked for", {"layer": None, "sigma_t": 0.11}),
+    (
+        "homogeneous",
+        "homogeneous fog where height fog was asked for",
+        {"layer": None, "sigma_t": 0.11},
+    ),
     ("scale-height", "a falloff for the scale height", {"layer": (0.2, 1 / 1.3)}),
     ("scale-height", "density halves in the scale height", {"layer": (0.2, 1.3 / math.log(2))}),
     ("scale-height", "the scale height 1.8 times", {"layer": (0.2, 1.8 * 1.3)}),
-    ("height-fog", "the scale height 0.7 times, and the base 0.6 m too high", {"layer": (0.8, 0.7 * 1.3)}),
-    ("camera-path", "the way to the camera not attenuated, in height fog", {"segments": (0.0, 1.0)}),
+    (
+        "height-fog",
+        "the scale height 0.7 times, and the base 0.6 m too high",
+        {"layer": (0.8, 0.7 * 1.3)},
+    ),
+    (
+        "camera-path",
+        "the way to the camera not attenuated, in height fog",
+        {"segments": (0.0, 1.0)},
+    ),
 )
 LAWS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("distance-law", "one over the squared distance and 0.4 m^2", {"soft": 0.4}),
@@ -315,7 +381,9 @@ def main() -> None:
     from airlight.reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="*", type=int, help="numbers of faults; others keep their rows")
+    parser.add_argument(
+        "--only", nargs="*", type=int, help="numbers of faults; others keep their rows"
+    )
     parser.add_argument("--noise", type=float, default=0.01, help="relative noise of every pixel")
     chosen = parser.parse_args()
     activate()
@@ -352,7 +420,9 @@ def main() -> None:
             "first": said.first,
             "right": said.first == injected,
             "pixel_found": said.pixel,
-            "says": said.ranked[0].words if said.first != "unexplained" else f"the error lies {said.place}",
+            "says": said.ranked[0].words
+            if said.first != "unexplained"
+            else f"the error lies {said.place}",
             "together": list(said.ranked[0].together),
             "residual": said.residual,
             "left": said.left,

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A release is a commit: `python docs/tools/release.py` makes it, its tag and its files.
 
-The number is that of the stamp, `__version__` in `src/airlight/__init__.py`, without `.dev0`; another number is another
-stamp, in a commit of its own. In a worktree beside the checkout the tool commits the release (the stamp, the heading of
-`CHANGELOG.md`, `CITATION.cff`) and the stamp of the next version, and makes in `dist/NUMBER` of the release alone:
+The number is that of the stamp, `__version__` in `src/airlight/__init__.py`, without `.dev0`;
+another number is another stamp, in a commit of its own. In a worktree beside the checkout the tool
+commits the release (the stamp, the heading of `CHANGELOG.md`, `CITATION.cff`) and the stamp of the
+next version, and makes in `dist/NUMBER` of the release alone:
 
 - the source distribution and the wheel, which say of which commit they are;
-- `airlight-NUMBER-docs.tar.gz`, the site, and `airlight-NUMBER-certified.tar.gz`, the certified scenes and values;
+- `airlight-NUMBER-docs.tar.gz`, the site, and `airlight-NUMBER-certified.tar.gz`, the
+  certified scenes and values;
 - `airlight-NUMBER.md`, the section of the changelog, and `SHA256SUMS`.
 
-When all files are there, the branch gets the two commits and the first one the tag `vNUMBER`; `git push --follow-tags`
-publishes them. `--dry-run` makes the files and leaves branch and tags alone.
+When all files are there, the branch gets the two commits and the first one the tag `vNUMBER`; `git
+push --follow-tags` publishes them. `--dry-run` makes the files and leaves branch and tags alone.
 
-It refuses changed files, a number that was released, an empty `[Unreleased]`, a run of all tests that failed or is of
-other code than this, and an error that moved since the last release where no entry names its scene or its method.
+It refuses changed files, a number that was released, an empty `[Unreleased]`, a run of all tests
+that failed or is of other code than this, and an error that moved since the last release where no
+entry names its scene or its method.
 """
 
 import argparse
@@ -35,7 +38,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 STAMP, CHANGELOG, CITATION = "src/airlight/__init__.py", "CHANGELOG.md", "CITATION.cff"
 RECORD = "docs/data/full_run.json"
-#: The files that all tests are a test of: where one changes, they must run again. Pages and their data are none of it.
+#: The files that all tests are a test of: where one changes, they must run again. Pages and
+#: their data are none of it.
 CODE = (
     *("analytic", "realtime", "reference", "validation", "reports", "src", "tests"),
     *("airlight", "setup.py", "pyproject.toml", ":(glob)*.lock"),
@@ -52,7 +56,7 @@ class RefusedError(Exception):
     """The reasons why there is no release, a sentence a line."""
 
 
-# Questions to a checkout ----------------------------------------------------------------------------------------------
+# Questions to a checkout --------------------------------------------------------------------------
 
 
 def git(root: Path, *words: str) -> str:
@@ -66,7 +70,10 @@ def git(root: Path, *words: str) -> str:
 def _holds(root: Path, *words: str) -> bool:
     """Return whether git says yes; no git, and no repository, do not."""
     with suppress(FileNotFoundError):
-        return subprocess.run(["git", *words], cwd=root, capture_output=True, check=False).returncode == 0
+        return (
+            subprocess.run(["git", *words], cwd=root, capture_output=True, check=False).returncode
+            == 0
+        )
     return False
 
 
@@ -87,16 +94,22 @@ def unreleased(root: Path) -> str:
 
 
 def stamp_problems(root: Path) -> Iterator[str]:
-    """Yield what contradicts the stamp: in the changelog, in the citation, or in code behind the tag of its number."""
+    """Yield what contradicts the stamp: in the changelog, in the citation, or in code
+    behind the tag of its number.
+    """
     number, open_ = stamped_number(root)
-    released = re.findall(r"^## \[(\d[^\]]*)\]", (root / CHANGELOG).read_text(encoding="utf-8"), flags=re.MULTILINE)
+    released = re.findall(
+        r"^## \[(\d[^\]]*)\]", (root / CHANGELOG).read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
     if open_ and number in released:
         yield f"{STAMP} says {number}.dev0, and {CHANGELOG} has a section [{number}]: that number was released"
     if not open_ and released[:1] != [number]:
         yield f"{STAMP} says {number}, expected .dev0 behind it or [{number}] as the newest section of {CHANGELOG}"
     if not open_ and unreleased(root):
         yield f"{STAMP} says {number}, and {CHANGELOG} has entries in [Unreleased]: the next stamp is due"
-    cited = re.search(r"^version: (\S+)$", (root / CITATION).read_text(encoding="utf-8"), flags=re.MULTILINE)
+    cited = re.search(
+        r"^version: (\S+)$", (root / CITATION).read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
     expected = released[0] if released else f"{number}.dev0"
     if cited is None or cited[1] != expected:
         yield f"{CITATION} has the version {cited and cited[1]}, expected {expected}"
@@ -109,7 +122,9 @@ def stamp_problems(root: Path) -> Iterator[str]:
 def problems(root: Path) -> Iterator[str]:
     """Yield what stands in the way of a release, a sentence each."""
     if git(root, "rev-parse", "--is-shallow-repository").strip() == "true":
-        raise RefusedError("a shallow clone does not know what was released: git fetch --unshallow --tags")
+        raise RefusedError(
+            "a shallow clone does not know what was released: git fetch --unshallow --tags"
+        )
     if changed := git(root, "status", "--porcelain").splitlines():
         yield f"{len(changed)} files are not as they were committed, such as {changed[0][3:]}: commit or remove them"
     if not stamped_number(root)[1]:
@@ -143,7 +158,7 @@ def _run_problems(root: Path) -> Iterator[str]:
         yield f"{RECORD} is old: {len(since)} files of code changed since {commit[:12]}, such as {since[0]}; {again}"
 
 
-# Numbers that moved ---------------------------------------------------------------------------------------------------
+# Numbers that moved -------------------------------------------------------------------------------
 
 
 def last_release(root: Path) -> str | None:
@@ -153,7 +168,8 @@ def last_release(root: Path) -> str | None:
 
 
 def _unnamed(root: Path) -> Iterator[str]:
-    """Yield each error that moved since the last release and that no entry names by its scene or its method.
+    """Yield each error that moved since the last release and that no entry names by
+    its scene or its method.
 
     Before the first release nobody has a number that could have moved.
     """
@@ -162,11 +178,16 @@ def _unnamed(root: Path) -> Iterator[str]:
         return
     named = set(re.findall(r"`([\w.-]+)", unreleased(root)))
     moved: dict[str, set[str]] = {}
-    for name in git(root, "ls-tree", "-r", "--name-only", tag, "--", *ERRORS, CERTIFIED).splitlines():
+    for name in git(
+        root, "ls-tree", "-r", "--name-only", tag, "--", *ERRORS, CERTIFIED
+    ).splitlines():
         before, path = git(root, "show", f"{tag}:{name}"), root / name
         after = path.read_text(encoding="utf-8") if path.is_file() else ""
         if name.startswith(CERTIFIED):
-            if set(before.splitlines()) - set(after.splitlines()) and not {path.name, path.stem} & named:
+            if (
+                set(before.splitlines()) - set(after.splitlines())
+                and not {path.name, path.stem} & named
+            ):
                 yield f"values of {path.name} moved since {tag}: an entry of {CHANGELOG} must name the file"
         elif after:
             for scene, label in _moves(path.stem, json.loads(before), json.loads(after)):
@@ -178,7 +199,9 @@ def _unnamed(root: Path) -> Iterator[str]:
 
 
 def _moves(stem: str, before: Any, after: Any) -> Iterator[tuple[str, str]]:
-    """Yield the scenes and configurations of which an error moved by more than its band, in a baseline or a report."""
+    """Yield the scenes and configurations of which an error moved by more than its band,
+    in a baseline or a report.
+    """
     from airlight.validation.statistics.noise import FLOORS, error_band
 
     now = dict(_numbers(after))
@@ -187,14 +210,19 @@ def _moves(stem: str, before: Any, after: Any) -> Iterator[tuple[str, str]]:
         if new is None or "times" in keys or not set(keys) & set(_ERRORS_WITHIN):
             continue
         if name in (*FLOORS, "nonfinite") and abs(new - old) > error_band(name, old):
-            of_report = keys[0] == "scenes"  # scenes, SCENE, methods, LABEL; in a baseline configurations, LABEL
+            # scenes, SCENE, methods, LABEL; in a baseline configurations, LABEL
+            of_report = keys[0] == "scenes"
             yield (keys[1], keys[3]) if of_report and len(keys) > 4 else (stem, keys[1])
 
 
 def _numbers(data: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Yield the numbers of JSON by their keys; an entry of a list has its label or its name as one."""
+    """Yield the numbers of JSON by their keys; an entry of a list has its
+    label or its name as one.
+    """
     if isinstance(data, list):
-        labels = (each.get("label", each.get("name")) if isinstance(each, dict) else None for each in data)
+        labels = (
+            each.get("label", each.get("name")) if isinstance(each, dict) else None for each in data
+        )
         data = {str(label or place): each for place, (label, each) in enumerate(zip(labels, data))}
     if isinstance(data, dict):
         for key, each in data.items():
@@ -203,11 +231,13 @@ def _numbers(data: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], float]]:
         yield keys, float(data)
 
 
-# The release ----------------------------------------------------------------------------------------------------------
+# The release --------------------------------------------------------------------------------------
 
 
 def release(root: Path, target: Path, *, dry_run: bool, site: bool = True) -> list[Path]:
-    """Make the release of a checkout and return its files; raises RefusedError with all that stands in the way."""
+    """Make the release of a checkout and return its files; raises RefusedError with
+    all that stands in the way.
+    """
     if found := list(problems(root)):
         raise RefusedError("\n".join(found))
     (number, _), section = stamped_number(root), unreleased(root)
@@ -226,12 +256,22 @@ def release(root: Path, target: Path, *, dry_run: bool, site: bool = True) -> li
             if site:
                 _site(tree, Path(place, "site"), files / f"airlight-{number}-docs.tar.gz", date)
             made = sorted(files.iterdir())
-            sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in made]
+            sums = [
+                f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in made
+            ]
             (files / "SHA256SUMS").write_text("".join(sums), encoding="utf-8")
             after = _next_commit(tree, number)
         if not dry_run:
             git(root, "merge", "--quiet", "--ff-only", after)
-            git(root, "tag", "--annotate", f"v{number}", commit, "--message", f"airlight {number}\n\n{section}")
+            git(
+                root,
+                "tag",
+                "--annotate",
+                f"v{number}",
+                commit,
+                "--message",
+                f"airlight {number}\n\n{section}",
+            )
         files.rename(folder)
     return sorted(folder.iterdir())
 
@@ -253,7 +293,9 @@ def _made(folder: Path) -> Path:
 
 def _edit(path: Path, pattern: str, text: str) -> None:
     """Replace the one place of a file that a pattern finds."""
-    whole, count = re.subn(pattern, lambda _: text, path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    whole, count = re.subn(
+        pattern, lambda _: text, path.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
     if count != 1:
         raise RefusedError(f"{path.name} has {count} places like {pattern}, expected one")
     path.write_text(whole, encoding="utf-8", newline="\n")
@@ -264,7 +306,11 @@ def _release_commit(tree: Path, number: str, date: datetime) -> str:
     day = f"{date:%Y-%m-%d}"
     _edit(tree / STAMP, _VERSION.pattern, f'__version__ = "{number}"')
     _edit(tree / CHANGELOG, f"^{re.escape(_UNRELEASED)}", f"{_UNRELEASED}\n## [{number}] - {day}\n")
-    _edit(tree / CITATION, r"^version: .*\n(date-released: .*\n)?", f'version: {number}\ndate-released: "{day}"\n')
+    _edit(
+        tree / CITATION,
+        r"^version: .*\n(date-released: .*\n)?",
+        f'version: {number}\ndate-released: "{day}"\n',
+    )
     git(tree, "commit", "--quiet", "--all", "--message", f"airlight {number}")
     return git(tree, "rev-parse", "HEAD").strip()
 
@@ -274,13 +320,22 @@ def _next_commit(tree: Path, number: str) -> str:
     major, minor, patch = number.split(".")
     following = f"{major}.{minor}.{int(patch) + 1}.dev0"
     _edit(tree / STAMP, _VERSION.pattern, f'__version__ = "{following}"')
-    git(tree, "commit", "--quiet", "--all", "--message", f"{following}: what follows the release of {number}")
+    git(
+        tree,
+        "commit",
+        "--quiet",
+        "--all",
+        "--message",
+        f"{following}: what follows the release of {number}",
+    )
     return git(tree, "rev-parse", "HEAD").strip()
 
 
 def _run(tree: Path, what: str, *words: str) -> None:
     """Run Python in a tree; what it prints is shown where it fails."""
-    ran = subprocess.run([sys.executable, *words], cwd=tree, capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        [sys.executable, *words], cwd=tree, capture_output=True, text=True, check=False
+    )
     if ran.returncode:
         raise RefusedError(f"{what} could not be made:\n{ran.stdout}{ran.stderr}")
 
@@ -293,7 +348,9 @@ def _distributions(tree: Path, files: Path) -> None:
 
 
 def _certified(tree: Path, path: Path, date: datetime) -> None:
-    """Write the archive of the certified scenes and values, with the page that says what they are."""
+    """Write the archive of the certified scenes and values, with the page
+    that says what they are.
+    """
     data = git(tree, "ls-files", "--", f"{CERTIFIED}/*.csv", f"{CERTIFIED}/*.json").splitlines()
     names = (*data, "LICENSE", CITATION, "docs/formats.md")
     _pack(path, [(tree / name, Path(name).name) for name in names], date)
@@ -320,9 +377,15 @@ def _pack(path: Path, files: Sequence[tuple[Path, str]], date: datetime) -> None
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--dry-run", action="store_true", help="make all files, and neither commit nor tag")
-    parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist", help="the folder of dist/NUMBER")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="make all files, and neither commit nor tag"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, default=ROOT / "dist", help="the folder of dist/NUMBER"
+    )
     asked = parser.parse_args()
     try:
         for written in release(ROOT, asked.output.resolve(), dry_run=asked.dry_run):

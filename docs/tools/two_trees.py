@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of two checkouts side by side: `python docs/tools/two_trees.py OTHER [--scenes A,B] [--methods A,B]`.
+"""Frames of two checkouts side by side: `python docs/tools/two_trees.py OTHER
+[--scenes A,B] [--methods A,B]`.
 
-OTHER is a checkout with an environment `.venv`, usually the commit before a change. Both render the same scenes with
-the same methods at 800 x 600, by the defaults of each. Frames are timed in turns, one of this checkout and one of the
-other, so that what else the machine does meets both. A time is the time of the processor, over all threads [ms]; a line
-has the medians, and how many kernels the first frames ran for the first time.
+OTHER is a checkout with an environment `.venv`, usually the commit before a change. Both render the
+same scenes with the same methods at 800 x 600, by the defaults of each. Frames are timed in turns,
+one of this checkout and one of the other, so that what else the machine does meets both. A time is
+the time of the processor, over all threads [ms]; a line has the medians, and how many kernels the
+first frames ran for the first time.
 """
 
 import json
@@ -44,12 +46,18 @@ class Checkout:
         return json.loads(answer)
 
 
-def compare(other: Path, scenes: Sequence[str], methods: Sequence[str], size: str, frames: int) -> None:
+def compare(
+    other: Path, scenes: Sequence[str], methods: Sequence[str], size: str, frames: int
+) -> None:
     """Print a line for each scene and method."""
-    print(f"{'scene':16}{'method':20}{'frame [ms]':>20}{'ratio':>8}{'first [ms]':>16}{'kernels':>12}   here, other")
+    print(
+        f"{'scene':16}{'method':20}{'frame [ms]':>20}{'ratio':>8}{'first [ms]':>16}{'kernels':>12} "
+        "  here, other"
+    )
     here = Checkout(ROOT).ask("methods", *scenes, "/", *methods)
     for scene, method in here["pairs"]:
-        # A pair of processes for each line: the first frame of the one does not find the kernels of another.
+        # A pair of processes for each line: the first frame of the one does not
+        # find the kernels of another.
         both = [Checkout(ROOT), Checkout(other)]
         first = [checkout.ask("open", scene, method, size) for checkout in both]
         if not all(answer["first"] for answer in first):
@@ -64,7 +72,8 @@ def compare(other: Path, scenes: Sequence[str], methods: Sequence[str], size: st
         starts = " ".join(f"{answer['first']:7.0f}" for answer in first)
         kernels = " ".join(f"{answer['kernels']:5d}" for answer in first)
         print(
-            f"{scene:16}{method:20}{mine:10.1f}{theirs:10.1f}{mine / theirs:8.2f} {starts} {kernels}",
+            f"{scene:16}{method:20}{mine:10.1f}{theirs:10.1f}{mine / theirs:8.2f} {starts} "
+            f"{kernels}",
             flush=True,
         )
 
@@ -100,12 +109,16 @@ def work() -> None:
             dr.set_flag(dr.JitFlag.KernelHistory, True)
             before = time.process_time()
             try:
-                renderer = frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"])
+                renderer = frame_renderer(
+                    read_scene(loaded), find_method(method), kernel=KERNELS["exact"]
+                )
                 render_frame(renderer)
                 answer["first"] = 1000 * (time.process_time() - before)
             except InputError:
                 answer["first"] = None
-            answer["kernels"] = len({entry["hash"] for entry in dr.kernel_history([dr.KernelType.JIT])})
+            answer["kernels"] = len(
+                {entry["hash"] for entry in dr.kernel_history([dr.KernelType.JIT])}
+            )
             dr.set_flag(dr.JitFlag.KernelHistory, False)
         else:
             before = time.process_time()
@@ -118,12 +131,18 @@ def main() -> None:
     """Read the command line."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("other", type=Path, help="the other checkout")
-    parser.add_argument("--scenes", default="", help="names of built-in scenes with commas; default: all")
+    parser.add_argument(
+        "--scenes", default="", help="names of built-in scenes with commas; default: all"
+    )
     parser.add_argument("--methods", default="", help="names of methods with commas; default: all")
     parser.add_argument("--size", default="800x600", help="of the images [pixels]")
-    parser.add_argument("--frames", type=int, default=7, help="frames of each to take the median of")
+    parser.add_argument(
+        "--frames", type=int, default=7, help="frames of each to take the median of"
+    )
     chosen = parser.parse_args()
-    scenes, methods = (list(filter(None, names.split(","))) for names in (chosen.scenes, chosen.methods))
+    scenes, methods = (
+        list(filter(None, names.split(","))) for names in (chosen.scenes, chosen.methods)
+    )
     compare(chosen.other.resolve(), scenes, methods, chosen.size, chosen.frames)
 
 

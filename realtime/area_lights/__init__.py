@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Area lights: rectangles, disks, spheres and meshes of constant radiance, and the points that stand for them.
+"""Area lights: rectangles, disks, spheres and meshes of constant radiance, and the
+points that stand for them.
 
 Read in this order:
 

@@ -3,22 +3,24 @@
 
 **Patterns of points, each for an equal part of the area.**
 
-* `ring`: the few points of Ali 2016, whose layout the source does not print; reconstructed from captions. On a disk of
-  the radius R they lie on a circle of R/sqrt(2), on a rectangle on the ellipse that is sqrt(2/3) as large as it: there
-  their mean square distances from the middle are those of the whole light,
+* `ring`: the few points of Ali 2016, whose layout the source does not print; reconstructed from
+  captions. On a disk of the radius R they lie on a circle of R/sqrt(2), on a rectangle on the
+  ellipse that is sqrt(2/3) as large as it: there their mean square distances from the middle are
+  those of the whole light,
 
       int r^2 dA / A = R^2/2,      int x^2 dx / (2 a) = a^2/3 = (1/2) (2/3) a^2,
 
-  so that they are right to second order for whatever is smooth. One point is the middle. A sphere has no ring: there
-  they lie on a spiral, at equal steps of height and golden angles. Nor has a mesh: there they follow its area in equal
-  steps.
-* `sobol`: the first points of Sobol's sequence, scrambled as Owen proposed, with one fixed seed (Laine and Karras 2011;
-  Burley 2020 has the hash).
+  so that they are right to second order for whatever is smooth. One point is the middle. A sphere
+  has no ring: there they lie on a spiral, at equal steps of height and golden angles. Nor has a
+  mesh: there they follow its area in equal steps.
+* `sobol`: the first points of Sobol's sequence, scrambled as Owen proposed, with one fixed seed
+  (Laine and Karras 2011; Burley 2020 has the hash).
 
 **Light samples:** an area light as N point lights of equal power.
 
-Each stands for the part A/N of the area: a point light with the intensity I(w) = I0 max(0, n . w), I0 = Le A/N [W/sr],
-n the normal of the shape there. Its power, pi I0, is an N-th of that of the light.
+Each stands for the part A/N of the area: a point light with the intensity I(w) = I0 max(0, n . w),
+I0 = Le A/N [W/sr], n the normal of the shape there. Its power, pi I0, is an N-th of that of the
+light.
 """
 
 import math
@@ -33,13 +35,16 @@ from airlight.realtime.parameters import Parameters, parameter
 Array = NDArray[np.float64]
 
 PATTERNS = ("ring", "sobol")
-_TURN = 0.37  #: where a ring begins [rad]: not on an axis of the light, along which occluders often run
+#: where a ring begins [rad]: not on an axis of the light, along which occluders often run
+_TURN = 0.37
 _GOLDEN = math.pi * (3 - math.sqrt(5))  #: [rad]
 _SEEDS = (0x1A2B3C4D, 0x9D5F37E1)
 
 
 def ring(points: int) -> Array:
-    """Return directions from the middle of a ring, (points, 2) of length 1; one point is the middle, (0, 0)."""
+    """Return directions from the middle of a ring, (points, 2) of length 1; one
+    point is the middle, (0, 0).
+    """
     if points == 1:
         return np.zeros((1, 2))
     angle = _TURN + 2 * math.pi * np.arange(points) / points
@@ -57,21 +62,26 @@ def spiral(points: int) -> Array:
 def sobol(points: int) -> Array:
     """Return the first points of Sobol's sequence in the unit square, (points, 2) in [0, 1].
 
-    `scipy.stats.qmc` has the sequence too; its import takes a second or more, and its scrambling, by random matrices,
-    makes the error of penumbrae by 16 points 6 % larger (median of 12 seeds, 20 000 edges across a square).
+    `scipy.stats.qmc` has the sequence too; its import takes a second or more, and its scrambling,
+    by random matrices, makes the error of penumbrae by 16 points 6 % larger (median of 12 seeds, 20
+    000 edges across a square).
     """
     index = np.arange(points, dtype=np.uint32)
     first = bit_reversed(index)
     second, direction = np.zeros_like(index), 1 << 31
     for bit in range(32):
-        second ^= np.where(index >> np.uint32(bit) & np.uint32(1), np.uint32(direction), np.uint32(0))
+        second ^= np.where(
+            index >> np.uint32(bit) & np.uint32(1), np.uint32(direction), np.uint32(0)
+        )
         direction ^= direction >> 1
     columns = [_scrambled(column, seed) for column, seed in zip((first, second), _SEEDS)]
     return (np.stack(columns, axis=1).astype(np.float64) + 0.5) / 2.0**32
 
 
 def _scrambled(number, seed: int):
-    """Return numbers after a nested uniform scrambling: each bit is flipped by a hash of the bits above it."""
+    """Return numbers after a nested uniform scrambling: each bit is flipped by a
+    hash of the bits above it.
+    """
     with np.errstate(over="ignore"):
         x = bit_reversed(number) + np.uint32(seed)
         for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
@@ -82,19 +92,28 @@ def _scrambled(number, seed: int):
 def bit_reversed(number):
     """Return 32-bit numbers with their bits in reverse order."""
     x = number
-    for shift, mask in ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+    for shift, mask in (
+        (16, 0x0000FFFF),
+        (8, 0x00FF00FF),
+        (4, 0x0F0F0F0F),
+        (2, 0x33333333),
+        (1, 0x55555555),
+    ):
         x = (x >> np.uint32(shift)) & np.uint32(mask) | (x & np.uint32(mask)) << np.uint32(shift)
     return x
 
 
-_NEAR = 4e-6  #: of the largest coordinate: how far off the shape rays start, some dozen units in the last place
+#: of the largest coordinate: how far off the shape rays start, some dozen units in the last place
+_NEAR = 4e-6
 
 
 @dataclass(frozen=True)
 class LightSamples(Parameters):
     """How a method renders area lights; without effect where there are none."""
 
-    points: int = parameter(16, "light samples of equal power for each area light", least=1, most=4096)
+    points: int = parameter(
+        16, "light samples of equal power for each area light", least=1, most=4096
+    )
     pattern: str = parameter(
         "sobol",
         "where they lie: on a ring, as in Ali 2016, or by Sobol's sequence",
@@ -116,7 +135,8 @@ class PlacedPoints:
 def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
     """Return the light samples of a light.
 
-    Valid for all lights. One point of a sphere lights a half space alone; a few points are needed there.
+    Valid for all lights. One point of a sphere lights a half space alone; a few
+    points are needed there.
 
     Parameters
     ----------
@@ -141,7 +161,9 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
         u, v = _on_disk(points, pattern) if light.kind == "disk" else _on_rectangle(points, pattern)
         positions = light.middle + u[:, None] * light.across + v[:, None] * light.up
         normals = np.broadcast_to(light.normal, (points, 3))
-    lift = _NEAR * float(np.abs(light.middle).max() + np.linalg.norm(light.across) + np.linalg.norm(light.up))
+    lift = _NEAR * float(
+        np.abs(light.middle).max() + np.linalg.norm(light.across) + np.linalg.norm(light.up)
+    )
     chord = 2 * light.radius if light.kind == "sphere" else 0.0
     if light.folded:
         positions = positions + lift * normals  # its shape stays in the light of its points
@@ -149,7 +171,9 @@ def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
 
 
 def _on_mesh(light: AreaLight, points: int, pattern: str) -> tuple[Array, Array]:
-    """Return points and normals: the first coordinate of the pattern chooses the triangle and a place along it."""
+    """Return points and normals: the first coordinate of the pattern chooses the
+    triangle and a place along it.
+    """
     if pattern == "ring":
         number = np.arange(points)
         u, v = (number + 0.5) / points, number * _GOLDEN / (2 * math.pi) % 1
@@ -160,7 +184,9 @@ def _on_mesh(light: AreaLight, points: int, pattern: str) -> tuple[Array, Array]
     chosen = np.minimum(np.searchsorted(last, u, side="right"), len(last) - 1)
     root = np.sqrt(np.clip(1 - (last[chosen] - u) / (twice[chosen] / twice.sum()), 0, 1))
     first, second, third = (light.vertices[light.triangles[chosen, corner]] for corner in range(3))
-    places = first + (root * (1 - v))[:, None] * (second - first) + (root * v)[:, None] * (third - first)
+    places = (
+        first + (root * (1 - v))[:, None] * (second - first) + (root * v)[:, None] * (third - first)
+    )
     return places, light.normals[chosen] / twice[chosen, None]
 
 
@@ -180,7 +206,9 @@ def _on_disk(points: int, pattern: str) -> tuple[Array, Array]:
 
 
 def _concentric(places: Array) -> tuple[Array, Array]:
-    """Return the unit square mapped to the unit disk, square rings to round ones (Shirley and Chiu 1997)."""
+    """Return the unit square mapped to the unit disk, square rings to round ones
+    (Shirley and Chiu 1997).
+    """
     a, b = 2 * places.T - 1
     steep = np.abs(b) > np.abs(a)
     radius = np.where(steep, b, a)
@@ -198,6 +226,9 @@ def _on_sphere(light: AreaLight, points: int, pattern: str) -> tuple[Array, Arra
         z, angle = 1 - 2 * v, 2 * np.pi * u
         across = np.sqrt(1 - z * z)
         own = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
-    axes = np.stack([light.across, light.up, np.cross(light.across, light.up) / light.radius]) / light.radius
+    axes = (
+        np.stack([light.across, light.up, np.cross(light.across, light.up) / light.radius])
+        / light.radius
+    )
     normals = own @ axes
     return light.middle + light.radius * normals, normals

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Area lights: their record, their triangles, and how they are read from Mitsuba's `area` emitters.
 
-Every point of the surface sends the same radiance Le into all directions of the half space before it. An element dA has
-the intensity Le cos dA in a direction at an angle whose cosine to the normal is cos, and the power pi Le dA. The shape
-is a rectangle, disk, sphere or mesh; its material is `null` or opaque, and without one it is black, as in Mitsuba.
+Every point of the surface sends the same radiance Le into all directions of the half space before
+it. An element dA has the intensity Le cos dA in a direction at an angle whose cosine to the normal
+is cos, and the power pi Le dA. The shape is a rectangle, disk, sphere or mesh; its material is
+`null` or opaque, and without one it is black, as in Mitsuba.
 
-Methods that know occluders by their triangles need those of black lights. A disk and a sphere have none: a polygon and
-a sphere of facets stand for them, as large in area and in mean shadow. They shadow other lights, not their own.
+Methods that know occluders by their triangles need those of black lights. A disk and a sphere have
+none: a polygon and a sphere of facets stand for them, as large in area and in mean shadow. They
+shadow other lights, not their own.
 """
 
 import math
@@ -29,8 +31,8 @@ KINDS = ("rectangle", "disk", "sphere", "mesh")
 class AreaLight:
     """An area light, on the host, in float64.
 
-    A point of a rectangle or disk is middle + u across + v up, u and v from -1 to 1, for a disk with u^2 + v^2 <= 1.
-    Middle and axes of a mesh are those of a ball around it.
+    A point of a rectangle or disk is middle + u across + v up, u and v from -1 to 1, for a disk
+    with u^2 + v^2 <= 1. Middle and axes of a mesh are those of a ball around it.
     """
 
     name: str  #: of its shape
@@ -40,7 +42,9 @@ class AreaLight:
     up: Array  #: half of the other side, or another radius at a right angle, (3,) [m]
     normal: Array  #: of a rectangle or disk, which shine on this side alone; a unit vector (3,)
     radiance: Array  #: Le, RGB (3,) [W/(m^2 sr)]
-    opaque: bool  #: whether its shape is black, ends camera rays and shadows other lights; else it is nothing but light
+    #: whether its shape is black, ends camera rays and shadows other lights;
+    #: else it is nothing but light
+    opaque: bool
     vertices: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of a mesh [m]
     #: of a mesh: numbers of vertices, counter-clockwise from the side that shines, (triangles, 3)
     triangles: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
@@ -61,7 +65,9 @@ class AreaLight:
 
     @property
     def normals(self) -> Array:
-        """Vectors along the normals of the triangles of a mesh, twice as long as these are large [m^2]."""
+        """Vectors along the normals of the triangles of a mesh, twice as long
+        as these are large [m^2].
+        """
         first, second, third = (self.vertices[self.triangles[:, corner]] for corner in range(3))
         return np.cross(second - first, third - first)
 
@@ -113,7 +119,10 @@ def occluder_triangles(light: AreaLight) -> NDArray[np.int64]:
     faces = []
     for ring in range(_RINGS - 2):
         near, far = ring * _SIDES, (ring + 1) * _SIDES
-        faces += [np.stack([near + i, far + i, far + j], axis=1), np.stack([near + i, far + j, near + j], axis=1)]
+        faces += [
+            np.stack([near + i, far + i, far + j], axis=1),
+            np.stack([near + i, far + j, near + j], axis=1),
+        ]
     last, top = (_RINGS - 2) * _SIDES, (_RINGS - 1) * _SIDES
     faces += [
         np.stack([np.full(_SIDES, top), i, j], axis=1),
@@ -124,7 +133,8 @@ def occluder_triangles(light: AreaLight) -> NDArray[np.int64]:
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
 _LEAST = 1e-12  #: half a side or a radius, of which float32 knows the square [m]
-_FLAT = 1e-6  #: of a mesh's size and place: how far before a triangle a vertex lies in its plane, after float32
+#: of a mesh's size and place: how far before a triangle a vertex lies in its plane, after float32
+_FLAT = 1e-6
 _MANY, _CHUNK = 1e9, 1 << 22  #: vertices times triangles that are looked at, in all and at once
 _SHEARED = 1e-4  #: of a length: how far from a right angle or from another length, after float32
 
@@ -132,35 +142,52 @@ _SHEARED = 1e-4  #: of a length: how far from a right angle or from another leng
 def read_area_light(shape: Any, camera: Array) -> AreaLight:
     """Read the light of a Mitsuba shape.
 
-    `shape`: a shape with an `area` emitter; `camera`: where the camera is, (3,) [m]. Raises InputError for a light that
-    no method can render, with the name of its shape.
+    `shape`: a shape with an `area` emitter; `camera`: where the camera is, (3,) [m]. Raises
+    InputError for a light that no method can render, with the name of its shape.
     """
     name = shape.id()
     kind = _KINDS.get(shape.class_name())
     if kind is None and not shape.is_mesh():
         raise InputError(
-            f"light '{name}': its shape is a {shape.class_name().lower()}; expected a 'rectangle', 'disk', 'sphere' or "
+            f"light '{name}': its shape is a {shape.class_name().lower()}; expected a 'rectangle', "
+            "'disk', 'sphere' or "
             "mesh with an 'area' emitter"
         )
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
-        raise InputError(f"light '{name}': its shape bounds a medium; expected a light apart from the bounds of media")
+        raise InputError(
+            f"light '{name}': its shape bounds a medium; expected a light apart from the bounds of "
+            "media"
+        )
     if kind is None:
         return _read_mesh(shape, radiance, opaque)
     matrix = host_matrix(mi.traverse(shape)["to_world"])
     if not np.isfinite(matrix).all():
         raise InputError(f"light '{name}': its to_world holds numbers that are not finite")
     across, up, third = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2]
-    sizes = [float(np.linalg.norm(axis)) for axis in ((across, up, third) if kind == "sphere" else (across, up))]
-    if not min(sizes) > _LEAST or not np.linalg.norm(np.cross(across, up)) > 1e-12 * sizes[0] * sizes[1]:
-        raise InputError(f"light '{name}': the {kind} has no area; expected a to_world that leaves it one")
+    sizes = [
+        float(np.linalg.norm(axis))
+        for axis in ((across, up, third) if kind == "sphere" else (across, up))
+    ]
+    if (
+        not min(sizes) > _LEAST
+        or not np.linalg.norm(np.cross(across, up)) > 1e-12 * sizes[0] * sizes[1]
+    ):
+        raise InputError(
+            f"light '{name}': the {kind} has no area; expected a to_world that leaves it one"
+        )
     pairs = [(across, up)] + ([(up, third), (third, across)] if kind == "sphere" else [])
     if any(abs(a @ b) > _SHEARED * np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs):
-        raise InputError(f"light '{name}': the {kind} is sheared; expected a to_world of rotations, scales and shifts")
+        raise InputError(
+            f"light '{name}': the {kind} is sheared; expected a to_world of rotations, scales and "
+            "shifts"
+        )
     if kind != "rectangle" and max(sizes) - min(sizes) > _SHEARED * max(sizes):
         scales = " x ".join(f"{size:g}" for size in sizes)
-        raise InputError(f"light '{name}': the {kind} is scaled by {scales}; expected one scale for all its axes")
+        raise InputError(
+            f"light '{name}': the {kind} is scaled by {scales}; expected one scale for all its axes"
+        )
     middle = matrix[:3, 3]
     normal = np.cross(across, up)
     if kind == "sphere":
@@ -168,14 +195,24 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
         if shape.has_flipped_normals():
             raise InputError(f"light '{name}': the sphere shines inwards; {turned_outwards(shape)}")
         if np.linalg.norm(camera - middle) <= sizes[0]:
-            raise InputError(f"light '{name}': the camera is inside of the sphere; move the camera or the light")
-    elif np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel() @ normal < 0:
+            raise InputError(
+                f"light '{name}': the camera is inside of the sphere; move the camera or the light"
+            )
+    elif (
+        np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel()
+        @ normal
+        < 0
+    ):
         normal = -normal
-    return AreaLight(name, kind, middle, across, up, normal / np.linalg.norm(normal), radiance, opaque)
+    return AreaLight(
+        name, kind, middle, across, up, normal / np.linalg.norm(normal), radiance, opaque
+    )
 
 
 def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
-    """Read a mesh. The order of vertices says which side of a triangle shines, or their normals if there are any."""
+    """Read a mesh. The order of vertices says which side of a triangle shines, or their
+    normals if there are any.
+    """
     vertices = _rows(shape.vertex_positions_buffer())
     triangles = _rows(shape.faces_buffer()).astype(np.int64)
     if not np.isfinite(vertices).all():
@@ -184,7 +221,9 @@ def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(normals, axis=1)
     if not twice.any():
-        raise InputError(f"light '{shape.id()}': the mesh has no area; expected triangles that have some")
+        raise InputError(
+            f"light '{shape.id()}': the mesh has no area; expected triangles that have some"
+        )
     inverted = shape.has_flipped_normals()
     if shape.has_vertex_normals():
         along = np.einsum("tcx,tx->t", _rows(shape.vertex_normals_buffer())[triangles], normals)
@@ -198,7 +237,9 @@ def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
     middle = (corners.max(axis=0) + corners.min(axis=0)) / 2
     radius = float(np.linalg.norm(corners - middle, axis=1).max())
     x, y, z = np.eye(3)
-    light = AreaLight(shape.id(), "mesh", middle, radius * x, radius * y, z, radiance, opaque, vertices, triangles)
+    light = AreaLight(
+        shape.id(), "mesh", middle, radius * x, radius * y, z, radiance, opaque, vertices, triangles
+    )
     return replace(light, folded=opaque and _is_folded(light, normals))
 
 
@@ -207,7 +248,9 @@ def _rows(buffer: Any) -> Array:
 
 
 def _is_folded(light: AreaLight, normals: Array) -> bool:
-    """Return whether a vertex lies before the plane of a triangle; yes for a mesh too large to look."""
+    """Return whether a vertex lies before the plane of a triangle; yes for
+    a mesh too large to look.
+    """
     vertices = light.vertices[np.unique(light.triangles)]
     count, most = len(vertices), _FLAT * (light.radius + float(np.abs(light.middle).max()))
     if count * len(normals) > _MANY:
@@ -225,11 +268,15 @@ def _is_folded(light: AreaLight, normals: Array) -> bool:
 def _read_radiance(emitter, name: str) -> Array:
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
-        raise InputError(f"light '{name}': its radiance is textured or spectral; expected a constant 'rgb' radiance")
+        raise InputError(
+            f"light '{name}': its radiance is textured or spectral; expected a constant 'rgb' "
+            "radiance"
+        )
     value = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
     value = np.broadcast_to(value, 3).copy() if value.size == 1 else value
     if not np.all(np.isfinite(value)) or np.any(value < 0):
         raise InputError(
-            f"light '{name}': its radiance is {value.tolist()}; expected finite values of 0 or more [W/(m^2 sr)]"
+            f"light '{name}': its radiance is {value.tolist()}; expected finite values of 0 or "
+            "more [W/(m^2 sr)]"
         )
     return value

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The collector search: the tangent slab of a collector, the fixed point, and the light that comes from there.
+"""The collector search: the tangent slab of a collector, the fixed point, and the
+light that comes from there.
 
 **The slab that touches a cloud where light enters it, and a point and a direction in it.**
 
-A collector is a place c and a width sigma. The lit surface filtered by sigma (`realtime.clouds.light_maps`) gives a
-point q of the filtered surface, its outward normal n and the thickness Z of the cloud along the light w_L there. The
-slab is the one that touches it: its lit face goes through q across n. With mu_L = -n . w_L,
+A collector is a place c and a width sigma. The lit surface filtered by sigma
+(`realtime.clouds.light_maps`) gives a point q of the filtered surface, its outward normal n and the
+thickness Z of the cloud along the light w_L there. The slab is the one that touches it: its lit
+face goes through q across n. With mu_L = -n . w_L,
 
     t = sigma_t mu_L Z                      its thickness; Z lies along the light,
     d = sigma_t (q - p) . n                 the depth of the point p below the face,
@@ -14,58 +16,68 @@ slab is the one that touches it: its lit face goes through q across n. With mu_L
     x = (w_L + mu_L n)/|..|,  y = n x x     the horizontal direction of the light, and the one beside it,
     cos phi = v . x / sin, sin phi = v . y / sin,   sin = sqrt(1 - mu^2).
 
-The canonical transport of (t, d, mu, phi, mu_L) gives the radiance of a set of orders at p in the direction v, and
-where its light enters the slab: c = f + (c_x x + c_y y)/sigma_t.
+The canonical transport of (t, d, mu, phi, mu_L) gives the radiance of a set of orders at p in the
+direction v, and where its light enters the slab: c = f + (c_x x + c_y y)/sigma_t.
 
 Where a cloud is no slab:
 
 * p above the filtered face: d = 0. The filter removes bumps of the cloud.
 * p deeper than the slab is thick: t = d. There is cloud down to p at least.
-* The sun below the tangent plane, or in it: mu_L is `LEAST_COSINE` at least, and n is turned towards the sun until it
-  is. Normals of a map face the light, so means of them are never below the plane; at silhouettes they come close to it.
+* The sun below the tangent plane, or in it: mu_L is `LEAST_COSINE` at least, and n is turned
+  towards the sun until it is. Normals of a map face the light, so means of them are never below the
+  plane; at silhouettes they come close to it.
 * Opposed normals whose mean is 0 (both sides of a ridge): n is the direction towards the sun.
 * The sun in the zenith: x is any horizontal direction, as the transport does not depend on it.
 
-`thickness=light` measures both lengths along the light, as printed: t = sigma_t Z and d/mu_L, the lengths in a depth
-map. A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
+`thickness=light` measures both lengths along the light, as printed: t = sigma_t Z and d/mu_L, the
+lengths in a depth map. A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
 
-**The collector of a set of orders:** a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
+**The collector of a set of orders:** a fixed point on the lit surface of a cloud
+(Bouthors 2008, section 6.1).
 
-Let P(c, sigma) be the slab that touches the surface filtered by sigma where c lies along the light, and F the canonical
-transport, which maps a slab, p and v to the place and the width (c, sigma) where light enters. The search solves
+Let P(c, sigma) be the slab that touches the surface filtered by sigma where c lies along the light,
+and F the canonical transport, which maps a slab, p and v to the place and the width (c, sigma)
+where light enters. The search solves
 
     (c, sigma) = F(P(c, sigma)).
 
-Seen along the light, the map from c to c maps the plane into itself. On a slab the map is constant: the first step is
-right and the second confirms it. On a cloud the map varies with the normal of the surface at c, times the distance from
-c to p: where both are large it is no contraction, and steps overshoot.
+Seen along the light, the map from c to c maps the plane into itself. On a slab the map is constant:
+the first step is right and the second confirms it. On a cloud the map varies with the normal of the
+surface at c, times the distance from c to p: where both are large it is no contraction, and steps
+overshoot.
 
-* *Projection*. c' is the point of the tangent plane that c lies over, along the light: it differs from c where the
-  surface curves.
-* *Step*. c' + w (F - c'), no longer than the new sigma (the paper's bound on |c_i - c_(i-1)|): the surface was filtered
-  by sigma, and says nothing of what lies further away.
-* *Two-cycles*. Where the map has a slope below -1 along the line between two places, the steps go to and fro between
-  them without end. w is 1 at first, and is halved after every step that turns back (its scalar product with the last
-  step is negative). The mean of the map and the identity with the weight w has the slope 1 - w (1 - s), which is within
-  (-1, 1) for every s from 1 - 2/w on: -3 for w = 1/2, -7 for 1/4.
-* *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the collector of the last frame.
-* *Cover*. Light enters where there is cloud. Only the fraction A of the collector, read from the filtered map, is
-  cloud, so the light of the infinite slab is weighted by A; the paper does not weight it.
-* *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards, (t - d)/mu
-  downwards. The eye gets the light that was scattered into the ray over the depth T, not L: the light is weighted by (1
-  - exp(-T))/(1 - exp(-L)), as if its source were uniform. Where the ray leaves the slab through the lit face (mu < 0),
-  p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are too bright,
-  and slopes that face away from the sun are black.
-* *End*. After `iterations` steps, or where a step has no length. The light is that of the last slab: F gives it with
-  the place and the width.
+* *Projection*. c' is the point of the tangent plane that c lies over, along the light: it differs
+  from c where the surface curves.
+* *Step*. c' + w (F - c'), no longer than the new sigma (the paper's bound on |c_i - c_(i-1)|): the
+  surface was filtered by sigma, and says nothing of what lies further away.
+* *Two-cycles*. Where the map has a slope below -1 along the line between two places, the steps go
+  to and fro between them without end. w is 1 at first, and is halved after every step that turns
+  back (its scalar product with the last step is negative). The mean of the map and the identity
+  with the weight w has the slope 1 - w (1 - s), which is within (-1, 1) for every s from 1 - 2/w
+  on: -3 for w = 1/2, -7 for 1/4.
+* *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the
+  collector of the last frame.
+* *Cover*. Light enters where there is cloud. Only the fraction A of the collector, read from the
+  filtered map, is cloud, so the light of the infinite slab is weighted by A; the paper does not
+  weight it.
+* *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu|
+  upwards, (t - d)/mu downwards. The eye gets the light that was scattered into the ray over the
+  depth T, not L: the light is weighted by (1
+  - exp(-T))/(1 - exp(-L)), as if its source were uniform. Where the ray leaves the slab
+    through the lit face (mu < 0),
+  p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin
+  parts are too bright, and slopes that face away from the sun are black.
+* *End*. After `iterations` steps, or where a step has no length. The light is that of the last
+  slab: F gives it with the place and the width.
 
-The distance |F - c'| / sigma of the last step says how far the search is from its end: `CollectorLight.missed`.
+The distance |F - c'| / sigma of the last step says how far the search is from its end:
+`CollectorLight.missed`.
 
 **The light of all sets of orders at points of a cloud under one sun:** one search for each set.
 
-A frame leaves to the next the collectors of each set: the vectors from the points to the centres, and the widths, which
-are 0 where there is none. Where the camera moved, a point of the next frame is displaced from the point whose collector
-it takes, and its collector is displaced, too.
+A frame leaves to the next the collectors of each set: the vectors from the points to the centres,
+and the widths, which are 0 where there is none. Where the camera moved, a point of the next frame
+is displaced from the point whose collector it takes, and its collector is displaced, too.
 """
 
 from dataclasses import dataclass, replace
@@ -83,7 +95,9 @@ _LEAST_LENGTH = 1e-4  #: of a mean of unit normals that has a direction
 
 @dataclass(frozen=True)
 class TangentSlab:
-    """A slab, a point and a direction in it; lengths in mean free paths unless they say otherwise."""
+    """A slab, a point and a direction in it; lengths in mean free paths
+    unless they say otherwise.
+    """
 
     thickness: Any  #: t
     depth: Any  #: d of the point, from 0 to t
@@ -98,14 +112,20 @@ class TangentSlab:
 
 
 def tangent_slab(
-    surface: FilteredSurface, *, axis: Any, point: Any, toward: Any, extinction: Any, along_light: bool = False
+    surface: FilteredSurface,
+    *,
+    axis: Any,
+    point: Any,
+    toward: Any,
+    extinction: Any,
+    along_light: bool = False,
 ) -> TangentSlab:
     """Return the slab that touches a filtered surface, with a point and a direction in it.
 
-    `surface`: what `realtime.clouds.light_maps.filtered_surface` found; `axis`: unit direction in which the
-    light travels; `point`: points in the cloud or on it [m]; `toward`: unit directions in which light leaves the
-    points; `extinction`: of the cloud [1/m]; `along_light`: whether thickness and depth are those along the light, as
-    printed.
+    `surface`: what `realtime.clouds.light_maps.filtered_surface` found; `axis`: unit direction in
+    which the light travels; `point`: points in the cloud or on it [m]; `toward`: unit directions in
+    which light leaves the points; `extinction`: of the cloud [1/m]; `along_light`: whether
+    thickness and depth are those along the light, as printed.
     """
     Float = type(surface.cover)
     normal, mu_l = _facing(surface.normal, axis)
@@ -118,7 +138,9 @@ def tangent_slab(
     along = axis + normal * mu_l
     length = dr.norm(along)
     helper = dr.select(dr.abs(normal.x) < 0.5, type(normal)(1, 0, 0), type(normal)(0, 1, 0))
-    along = dr.select(length > _LEAST_LENGTH, along / length, dr.normalize(dr.cross(helper, normal)))
+    along = dr.select(
+        length > _LEAST_LENGTH, along / length, dr.normalize(dr.cross(helper, normal))
+    )
     beside = dr.cross(normal, along)
     mu = dr.clip(dr.dot(toward, normal), -1, 1)
     x, y = dr.dot(toward, along), dr.dot(toward, beside)
@@ -178,13 +200,18 @@ class Search:
     """How collectors are searched."""
 
     iterations: int = 10
-    along_light: bool = False  #: whether slabs are as thick as the cloud is along the light, as printed
+    #: whether slabs are as thick as the cloud is along the light, as printed
+    along_light: bool = False
     covered: bool = True  #: whether light enters only where the map has cloud
 
 
 def cold_start(light_map: LightMap, point) -> Collector:
-    """Return the collector with which a search starts that knows nothing: the point, and the whole cloud."""
-    return Collector(+point, light_map.texel * light_map.size + dr.zeros(type(light_map.texel), dr.width(point)))
+    """Return the collector with which a search starts that knows nothing: the
+    point, and the whole cloud.
+    """
+    return Collector(
+        +point, light_map.texel * light_map.size + dr.zeros(type(light_map.texel), dr.width(point))
+    )
 
 
 def collector_light(
@@ -202,11 +229,11 @@ def collector_light(
 ) -> CollectorLight:
     """Find the collectors of one set of orders, and the light that comes from them.
 
-    `light_map`: of the cloud under one sun; `transport`: see `Transport`; `set_number`: what the transport is asked
-    for; `point`: points in the cloud or on it [m]; `toward`: unit directions in which light leaves them; `extinction`:
-    of the cloud [1/m]; `behind`: optical depth of the clouds on the ray behind each point; `start`: with which the
-    search starts; `search`: how it goes on; `active`: lanes to compute; in the others the collector stays and no light
-    comes.
+    `light_map`: of the cloud under one sun; `transport`: see `Transport`; `set_number`: what the
+    transport is asked for; `point`: points in the cloud or on it [m]; `toward`: unit directions in
+    which light leaves them; `extinction`: of the cloud [1/m]; `behind`: optical depth of the clouds
+    on the ray behind each point; `start`: with which the search starts; `search`: how it goes on;
+    `active`: lanes to compute; in the others the collector stays and no light comes.
     """
     Float = type(start.width)
     lanes = max(dr.width(point), dr.width(toward))
@@ -265,7 +292,9 @@ def _reaching_behind(slab: TangentSlab, behind: Any) -> TangentSlab:
     """Return a slab with the point so deep that there is something of it behind."""
     skin = dr.minimum(_SKIN, 0.5 * slab.thickness)
     deep = dr.maximum(slab.depth, dr.maximum(skin, -slab.mu * behind))
-    depth = dr.select(slab.mu < 0, dr.minimum(deep, slab.thickness), dr.minimum(slab.depth, slab.thickness - skin))
+    depth = dr.select(
+        slab.mu < 0, dr.minimum(deep, slab.thickness), dr.minimum(slab.depth, slab.thickness - skin)
+    )
     return replace(slab, depth=depth)
 
 
@@ -280,7 +309,8 @@ class OrdersLight:
     """The light of sets of orders at points."""
 
     by_set: tuple[Any, ...]  #: for unit irradiance across the beam [1/sr]
-    collectors: tuple[Collector, ...]  #: for the next frame, by set; centres count from the points [m]
+    #: for the next frame, by set; centres count from the points [m]
+    collectors: tuple[Collector, ...]
 
 
 def light_of_orders(
@@ -299,19 +329,23 @@ def light_of_orders(
     """Search the collectors of all sets of orders, and return their light.
 
     `light_map`, `transport`, `point`, `toward`, `extinction`, `behind`, `search`, `active`: see
-    `realtime.clouds.collector_search.collector_light`; `sets`: how many sets there are, numbers from 0 on; `last`: the
-    `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
+    `realtime.clouds.collector_search.collector_light`; `sets`: how many sets there are, numbers
+    from 0 on; `last`: the `OrdersLight.collectors` of the last frame; None where a search starts
+    with nothing.
     """
     cold = cold_start(light_map, point)
     Float, Vector = type(cold.width), type(cold.centre)
-    # By set the collector, which is at first that of the last frame, and the light that comes from it.
+    # By set the collector, which is at first that of the last frame, and the
+    # light that comes from it.
     centres, widths = (dr.alloc_local(kind, sets, value=kind(0)) for kind in (Vector, Float))
     radiances = dr.alloc_local(Float, sets, value=Float(0))
     for number, collector in enumerate(last or ()):
         centres[mi.UInt32(number)], widths[mi.UInt32(number)] = collector.centre, collector.width
 
     def search_set(number, centres, widths, radiances):
-        start = cold if last is None else _warm(cold, Collector(centres[number], widths[number]), point)
+        start = (
+            cold if last is None else _warm(cold, Collector(centres[number], widths[number]), point)
+        )
         light = collector_light(
             light_map,
             transport,
@@ -346,4 +380,6 @@ def _warm(cold: Collector, last: Collector, point) -> Collector:
     """Return the collector with which a search starts: the last frame's where there is one."""
     way, width = last.centre, last.width
     there = width > 0
-    return Collector(dr.select(there, point + way, cold.centre), dr.select(there, width, cold.width))
+    return Collector(
+        dr.select(there, point + way, cold.centre), dr.select(there, width, cold.width)
+    )

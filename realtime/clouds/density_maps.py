@@ -1,33 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""How much of a cloud lies between a sun and a point, in a map: what a segment of single scattering looks up.
+r"""How much of a cloud lies between a sun and a point, in a map: what a segment of
+single scattering looks up.
 
-A ray of the light through each texel marches through a cloud. It keeps l = int rho dx, in metres of full density, at
-layers whose heights lie
+A ray of the light through each texel marches through a cloud. It keeps l = int rho dx, in metres of
+full density, at layers whose heights lie
 
     h_k = front - (front - back) (k/K)^2,        k = 0 .. K,
 
-between the first and the last place of the ray with any density: narrow where the light comes in and much of it is
-left, wide behind. A look-up is linear in k between two layers, and between the four nearest texels, each with its own
-front and back. That is a deep shadow map (Lokovic and Veach 2000), which the paper names as its future work: a depth
-map alone takes the way from the first surface for cloud of one density, without wisps and gaps. The depth of a segment
-is sigma_t l, so that other extinctions need no new map.
+between the first and the last place of the ray with any density: narrow where the light comes in
+and much of it is left, wide behind. A look-up is linear in k between two layers, and between the
+four nearest texels, each with its own front and back. That is a deep shadow map (Lokovic and Veach
+2000), which the paper names as its future work: a depth map alone takes the way from the first
+surface for cloud of one density, without wisps and gaps. The depth of a segment is sigma_t l, so
+that other extinctions need no new map.
 
-**The surface of a cloud with a density:** where rho first exceeds a threshold rho_0, from the eye and from the sun.
+**The surface of a cloud with a density:** where rho first exceeds a threshold rho_0, from
+the eye and from the sun.
 
-Bouthors et al. 2008, sections 6.1 and 8, take for the lit surface the first voxel with rho > rho_0 along the light, and
-slabs between it and the far side. A slab has one extinction, a cloud one at every place; but slabs depend on optical
-lengths alone. So
+Bouthors et al. 2008, sections 6.1 and 8, take for the lit surface the first voxel with rho > rho_0
+along the light, and slabs between it and the far side. A slab has one extinction, a cloud one at
+every place; but slabs depend on optical lengths alone. So
 
     sigma_s = sigma_t mean(rho where rho > rho_0)        stands for the extinction of slabs: that of the cloud's body,
     Z = int rho dx / mean(rho where rho > rho_0)         for their thickness along the light, from the surface on,
 
-whose product is the true optical thickness of the cloud, gaps and wisps counted with their densities. The light map
-keeps front and front - Z, so that the filter and the search are the same as for homogeneous clouds. Depths below the
-surface, and the ways to collectors, are lengths times sigma_s: exact where rho equals that of the body, which is
-everywhere except in a layer at the surface.
+whose product is the true optical thickness of the cloud, gaps and wisps counted with their
+densities. The light map keeps front and front - Z, so that the filter and the search are the same
+as for homogeneous clouds. Depths below the surface, and the ways to collectors, are lengths times
+sigma_s: exact where rho equals that of the body, which is everywhere except in a layer at the
+surface.
 
-Along a ray the density is taken at the ends of steps of a voxel, and the place between two of them at which it passes
-rho_0 is linear.
+Along a ray the density is taken at the ends of steps of a voxel, and the place between two of them
+at which it passes rho_0 is linear.
 """
 
 from collections.abc import Sequence
@@ -51,7 +55,9 @@ SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
 
 @dataclass(frozen=True)
 class LightDepths:
-    """Depths between one sun and the points of one cloud; row by row, the layers of a texel one after the other."""
+    """Depths between one sun and the points of one cloud; row by row, the layers of a
+    texel one after the other.
+    """
 
     lengths: Any  #: l at the K + 1 heights of each texel [m]
     front: Any  #: by texel [m]
@@ -63,16 +69,22 @@ class LightDepths:
         """Return l of points [m]."""
         u, v, height, _ = self.projection.homogeneous(mi.UInt32(0), point - self.position, 1)
         Float = type(height)
-        (column, x), (row, y) = (cell_of(dr.fma(0.5 * SIZE, place + 1, -0.5), SIZE) for place in (u, v))
+        (column, x), (row, y) = (
+            cell_of(dr.fma(0.5 * SIZE, place + 1, -0.5), SIZE) for place in (u, v)
+        )
         total = Float(0)
         for down, weight_down in ((0, 1 - y), (1, y)):
             for along, weight_along in ((0, 1 - x), (1, x)):
                 texel = (row + down) * SIZE + column + along
-                front, back = (dr.gather(Float, own, texel, active) for own in (self.front, self.back))
+                front, back = (
+                    dr.gather(Float, own, texel, active) for own in (self.front, self.back)
+                )
                 fraction = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
                 layer, between = cell_of(dr.sqrt(fraction) * LAYERS, LAYERS + 1)
                 first = texel * (LAYERS + 1) + layer
-                near, far = (dr.gather(Float, self.lengths, place, active) for place in (first, first + 1))
+                near, far = (
+                    dr.gather(Float, self.lengths, place, active) for place in (first, first + 1)
+                )
                 total = dr.fma(weight_down * weight_along, dr.lerp(near, far, between), total)
         return total
 
@@ -87,9 +99,9 @@ def light_depths(
 ) -> LightDepths:
     """Return the depths between a sun and all points of a cloud.
 
-    `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a directional light, with an
-    extent that holds the clouds; `cloud`: the number of the cloud, opaque: all clouds share kernels; `stride`: how long
-    the steps are at most [voxels].
+    `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a
+    directional light, with an extent that holds the clouds; `cloud`: the number of the cloud,
+    opaque: all clouds share kernels; `stride`: how long the steps are at most [voxels].
     """
     Float = type(light.position.x)
     start, axis, texel = texel_rays(light, SIZE)
@@ -104,10 +116,17 @@ def light_depths(
 
     def widen(total, begin, end, inside, number):
         first, last = total
-        there = (number == cloud) & (middle_density(clouds, origin, direction, begin, end, number) > 0)
-        return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), mi.Bool(True)
+        there = (number == cloud) & (
+            middle_density(clouds, origin, direction, begin, end, number) > 0
+        )
+        return (
+            dr.select(there, dr.minimum(first, begin), first),
+            dr.select(there, end, last),
+        ), mi.Bool(True)
 
-    first, last = march(surfaces, origin, direction, Float(dr.inf), nothing, step=full_step, add=widen)
+    first, last = march(
+        surfaces, origin, direction, Float(dr.inf), nothing, step=full_step, add=widen
+    )
     there = dr.isfinite(first)
     first, last = dr.select(there, first, 0), dr.select(there, last, 0)
     dr.eval(first, last)
@@ -126,7 +145,8 @@ def light_depths(
         # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
         fraction = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
         reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(fraction), LAYERS, 1e-3)), LAYERS)
-        # The next layer keeps this length if the ray leaves the cloud before it; a later step writes over it.
+        # The next layer keeps this length if the ray leaves the cloud before it; a
+        # later step writes over it.
         dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
         dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))
         return (dr.maximum(layer, reached), length), end < last
@@ -187,8 +207,9 @@ def dense_surface(
     """Return where rays first meet more than a density.
 
     `surfaces`, `clouds`, `origin`, `direction`, `end`, `stride`: as for
-    `realtime.clouds.march.depths_along`; `threshold`: rho_0 [1]; `only`: the number of a cloud that is
-    seen alone, with what the rays meet behind its surface; None for all, where rays end at the surface.
+    `realtime.clouds.march.depths_along`; `threshold`: rho_0 [1]; `only`: the number of a cloud that
+    is seen alone, with what the rays meet behind its surface; None for all, where rays end at the
+    surface.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
     density = clouds.density
@@ -213,7 +234,9 @@ def dense_surface(
             return (distance, number, behind), ~met
         rho = middle_density(clouds, origin, direction, begin, finish, cloud)
         counted = own & dr.isfinite(distance)
-        behind += dr.select(counted, rho * (finish - dr.maximum(begin, dr.select(counted, distance, 0))), 0)
+        behind += dr.select(
+            counted, rho * (finish - dr.maximum(begin, dr.select(counted, distance, 0))), 0
+        )
         return (distance, number, behind), mi.Bool(True)
 
     total = (
@@ -236,17 +259,25 @@ def lit_dense_surface(
     threshold: float,
     stride: Any,
 ) -> LitSurfaces:
-    """Return the lit surfaces of one cloud along a light, as `realtime.clouds.light_maps.cast_surfaces` does.
+    """Return the lit surfaces of one cloud along a light, as
+    `realtime.clouds.light_maps.cast_surfaces` does.
 
-    `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for `cast_surfaces`;
-    `cloud`: its number, opaque; `body`: by cloud, mean(rho where rho > rho_0) [1].
+    `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for
+    `cast_surfaces`; `cloud`: its number, opaque; `body`: by cloud, mean(rho where rho > rho_0) [1].
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)
     start, axis, texel = texel_rays(light, size)
     origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, size * size)
     met = dense_surface(
-        surfaces, clouds, origin, direction, Float(dr.inf), threshold=threshold, stride=stride, only=cloud
+        surfaces,
+        clouds,
+        origin,
+        direction,
+        Float(dr.inf),
+        threshold=threshold,
+        stride=stride,
+        only=cloud,
     )
     there = dr.isfinite(met.distance)
     distance = dr.select(there, met.distance, 0)

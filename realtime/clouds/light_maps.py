@@ -3,40 +3,45 @@
 
 The first and the last surface of a cloud along parallel light, in plain arrays.
 
-The rectangle of a directional light is cut into size^2 texels, and a ray goes through the middle of each: from before
-the rectangle's shapes to the first surface, and from behind back to the last. Heights are those of
-`realtime.shadow_maps.projection`: above the rectangle where the media end, so that the lit side is the higher one and
-height falls along the light.
+The rectangle of a directional light is cut into size^2 texels, and a ray goes through the middle of
+each: from before the rectangle's shapes to the first surface, and from behind back to the last.
+Heights are those of `realtime.shadow_maps.projection`: above the rectangle where the media end, so
+that the lit side is the higher one and height falls along the light.
 
-The lit surface of a cloud filtered to any width: premultiplied MIP levels, read between texels and levels.
+The lit surface of a cloud filtered to any width: premultiplied MIP levels, read
+between texels and levels.
 
-With A = 1 where a ray of the light meets the cloud and 0 elsewhere, each level holds the means over squares of 2^l
-texels of
+With A = 1 where a ray of the light meets the cloud and 0 elsewhere, each level holds the means over
+squares of 2^l texels of
 
     A,   A front,   A back,   A (u, v),   A n,
 
-so that their values divided by the value of A are means over the cloud alone, and texels outside the cloud count for
-nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mean of (u, v) is not in the paper: it says
-*where* the mean of the heights is. Over the middle of a cloud it is the requested place; at a silhouette it lies on the
-side of the cloud, and a tangent plane through the mean height must go through it there.
+so that their values divided by the value of A are means over the cloud alone, and texels outside
+the cloud count for nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mean of
+(u, v) is not in the paper: it says *where* the mean of the heights is. Over the middle of a cloud
+it is the requested place; at a silhouette it lies on the side of the cloud, and a tangent plane
+through the mean height must go through it there.
 
-*Normals*. The plane that touches a filtered surface has the mean slope of the surface. Hence n has the component 1
-along the light, (slope, 1), which means preserve. Slopes are differences of the heights of neighbouring texels, whose
-sum over many texels is the difference of the two ends: a surface that a bump hides counts as a step. A mean of unit
-normals, as printed, has too many normals that face the light, where a map sees most, and none of hidden surfaces. On
-clouds with bumps it leans towards the light, and slabs across it are too thick.
+*Normals*. The plane that touches a filtered surface has the mean slope of the surface. Hence n has
+the component 1 along the light, (slope, 1), which means preserve. Slopes are differences of the
+heights of neighbouring texels, whose sum over many texels is the difference of the two ends: a
+surface that a bump hides counts as a step. A mean of unit normals, as printed, has too many normals
+that face the light, where a map sees most, and none of hidden surfaces. On clouds with bumps it
+leans towards the light, and slabs across it are too thick.
 
-*Width*. A mean over a square of width w has the variance w^2/12 along each axis, and linear interpolation between such
-means adds the w^2/6 of a tent: w^2/4 together. The level of a filter of standard deviation sigma is therefore
+*Width*. A mean over a square of width w has the variance w^2/12 along each axis, and linear
+interpolation between such means adds the w^2/6 of a tent: w^2/4 together. The level of a filter of
+standard deviation sigma is therefore
 
     w = 2 sigma,   l = log2(2 sigma / texel),
 
 with linear interpolation in l between two levels.
 
-*Holes*. Where all texels that are read have A = 0 there is no mean. A texel without cloud therefore takes the values of
-its parent, with the weight `HOLE`: a look-up outside the cloud finds the nearest values, from the finest level that
-holds any of the cloud, and a look-up in the cloud changes by a fraction of `HOLE` at most. Holes are filled when all
-levels exist, from the coarsest down, so that no mean counts them.
+*Holes*. Where all texels that are read have A = 0 there is no mean. A texel without cloud therefore
+takes the values of its parent, with the weight `HOLE`: a look-up outside the cloud finds the
+nearest values, from the finest level that holds any of the cloud, and a look-up in the cloud
+changes by a fraction of `HOLE` at most. Holes are filled when all levels exist, from the coarsest
+down, so that no mean counts them.
 """
 
 from collections.abc import Sequence
@@ -64,10 +69,12 @@ class LitSurfaces:
 
 
 def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
-    """Cast both rays of every texel; nothing is evaluated, so that what reads it is computed with it.
+    """Cast both rays of every texel; nothing is evaluated, so that what
+    reads it is computed with it.
 
-    `cloud`: a Mitsuba scene of the cloud's boundary alone; `light`: a directional light, with an extent that holds the
-    cloud; `size`: texels on a side, a power of two. Raises InputError if `size` is not a power of two from 4 to 8192.
+    `cloud`: a Mitsuba scene of the cloud's boundary alone; `light`: a directional light, with an
+    extent that holds the cloud; `size`: texels on a side, a power of two. Raises InputError if
+    `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Float = type(light.position.x)
@@ -79,7 +86,10 @@ def cast_surfaces(cloud, light: Light, size: int) -> LitSurfaces:
     behind = cloud.ray_intersect_preliminary(last, coherent=True, active=hit.is_valid())
     # At a silhouette one of both rays may slip past: there is no cloud of any thickness.
     there = hit.is_valid() & behind.is_valid()
-    front, back = dr.select(there, Float(depth) - Float(hit.t), 0), dr.select(there, Float(behind.t), 0)
+    front, back = (
+        dr.select(there, Float(depth) - Float(hit.t), 0),
+        dr.select(there, Float(behind.t), 0),
+    )
     return LitSurfaces(size, texel, there, front, back)
 
 
@@ -88,7 +98,9 @@ HOLE = 1e-6  #: weight of a texel without cloud
 
 @dataclass(frozen=True)
 class LightMap:
-    """The levels of the maps of all clouds, cloud after cloud, the finest level first, row by row."""
+    """The levels of the maps of all clouds, cloud after cloud, the finest
+    level first, row by row.
+    """
 
     size: int  #: texels on a side of the finest level
     heights: Any  #: by texel A, A front [m], A back [m], A u
@@ -96,7 +108,8 @@ class LightMap:
     texel: Any  #: width of a texel of the finest level [m]
     position: Any  #: middle of the rectangle where heights are 0 [m]
     projection: Projection
-    before: Any = 0  #: texels before those of the cloud that is asked for, one for all lanes or by lane
+    #: texels before those of the cloud that is asked for, one for all lanes or by lane
+    before: Any = 0
 
     def of_cloud(self, number: PerRay) -> "LightMap":
         """Return the map in which lanes look at a cloud of their own."""
@@ -117,7 +130,9 @@ class LightMap:
 class FilteredSurface:
     """The lit surface near some points, filtered."""
 
-    cover: Any  #: fraction of the filter's width in which there is cloud; about `HOLE` or less where there is none
+    #: fraction of the filter's width in which there is cloud; about `HOLE` or
+    #: less where there is none
+    cover: Any
     middle: Any  #: the middle of that part of the surface [m]
     thickness: Any  #: from the first to the last surface, along the light [m]
     normal: Any  #: of unit length, towards the light
@@ -126,8 +141,8 @@ class FilteredSurface:
 def light_map(clouds: Sequence[Any], light: Light, size: int) -> LightMap:
     """Return the map of clouds under one directional light.
 
-    `clouds`: by cloud a Mitsuba scene of its boundary alone; `light`, `size`: see `cast_surfaces`, which says what is
-    refused, too.
+    `clouds`: by cloud a Mitsuba scene of its boundary alone; `light`, `size`: see `cast_surfaces`,
+    which says what is refused, too.
     """
     return filtered_map([cast_surfaces(cloud, light, size) for cloud in clouds], light)
 
@@ -148,12 +163,15 @@ def filtered_map(surfaces: Sequence[LitSurfaces], light: Light) -> LightMap:
 
 
 def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
-    """Return normals that are 1 long along the light, from differences of heights; 0 where there is no cloud."""
+    """Return normals that are 1 long along the light, from differences of heights; 0
+    where there is no cloud.
+    """
     assert projection.basis is not None
     size, Float = surfaces.size, type(surfaces.front)
     across, up, axis = projection.basis
     row, column = surfaces.place // size, surfaces.place % size
-    # Neighbours are found row by row. All that is read later is evaluated now: otherwise rays would be cast again.
+    # Neighbours are found row by row. All that is read later is evaluated now: otherwise
+    # rays would be cast again.
     fronts, there = dr.empty(Float, size * size), dr.empty(type(surfaces.there), size * size)
     dr.scatter(fronts, surfaces.front, surfaces.place)
     dr.scatter(there, surfaces.there, surfaces.place)
@@ -177,15 +195,20 @@ def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
     return dr.select(surfaces.there, normal, 0)
 
 
-def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, projection: Projection, before: int) -> None:
+def _add_levels(
+    tables: tuple[Any, Any], surfaces: LitSurfaces, projection: Projection, before: int
+) -> None:
     """Write the levels of one cloud, without holes, behind so many texels of others.
 
-    The finest level is most of the memory: it goes where it belongs at once, and its holes are written again. Dr.Jit
-    would copy a table that the same kernel reads and writes, so that its holes are known beside it.
+    The finest level is most of the memory: it goes where it belongs at once, and its holes are
+    written again. Dr.Jit would copy a table that the same kernel reads and writes, so that its
+    holes are known beside it.
     """
     Float, size, axis = type(tables[0]), surfaces.size, projection.parallel_axis
     Four = four_numbers(Float)
-    for table, values in zip(tables, _finest(surfaces, slope_normals(surfaces, projection)), strict=True):
+    for table, values in zip(
+        tables, _finest(surfaces, slope_normals(surfaces, projection)), strict=True
+    ):
         dr.scatter(table, values, surfaces.place + before)
     there = dr.empty(type(surfaces.there), size * size)
     dr.scatter(there, surfaces.there, surfaces.place)
@@ -193,7 +216,9 @@ def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, projection: Proj
     levels = [tuple(packed(_means(table, size // 2, before)) for table in tables)]
     while len(levels) < size.bit_length() - 1:
         dr.eval(levels[-1])
-        levels.append(tuple(packed(_means(table, size >> (len(levels) + 1))) for table in levels[-1]))
+        levels.append(
+            tuple(packed(_means(table, size >> (len(levels) + 1))) for table in levels[-1])
+        )
     coarser = packed(Four(Float(1), 0, 0, 0)), packed(Four(-axis.x, -axis.y, -axis.z, 0))
     for number in range(len(levels), 0, -1):
         dr.eval(levels[number - 1], coarser)
@@ -201,7 +226,9 @@ def _add_levels(tables: tuple[Any, Any], surfaces: LitSurfaces, projection: Proj
         texel = dr.arange(mi.UInt32, side * side)
         own = tuple(dr.gather(Four, part, texel) for part in levels[number - 1])
         hole = own[0].x == 0
-        values = [dr.select(hole, *pair) for pair in zip(_nearest(coarser, side, hole), own, strict=True)]
+        values = [
+            dr.select(hole, *pair) for pair in zip(_nearest(coarser, side, hole), own, strict=True)
+        ]
         for table, value in zip(tables, values, strict=True):
             dr.scatter(table, value, texel + (before + _texels_before(size, number)))
         coarser = tuple(packed(value) for value in values)
@@ -216,7 +243,10 @@ def _finest(surfaces: LitSurfaces, normal: Any) -> tuple[Any, Any]:
     Float, size = type(surfaces.front), surfaces.size
     Four = four_numbers(Float)
     row = surfaces.place // size
-    u, v = (dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1) for texel in (surfaces.place - row * size, row))
+    u, v = (
+        dr.fma(Float(texel), 2.0 / size, 1.0 / size - 1)
+        for texel in (surfaces.place - row * size, row)
+    )
     cover = dr.select(surfaces.there, Float(1), 0)
     return (
         Four(cover, surfaces.front, surfaces.back, cover * u),
@@ -248,9 +278,11 @@ def map_place(light_map: LightMap, point) -> tuple[Any, Any]:
 def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurface:
     """Return the lit surface that points lie under, or over, along the light.
 
-    `light_map`: of a cloud and a light; `point`: points [m]; `width`: standard deviation of the filter [m].
+    `light_map`: of a cloud and a light; `point`: points [m]; `width`: standard
+    deviation of the filter [m].
 
-    Valid for any point and any width of 0 or more; what lies beside the map has the values of its edge.
+    Valid for any point and any width of 0 or more; what lies beside the map
+    has the values of its edge.
     """
     Float = type(width)
     level = dr.clip(dr.log2(dr.maximum(2 * width / light_map.texel, 1)), 0, light_map.levels - 1)
@@ -264,20 +296,28 @@ def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurfa
     inverse = dr.rcp(cover)
     assert light_map.projection.basis is not None
     across, up, axis = light_map.projection.basis
-    middle = light_map.position + across * (u * inverse) + up * (v * inverse) - axis * (front * inverse)
-    return FilteredSurface(cover, middle, (front - back) * inverse, dr.normalize(type(point)(*normal)))
+    middle = (
+        light_map.position + across * (u * inverse) + up * (v * inverse) - axis * (front * inverse)
+    )
+    return FilteredSurface(
+        cover, middle, (front - back) * inverse, dr.normalize(type(point)(*normal))
+    )
 
 
 def shade(light_map: LightMap, point, width: Metres) -> tuple[PerRay, Metres]:
-    """Return the fraction of a filter's width over which a cloud lies, and how much of it is above the points [m].
+    """Return the fraction of a filter's width over which a cloud lies, and how much of it
+    is above the points [m].
 
-    Parameters are those of `filtered_surface`; above is where the light comes from, and the length along it.
+    Parameters are those of `filtered_surface`; above is where the light comes from,
+    and the length along it.
     """
     level = dr.clip(dr.log2(dr.maximum(2 * width / light_map.texel, 1)), 0, light_map.levels - 1)
     fine = dr.minimum(mi.UInt32(level), light_map.levels - 1)
     coarse = dr.minimum(fine + 1, light_map.levels - 1)
     u, v, height, _ = light_map.projection.homogeneous(mi.UInt32(0), point - light_map.position, 1)
-    sums = [_between_texels(light_map, light_map.heights, (u, v), number) for number in (fine, coarse)]
+    sums = [
+        _between_texels(light_map, light_map.heights, (u, v), number) for number in (fine, coarse)
+    ]
     cover, front, back, _ = dr.lerp(*sums, level - type(width)(fine))
     length = dr.clip(front - height * cover, 0, front - back) / cover
     return cover, length
@@ -286,22 +326,29 @@ def shade(light_map: LightMap, point, width: Metres) -> tuple[PerRay, Metres]:
 def length_along_light(light_map: LightMap, point, active: Any = True) -> Metres:
     """Return how much of the way of the light to points lies in a cloud [m].
 
-    From its first surface to the point, or to its last: what lies between both is cloud, also vacuum between two
-    lobes (Bouthors 2008, section 7). Parameters are those of `filtered_surface`; here the surface is that of the finest
-    level.
+    From its first surface to the point, or to its last: what lies between both is cloud, also
+    vacuum between two lobes (Bouthors 2008, section 7). Parameters are those of `filtered_surface`;
+    here the surface is that of the finest level.
     """
     u, v, height, _ = light_map.projection.homogeneous(mi.UInt32(0), point - light_map.position, 1)
-    cover, front, back, _ = _between_texels(light_map, light_map.heights, (u, v), mi.UInt32(0), active)
+    cover, front, back, _ = _between_texels(
+        light_map, light_map.heights, (u, v), mi.UInt32(0), active
+    )
     length = dr.maximum(dr.minimum(front - height * cover, front - back), 0) / cover
     return dr.select(cover > 0.5, length, 0)
 
 
 def _at_level(light_map: LightMap, place: tuple[PerRay, PerRay], level: PerRay) -> tuple[Any, Any]:
     """Return both quadruples between the texels of a level."""
-    return tuple(_between_texels(light_map, table, place, level) for table in (light_map.heights, light_map.normals))
+    return tuple(
+        _between_texels(light_map, table, place, level)
+        for table in (light_map.heights, light_map.normals)
+    )
 
 
-def _between_texels(light_map: LightMap, table: Any, place: Any, level: PerRay, active: Any = True) -> Any:
+def _between_texels(
+    light_map: LightMap, table: Any, place: Any, level: PerRay, active: Any = True
+) -> Any:
     """Return the four numbers of a table between the texels of a level."""
     Float = type(table)
     Four = four_numbers(Float)
@@ -316,7 +363,9 @@ def _between_texels(light_map: LightMap, table: Any, place: Any, level: PerRay, 
     return total
 
 
-def _neighbours(place: PerRay, side: PerRay, Float: Any) -> tuple[tuple[PerRay, PerRay], tuple[PerRay, PerRay]]:
+def _neighbours(
+    place: PerRay, side: PerRay, Float: Any
+) -> tuple[tuple[PerRay, PerRay], tuple[PerRay, PerRay]]:
     """Return the numbers of the texels on both sides of u or v, and their weights."""
     position = dr.clip(dr.fma(0.5 * Float(side), place + 1, -0.5), 0, Float(side) - 1)
     lower = dr.minimum(mi.UInt32(position), side - 1)
@@ -333,7 +382,9 @@ def _texels_before(size: int, level: Any) -> Any:
 
 
 def _means(table: Any, side: int, before: int = 0) -> Any:
-    """Return the means over squares of 2 x 2, (side, side), of a level that lies behind so many texels of a table."""
+    """Return the means over squares of 2 x 2, (side, side), of a level that lies behind
+    so many texels of a table.
+    """
     Four, texel = four_numbers(type(table)), dr.arange(mi.UInt32, side * side)
     row = texel // side
     first = 4 * row * side + 2 * (texel - row * side) + before

@@ -1,27 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Where rays cross the boundaries of clouds of any shape, their steps in between, and depths along them.
+r"""Where rays cross the boundaries of clouds of any shape, their steps in
+between, and depths along them.
 
-**The boundaries of all clouds of a scene:** a Mitsuba scene to cast rays at, and a table of normals.
+**The boundaries of all clouds of a scene:** a Mitsuba scene to cast rays
+at, and a table of normals.
 
-**Crossings of rays with the boundaries of clouds, one after the other, and what follows from them.**
+**Crossings of rays with the boundaries of clouds, one after the other, and
+what follows from them.**
 
-A stretch of a ray between two crossings lies in a cloud if and only if the ray leaves one at its end. The start of
-the ray need not be known, and a crossing that rounding hides, or shows twice, costs a stretch of its own length: the
-sum over the stretches is right to the rounding of a distance.
+A stretch of a ray between two crossings lies in a cloud if and only if the ray leaves one at its
+end. The start of the ray need not be known, and a crossing that rounding hides, or shows twice,
+costs a stretch of its own length: the sum over the stretches is right to the rounding of a
+distance.
 
-Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond it, 4e-6 of the
-distance and of the coordinates, is not seen.
+Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond
+it, 4e-6 of the distance and of the coordinates, is not seen.
 
-The ends of a stretch lie on a boundary, and rounding decides on which side of it. A light that shines along a boundary
-reaches either side by another depth. Depths at an end are therefore looked up inside the stretch, as far from the
-boundary as that step: there the point lies in the cloud of the stretch for certain.
+The ends of a stretch lie on a boundary, and rounding decides on which side of it. A light that
+shines along a boundary reaches either side by another depth. Depths at an end are therefore looked
+up inside the stretch, as far from the boundary as that step: there the point lies in the cloud of
+the stretch for certain.
 
 **Steps of rays through clouds, and optical depths.**
 
-A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint rule, whose error
-falls with dx^2. In a grid steps start as long as a voxel, and grow with the depth tau to the eye like exp(tau/s), s =
-`SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about the same fraction in what is wrong of it. A
-homogeneous cloud is one of density 1, without voxels: its stretches are the steps.
+A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint
+rule, whose error falls with dx^2. In a grid steps start as long as a voxel, and grow with the depth
+tau to the eye like exp(tau/s), s = `SPREAD`: what lies behind tau shows with exp(-tau), so all
+steps have about the same fraction in what is wrong of it. A homogeneous cloud is one of density 1,
+without voxels: its stretches are the steps.
 """
 
 from collections.abc import Callable
@@ -43,12 +49,16 @@ from airlight.realtime.scene.read_scene import Scene
 
 @dataclass(frozen=True)
 class CloudSurfaces:
-    """The boundaries of clouds; part of the state of a method, so that recorded functions take it as it is."""
+    """The boundaries of clouds; part of the state of a method, so that recorded
+    functions take it as it is.
+    """
 
     geometry: Any  #: an `mi.Scene` of the boundaries alone
     first: Any  #: by number of the shape in Mitsuba's registry, its first row of `facets`
     cloud: Any  #: by that number, the number of the cloud in `Medium.clouds`
-    facets: Any  #: four numbers each: the outward unit normal of a triangle and 0, or the centre of a sphere [m] and 1
+    #: four numbers each: the outward unit normal of a triangle and 0, or the
+    #: centre of a sphere [m] and 1
+    facets: Any
     spheres: bool  #: whether there are any
     several: bool  #: whether there is more than one cloud
 
@@ -58,7 +68,10 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     shapes = scene.boundaries
     rows = [_rows(shape) for shape in shapes]
     numbers = [shape_number(shape) for shape in shapes]
-    first, cloud = np.zeros(max(numbers) + 1, dtype=np.uint32), np.zeros(max(numbers) + 1, dtype=np.uint32)
+    first, cloud = (
+        np.zeros(max(numbers) + 1, dtype=np.uint32),
+        np.zeros(max(numbers) + 1, dtype=np.uint32),
+    )
     first[numbers] = np.cumsum([0] + [len(own) for own in rows[:-1]])
     cloud[numbers] = np.arange(len(shapes))
     facets = aligned_array(mi.Float, np.concatenate(rows).ravel())
@@ -70,15 +83,23 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
 
 
 def outward_normal(surfaces: CloudSurfaces, hit, point, active):
-    """Return the outward unit normals where `hit`, a preliminary intersection, meets a boundary at a `point` [m]."""
+    """Return the outward unit normals where `hit`, a preliminary intersection, meets a
+    boundary at a `point` [m].
+    """
     row = mi.UInt32(0)
     if surfaces.several:
-        row = dr.gather(mi.UInt32, surfaces.first, dr.reinterpret_array(mi.UInt32, hit.shape), active)
+        row = dr.gather(
+            mi.UInt32, surfaces.first, dr.reinterpret_array(mi.UInt32, hit.shape), active
+        )
     if not surfaces.spheres:
-        x, y, z, _ = dr.gather(four_numbers(mi.Float), surfaces.facets, row + hit.prim_index, active)
+        x, y, z, _ = dr.gather(
+            four_numbers(mi.Float), surfaces.facets, row + hit.prim_index, active
+        )
         return mi.Vector3f(x, y, z)
     ball = dr.gather(four_numbers(mi.Float), surfaces.facets, row, active).w > 0
-    x, y, z, _ = dr.gather(four_numbers(mi.Float), surfaces.facets, row + dr.select(ball, 0, hit.prim_index), active)
+    x, y, z, _ = dr.gather(
+        four_numbers(mi.Float), surfaces.facets, row + dr.select(ball, 0, hit.prim_index), active
+    )
     normal = mi.Vector3f(x, y, z)
     return dr.select(ball, dr.normalize(point - normal), normal)
 
@@ -87,7 +108,10 @@ def _rows(shape):
     """Return the rows of a shape, (rows, 4)."""
     if not shape.is_mesh():  # a sphere
         box = shape.bbox()
-        centre = 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())
+        centre = 0.5 * (
+            np.array(box.min, dtype=np.float64).ravel()
+            + np.array(box.max, dtype=np.float64).ravel()
+        )
         return np.array([[*centre, 1.0]])
     vertices, faces = mesh_triangles(shape)
     corners = vertices[faces]
@@ -114,15 +138,15 @@ class Crossing:
 def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) -> Crossing:
     """Return the first crossing beyond a distance.
 
-    `surfaces`: the boundaries of clouds; `origin`, `direction`: rays in any precision [m] and their unit directions;
-    `x`: distance of the last crossing, or 0 [m]; `active`: lanes to compute. Returns `crossing`: its distance is larger
-    than `x`.
+    `surfaces`: the boundaries of clouds; `origin`, `direction`: rays in any precision [m] and their
+    unit directions; `x`: distance of the last crossing, or 0 [m]; `active`: lanes to compute.
+    Returns `crossing`: its distance is larger than `x`.
     """
     Float = type(x)
     begin = dr.select(x > 0, x + _clearance(origin, x), 0)
     start = mi.Point3f(origin + direction * begin)
-    # Camera rays and segments side by side start close together and go alike: told so, Embree takes a third of the
-    # time.
+    # Camera rays and segments side by side start close together and go alike: told so, Embree
+    # takes a third of the time.
     ray = mi.Ray3f(start, mi.Vector3f(direction))
     hit = surfaces.geometry.ray_intersect_preliminary(ray, coherent=True, active=active)
     valid = hit.is_valid() & active
@@ -130,7 +154,9 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     normal = outward_normal(surfaces, hit, start + mi.Vector3f(direction) * t, valid)
     cloud = mi.UInt32(0)
     if surfaces.several:
-        cloud = dr.gather(mi.UInt32, surfaces.cloud, dr.reinterpret_array(mi.UInt32, hit.shape), valid)
+        cloud = dr.gather(
+            mi.UInt32, surfaces.cloud, dr.reinterpret_array(mi.UInt32, hit.shape), valid
+        )
     return Crossing(
         dr.select(valid, begin + Float(t), dr.inf),
         valid & (dr.dot(normal, mi.Vector3f(direction)) > 0),
@@ -165,19 +191,24 @@ def march(
 ) -> Any:
     """Add up what steps of rays within clouds have, from the nearest to the farthest.
 
-    `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit directions, and where they
-    end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
-    distance [m], cloud) -> how long a step may be [m]; `add`: (total, begin, end, inside, cloud) -> total, and whether
-    to go on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it begins;
-    `inside` is `end`, moved off a boundary into the stretch; `active`: lanes to compute; `first`: the first crossing,
-    if it is known. The loop changes no other lanes than those that go on.
+    `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit
+    directions, and where they end, may be infinite [m]; `total`: the sum of no step, a tuple of
+    arrays of the rays' width; `step`: (total, distance [m], cloud) -> how long a step may be [m];
+    `add`: (total, begin, end, inside, cloud) -> total, and whether to go on, for steps [m] in the
+    cloud of a number: the first in a stretch has no length, and says where it begins; `inside` is
+    `end`, moved off a boundary into the stretch; `active`: lanes to compute; `first`: the first
+    crossing, if it is known. The loop changes no other lanes than those that go on.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
     def stretch(x, crossing=None):
-        """Return where the next stretch in a cloud begins and ends; both are one place where rounding hides it."""
+        """Return where the next stretch in a cloud begins and ends; both are one place
+        where rounding hides it.
+        """
         near = next_crossing(surfaces, origin, direction, x) if crossing is None else crossing
-        far = next_crossing(surfaces, origin, direction, near.distance, ~near.leaves & (near.distance < end))
+        far = next_crossing(
+            surfaces, origin, direction, near.distance, ~near.leaves & (near.distance < end)
+        )
         begin = dr.select(near.leaves, x, dr.select(far.leaves, near.distance, far.distance))
         edge = dr.select(near.leaves, near.distance, far.distance)
         return begin, dr.minimum(edge, end), dr.select(near.leaves, near.cloud, far.cloud)
@@ -191,7 +222,10 @@ def march(
         total, goes_on = add(total, x, target, dr.select(opens, entered, leaving), cloud)
         opens = goes_on & ~opens & (target >= edge) & (edge < end)
         x, edge, cloud = dr.if_stmt(
-            args=(target, edge, cloud), cond=opens, true_fn=lambda x, *_: stretch(x), false_fn=lambda *same: same
+            args=(target, edge, cloud),
+            cond=opens,
+            true_fn=lambda x, *_: stretch(x),
+            false_fn=lambda *same: same,
         )
         return x, edge, cloud, opens, total, going & goes_on & (x < end)
 
@@ -210,7 +244,9 @@ def middle_density(clouds: Clouds, origin, direction, begin, end, cloud) -> Any:
 
 
 def voxel(clouds: Clouds, cloud) -> Metres:
-    """Return the width of a voxel of the clouds of some numbers, infinite where they have none [m]."""
+    """Return the width of a voxel of the clouds of some numbers, infinite
+    where they have none [m].
+    """
     if clouds.density is None:
         return type(clouds.sigma_t[0])(dr.inf)
     return dr.gather(type(clouds.density.voxel), clouds.density.voxel, cloud)
@@ -230,9 +266,10 @@ def depths_along(
 ) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`, `active`, `first`: as of
-    `march`; lanes that are not active have a depth of 0; `stride`: how long the first steps are in grids [voxels];
-    `seen`: whether the depths are those of what the eye sees: there steps grow, and end behind `OPAQUE`.
+    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`,
+    `active`, `first`: as of `march`; lanes that are not active have a depth of 0; `stride`: how
+    long the first steps are in grids [voxels]; `seen`: whether the depths are those of what the eye
+    sees: there steps grow, and end behind `OPAQUE`.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
     seen &= clouds.density is not None
@@ -244,22 +281,29 @@ def depths_along(
     def add(depths, begin, finish, inside, cloud):
         length = (finish - begin) * middle_density(clouds, origin, direction, begin, finish, cloud)
         depths = tuple(
-            dr.fma(dr.gather(Float, own, cloud), length, depth) for own, depth in zip(clouds.sigma_t, depths)
+            dr.fma(dr.gather(Float, own, cloud), length, depth)
+            for own, depth in zip(clouds.sigma_t, depths)
         )
         return depths, least(depths) < OPAQUE if seen else mi.Bool(True)
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active, first=first)
+    return march(
+        surfaces, origin, direction, end, nothing, step=step, add=add, active=active, first=first
+    )
 
 
 def segment_through(
     surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
 ) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of the segments from a light."""
+    """Return the function from points [m] and active lanes to the depths of
+    the segments from a light.
+    """
 
     def segment(point, active):
         end = type(point.x)(dr.inf)
-        return depths_along(surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active)
+        return depths_along(
+            surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active
+        )
 
     return segment
 
@@ -267,7 +311,8 @@ def segment_through(
 def segment_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[Any, ...]]:
     """Return the function from points [m] and active lanes to the depths of segments by channel.
 
-    `lengths`: by cloud a function (point, active) -> how much of it lies on the segment, at its full density [m].
+    `lengths`: by cloud a function (point, active) -> how much of it lies on the segment,
+    at its full density [m].
     """
 
     def segment(point, active):

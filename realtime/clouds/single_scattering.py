@@ -7,23 +7,26 @@ N steps of a ray of the depth T in clouds end at
 
     tau_k = -s log(1 - (k/N) (1 - exp(-T/s))),        k = 1 .. N,        tau_N = T:
 
-equal fractions of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light
-that is extinguished less on its way in than on the way out needs nodes further in, so that s is larger. From a node at
-the depth tau the next is -s log(1 - exp(tau/s) (1 - exp(-T/s))/N) away.
+equal fractions of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own
+extinction; light that is extinguished less on its way in than on the way out needs nodes further
+in, so that s is larger. From a node at the depth tau the next is -s log(1 - exp(tau/s) (1 -
+exp(-T/s))/N) away.
 
-In a grid of densities T is the depth that the ray had if they were 1 everywhere, and the next node is at most so far
-away at full density. No step is longer than those of `realtime.clouds.march`, which see the voxels.
+In a grid of densities T is the depth that the ray had if they were 1 everywhere, and the next node
+is at most so far away at full density. No step is longer than those of `realtime.clouds.march`,
+which see the voxels.
 
 **The opacity of clouds along a ray.**
 
-With the extinctions kappa_i and the lengths of the stretches in clouds, light from behind passes with the transmittance
+With the extinctions kappa_i and the lengths of the stretches in clouds, light from behind
+passes with the transmittance
 
     T = prod exp(-kappa_i (x_{i+1} - x_i)),        opacity = 1 - T.
 
 **Single scattering in clouds, by steps on which the segments of the light are linear.**
 
-Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
-tau(x) more; of phase function P/4 pi and albedo w,
+Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x),
+and the eye after tau(x) more; of phase function P/4 pi and albedo w,
 
     L = w E P/(4 pi) int kappa exp(-tau(x) - l(x)) dx.
 
@@ -31,12 +34,11 @@ On a step u = tau + l is linear between two nodes, du = kappa dx + dl, so that w
 
     int kappa exp(-u) dx = kappa dx/(kappa dx + dl) (e_i - e_{i+1}),
 
-and kappa dx e where dl = -kappa dx.
-In a polyhedron l is linear between kinks and jumps, where rays and segments cross edges, so the error is that of the
-steps with one of these in them.
+and kappa dx e where dl = -kappa dx. In a polyhedron l is linear between kinks and jumps, where rays
+and segments cross edges, so the error is that of the steps with one of these in them.
 
-Octaves of a light (`realtime.methods.cloud_octaves`) have the segment a l with a factor a each, and a phase function
-each: the same sum with u = tau + a l.
+Octaves of a light (`realtime.methods.cloud_octaves`) have the segment a l with a factor a each, and
+a phase function each: the same sum with u = tau + a l.
 
 **The background of clouds:** surfaces that light reaches through clouds, and a sky.
 """
@@ -69,15 +71,19 @@ _LAST = 1.0001  # times the fraction of a step: rounding leaves none behind the 
 
 
 def opacity_of(depths: tuple[Any, ...], Color) -> Any:
-    """Return 1 - exp(-depth) as a colour, from optical `depths` by channel [1]; `Color` is its type."""
+    """Return 1 - exp(-depth) as a colour, from optical `depths` by channel
+    [1]; `Color` is its type.
+    """
     # 1 - exp(-d) = 2 exp(-d/2) sinh(d/2) loses nothing where d is small.
     fractions = [
-        dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth)) for depth in depths
+        dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth))
+        for depth in depths
     ]
     return Color(*fractions)
 
 
-#: Returns the light of a step, of its depth, and of the depths to the eye and of the segment at its ends.
+#: Returns the light of a step, of its depth, and of the depths to the eye and of
+#: the segment at its ends.
 StepIntegral = Callable[[Any, tuple[Any, Any], tuple[Any, Any]], Any]
 
 
@@ -100,32 +106,46 @@ class Beam:
 
     irradiance: Any  #: across the beam, RGB [W/m^2]
     scales: tuple[Any, ...]  #: by octave, of the depths of its segments [1]
-    phases: tuple[tuple[Any, ...], ...]  #: by octave and by phase function of the clouds, its value on the rays, mean 1
+    #: by octave and by phase function of the clouds, its value on the rays, mean 1
+    phases: tuple[tuple[Any, ...], ...]
     #: (point [m], active) -> the depth of the segment to a point, by channel [1]
     segment: Callable[[Any, Any], tuple[Any, ...]]
     #: (point [m], active) -> whether no surface is in the way; None where nothing casts a shadow
     lit: Callable[[Any, Any], Any] | None
 
 
-def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> CloudRays:
+def cloud_rays(
+    surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any
+) -> CloudRays:
     """Return rays with their depths.
 
-    `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
-    may be infinite [m]; `stride` is the longest step in a grid where a ray enters [voxels].
+    `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit
+    `direction` the rays, `end` may be infinite [m]; `stride` is the longest step in a grid where a
+    ray enters [voxels].
     """
-    first = next_crossing(surfaces, origin, direction, dr.zeros(type(direction.x), dr.width(direction)))
-    depths = depths_along(surfaces, clouds, origin, direction, end, stride=stride, seen=True, first=first)
+    first = next_crossing(
+        surfaces, origin, direction, dr.zeros(type(direction.x), dr.width(direction))
+    )
+    depths = depths_along(
+        surfaces, clouds, origin, direction, end, stride=stride, seen=True, first=first
+    )
     return CloudRays(surfaces, clouds, origin, direction, end, depths, first)
 
 
 def light_once(
-    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, integral: StepIntegral | None = None
+    rays: CloudRays,
+    beams: Sequence[Beam],
+    *,
+    steps: int,
+    stride: Any,
+    integral: StepIntegral | None = None,
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering`, in a ray; a
-    stretch in a cloud has one more; `stride`: the longest step in a grid where a ray enters [voxels]; `integral`: over
-    a step, `step_integral` by default.
+    `rays`: rays through clouds; `beams`: the lights; `steps`: N of
+    `realtime.clouds.single_scattering`, in a ray; a stretch in a cloud has one more; `stride`: the
+    longest step in a grid where a ray enters [voxels]; `integral`: over a step, `step_integral` by
+    default.
 
     Valid for any extinction and thickness; `steps` is at least 1.
 
@@ -138,7 +158,8 @@ def light_once(
         even = replace(clouds, density=None)
         full = depths_along(way[0], even, *way[1:], stride=stride, seen=False, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
-    # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series, which it exceeds, are not.
+    # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series,
+    # which it exceeds, are not.
     fraction = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (_LAST / steps)
 
     def step(total, x, cloud):
@@ -148,18 +169,26 @@ def light_once(
         part = fraction * growth
         ahead = SPREAD * dr.maximum(part, -dr.log(dr.maximum(1 - part, 1e-30)))
         node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
-        return node if clouds.density is None else dr.minimum(node, stride * voxel(clouds, cloud) * growth)
+        return (
+            node
+            if clouds.density is None
+            else dr.minimum(node, stride * voxel(clouds, cloud) * growth)
+        )
 
     def add(total, begin, end, inside, cloud):
         depths, segments, lit, sums = total
         next_segments, next_lit = reaching(rays, beams, inside)
-        length = (end - begin) * middle_density(clouds, rays.origin, rays.direction, begin, end, cloud)
+        length = (end - begin) * middle_density(
+            clouds, rays.origin, rays.direction, begin, end, cloud
+        )
         own = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
         after = tuple(depth + part for depth, part in zip(depths, own))
         shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
         ends = (depths, after), (segments, next_segments)
         # Where a stretch begins, so do the segments: its first step has no length.
-        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, end > begin, integral or step_integral)
+        sums = with_step(
+            clouds, beams, sums, own, *ends, shown, cloud, end > begin, integral or step_integral
+        )
         return (after, next_segments, next_lit, sums), least(after) < OPAQUE
 
     def zeros(count: int):
@@ -173,30 +202,49 @@ def light_once(
 
 
 def reaching(rays: CloudRays, beams: Sequence[Beam], x) -> tuple[Any, Any]:
-    """Return by beam the depths of the segments to rays at a distance [m], and 1 where no surface is in the way."""
+    """Return by beam the depths of the segments to rays at a distance [m], and 1 where
+    no surface is in the way.
+    """
     Float, point = type(x), rays.origin + rays.direction * x
     segments = tuple(beam.segment(point, True) for beam in beams)
     return segments, tuple(
-        Float(1) if beam.lit is None else dr.select(beam.lit(point, True), Float(1), 0) for beam in beams
+        Float(1) if beam.lit is None else dr.select(beam.lit(point, True), Float(1), 0)
+        for beam in beams
     )
 
 
 def with_step(
-    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, segments, lit, cloud, long, integral: StepIntegral
+    clouds: Clouds,
+    beams: Sequence[Beam],
+    sums,
+    own,
+    depths,
+    segments,
+    lit,
+    cloud,
+    long,
+    integral: StepIntegral,
 ) -> tuple[tuple[Any, ...], ...]:
-    """Return sums by beam and octave with the light of a step in a cloud of some number, where it has a length.
+    """Return sums by beam and octave with the light of a step in a cloud of some
+    number, where it has a length.
 
-    `own`, `depths`: as of `step_light`; `segments`: at both ends, by beam and channel [1]; `lit`: by beam, what no
-    surface hides [1].
+    `own`, `depths`: as of `step_light`; `segments`: at both ends, by beam and channel [1]; `lit`:
+    by beam, what no surface hides [1].
     """
     albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud)
     several = len(clouds.phases) > 1
     phase = dr.gather(mi.UInt32, clouds.phase, cloud) if several else None
     return tuple(
         tuple(
-            total + dr.select(long, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0)
+            total
+            + dr.select(
+                long, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0
+            )
             for total, term, values in zip(
-                totals, step_light(beam, own, depths, (was, now), integral), beam.phases, strict=True
+                totals,
+                step_light(beam, own, depths, (was, now), integral),
+                beam.phases,
+                strict=True,
             )
         )
         for beam, totals, was, now, shown in zip(beams, sums, *segments, lit, strict=True)
@@ -218,22 +266,26 @@ def finished(clouds: Clouds, beams: Sequence[Beam], sums) -> tuple[tuple[Any, ..
 def step_light(beam: Beam, own, depths, segments, integral: StepIntegral) -> list[Any]:
     """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
 
-    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `segments`: tau and l at its two ends, by
-    channel [1].
+    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `segments`: tau and l
+    at its two ends, by channel [1].
     """
     Color = type(beam.irradiance)
     by_octave = []
     for scale in beam.scales:
         parts = [
             integral(part, (before, then), (scale * segment, scale * next_segment))
-            for part, before, then, segment, next_segment in zip(own, *depths, *segments, strict=True)
+            for part, before, then, segment, next_segment in zip(
+                own, *depths, *segments, strict=True
+            )
         ]
         by_octave.append(Color(*(parts * (3 // len(parts)))))
     return by_octave
 
 
 def step_integral(depth, eye, segment):
-    """Return the integral over a step of a `depth`, from the depths to the `eye` and of the `segment` at the ends."""
+    """Return the integral over a step of a `depth`, from the depths to the `eye` and of
+    the `segment` at the ends.
+    """
     first, last = eye[0] + segment[0], eye[1] + segment[1]
     change = dr.abs(depth + (segment[1] - segment[0]))
     _, less = exp_expm1_bounded(-change)
@@ -241,10 +293,11 @@ def step_integral(depth, eye, segment):
 
 
 def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
-    """Return the fraction of a light that clouds let through to visible surfaces, a colour [1]; 1 where there is none.
+    """Return the fraction of a light that clouds let through to visible surfaces, a colour
+    [1]; 1 where there is none.
 
-    `rays`: rays up to the surfaces; `segment`: (point [m], active) -> the depth of the segment to a point, by channel
-    [1].
+    `rays`: rays up to the surfaces; `segment`: (point [m], active) -> the depth of the segment to
+    a point, by channel [1].
     """
     Color = type(rays.clouds.albedo)
     seen = dr.isfinite(rays.end)
@@ -253,10 +306,11 @@ def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, 
 
 
 def sky_behind(lights: Sequence[Light], distance, Color) -> PerRay | None:
-    """Return the radiance of the sky where there is no surface, a `Color` [W/(m^2 sr)]; None without a sky.
+    """Return the radiance of the sky where there is no surface, a `Color` [W/(m^2
+    sr)]; None without a sky.
 
-    `lights`: of the scene, the beam of the sky among them; `distance`: to the visible surface, infinite where there is
-    none [m].
+    `lights`: of the scene, the beam of the sky among them; `distance`: to the visible surface,
+    infinite where there is none [m].
     """
     for light in lights:
         if light.sky is not None:

@@ -3,13 +3,14 @@
 
 **The fraction of light paths that leave a slab after a number of scatterings.**
 
-Light goes both ways along a path. Under a sky of the radiance L everywhere, below as above, the eye gets of order n
+Light goes both ways along a path. Under a sky of the radiance L everywhere, below as
+above, the eye gets of order n
 
     L albedo^n Pr(a path that starts at the eye is scattered n times and then leaves),
 
-as whatever such a path meets behind the cloud is L. If nothing is absorbed, every path leaves: all orders together are
-L times the opacity of the ray, exactly, for a cloud of any shape. The shape therefore decides only how this light
-is divided among the orders.
+as whatever such a path meets behind the cloud is L. If nothing is absorbed, every path leaves: all
+orders together are L times the opacity of the ray, exactly, for a cloud of any shape. The shape
+therefore decides only how this light is divided among the orders.
 
 For a slab of the thickness t and a ray of the cosine mu these fractions follow from the equation of transfer with light
 entering at both faces, I_0 = exp(-s/|mu|), s the depth from the face where a direction enters, order after order as in
@@ -18,15 +19,16 @@ those of all sets add up to 1 at albedo 1.
 
 **The light that clouds scatter from a uniform sky into rays, by set of orders.**
 
-A ray of the depth T in clouds, under a sky of the radiance L, gets of all orders L (1 - exp(-T)) where nothing is
-absorbed: as much as the clouds take from the sky behind. The section above says why, and how a slab shares it
-among the orders. The slab that stands for the cloud has its face where the ray first meets the cloud, with the cosine
-mu between ray and normal there, and the thickness t = mu T, through which the ray has the same depth T, but at most
-2 V/S, with which it has the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all
-sides. A camera in a cloud looks across its slab.
+A ray of the depth T in clouds, under a sky of the radiance L, gets of all orders L (1 - exp(-T))
+where nothing is absorbed: as much as the clouds take from the sky behind. The section above says
+why, and how a slab shares it among the orders. The slab that stands for the cloud has its face
+where the ray first meets the cloud, with the cosine mu between ray and normal there, and the
+thickness t = mu T, through which the ray has the same depth T, but at most 2 V/S, with which it has
+the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all sides.
+A camera in a cloud looks across its slab.
 
-With absorption the sum is that of the slab. Opaque shapes hide the same fraction of the sky from all orders: of eight
-directions from the place of entry, those that they block.
+With absorption the sum is that of the slab. Opaque shapes hide the same fraction of the sky from
+all orders: of eight directions from the place of entry, those that they block.
 """
 
 import hashlib
@@ -45,7 +47,11 @@ from airlight.realtime.clouds.canonical.coordinates import FIRST_ORDERS, ORDER_L
 from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from airlight.realtime.clouds.single_scattering import CloudRays, opacity_of
 from airlight.realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
-from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import (
+    Eigenmodes,
+    double_gauss,
+    mode_kernel,
+)
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 from airlight.realtime.numerics.array_types import types_of
 from airlight.realtime.numerics.functions import between_entries
@@ -68,7 +74,8 @@ def thicknesses() -> Array:
 
 
 def escapes(phase: SlabPhase, albedo: float) -> Array:
-    """Return the fractions by set of orders, (thicknesses, cosines, sets), cosines even from 0 to 1.
+    """Return the fractions by set of orders, (thicknesses, cosines, sets),
+    cosines even from 0 to 1.
 
     They are made in some seconds and kept on disk.
 
@@ -131,7 +138,8 @@ class SkyEscapes:
 
 
 def beams_of(lights: Sequence[Light], sky: str, clouds: Clouds) -> list[int]:
-    """Return the numbers of the lights that shine from one direction: all, or all but a 'uniform' `sky`.
+    """Return the numbers of the lights that shine from one direction: all, or
+    all but a 'uniform' `sky`.
 
     No slab stands for a cloud whose density differs from place to place: its sky is a beam.
     """
@@ -145,7 +153,9 @@ def sky_escapes(scene: Scene) -> SkyEscapes:
     assert clouds is not None
     phases = np.array(clouds.phase)
     albedos = np.array(clouds.albedo, dtype=np.float64).reshape(3, -1)
-    filled = [[(int(phase), float(albedo)) for phase, albedo in zip(phases, row)] for row in albedos]
+    filled = [
+        [(int(phase), float(albedo)) for phase, albedo in zip(phases, row)] for row in albedos
+    ]
     media = sorted({medium for row in filled for medium in row})
     known = [slab_phase(phase, types) for phase in clouds.phases]
     tables = np.concatenate([escapes(known[phase], albedo).ravel() for phase, albedo in media])
@@ -158,11 +168,15 @@ def sky_escapes(scene: Scene) -> SkyEscapes:
     return made
 
 
-def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible | None) -> tuple[Any, ...]:
-    """Return the light of a sky by set of orders, colours, in the order of `ORDER_LAYERS` [W/(m^2 sr)].
+def sky_light(
+    known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible | None
+) -> tuple[Any, ...]:
+    """Return the light of a sky by set of orders, colours, in the order of
+    `ORDER_LAYERS` [W/(m^2 sr)].
 
-    `known`: from `sky_escapes`; `light`: that of the sky; `rays`: through the clouds as they are; `visible`: (point
-    [m], light) -> whether no opaque shape is between them; None where nothing casts a shadow.
+    `known`: from `sky_escapes`; `light`: that of the sky; `rays`: through the clouds as they are;
+    `visible`: (point [m], light) -> whether no opaque shape is between them; None where nothing
+    casts a shadow.
     """
     Float, Color = type(rays.direction.x), type(light.sky)
     first = rays.first
@@ -170,7 +184,9 @@ def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible
     by_channel = []
     for channel in range(3):
         depth = rays.depths[min(channel, len(rays.depths) - 1)]
-        sigma_t = dr.gather(Float, rays.clouds.sigma_t[min(channel, len(rays.depths) - 1)], first.cloud)
+        sigma_t = dr.gather(
+            Float, rays.clouds.sigma_t[min(channel, len(rays.depths) - 1)], first.cloud
+        )
         thickness = dr.minimum(depth * mu, sigma_t * dr.gather(Float, known.widths, first.cloud))
         medium = dr.gather(mi.UInt32, known.media[channel], first.cloud)
         by_channel.append(_fractions(known.fractions, medium, thickness, mu))
@@ -196,7 +212,9 @@ def _seen_fraction(light: Light, point: Any, visible: Visible) -> Any:
     Float = type(point.x)
     corners = itertools.product((-1, 1), repeat=3)
     axes = [mi.Vector3d(*(sign * (1 / 3) ** 0.5 for sign in corner)) for corner in corners]
-    seen = [dr.select(visible(point, replace(light, exact_axis=axis)), Float(1), 0) for axis in axes]
+    seen = [
+        dr.select(visible(point, replace(light, exact_axis=axis)), Float(1), 0) for axis in axes
+    ]
     return sum(seen) / len(seen)
 
 

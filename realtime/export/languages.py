@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The template of `realtime.export.text` in each language.
 
-The template is a subset of GLSL that differs from the other languages in spelling alone: one declaration a line, braces
-after each `if`, no `?:`, no parameter that is assigned, no shift.
+The template is a subset of GLSL that differs from the other languages in spelling alone: one
+declaration a line, braces after each `if`, no `?:`, no parameter that is assigned, no shift.
 """
 
 import re
@@ -20,12 +20,22 @@ _TYPE = "(" + "|".join(_WGSL_TYPES) + ")"
 
 
 def _glsl(text: str) -> str:
-    text = re.sub(r"^float (\w+)\[(\d+)\] = \((.*)\);$", r"const float \1[\2] = float[\2](\3);", text, flags=re.M)
+    text = re.sub(
+        r"^float (\w+)\[(\d+)\] = \((.*)\);$",
+        r"const float \1[\2] = float[\2](\3);",
+        text,
+        flags=re.M,
+    )
     return _PRECISE + text
 
 
 def _hlsl(text: str) -> str:
-    text = re.sub(r"^float (\w+)\[(\d+)\] = \((.*)\);$", r"static const float \1[\2] = {\3};", text, flags=re.M)
+    text = re.sub(
+        r"^float (\w+)\[(\d+)\] = \((.*)\);$",
+        r"static const float \1[\2] = {\3};",
+        text,
+        flags=re.M,
+    )
     text = text.replace("floatBitsToInt(", "asint(").replace("intBitsToFloat(", "asfloat(")
     return re.sub(r"\bvec([23])\b", r"float\1", text).replace("AL_PRECISE", "precise")
 
@@ -47,9 +57,16 @@ def _wgsl(text: str) -> str:
     text = re.sub(r"^float (\w+)\[(\d+)\] = \((.*)\);$", array, text, flags=re.M)
     text = re.sub(r"^( +)float (\w+)\[(\d+)\];$", r"\1var \2: array<f32, \3>;", text, flags=re.M)
     text = re.sub(rf"\b{_TYPE} (\w+) = ", lambda m: f"var {m[2]}: {_WGSL_TYPES[m[1]]} = ", text)
-    text = text.replace("floatBitsToInt(", "bitcast<i32>(").replace("intBitsToFloat(", "bitcast<f32>(")
+    text = text.replace("floatBitsToInt(", "bitcast<i32>(").replace(
+        "intBitsToFloat(", "bitcast<f32>("
+    )
     return re.sub(rf"\b{_TYPE}\(", lambda m: f"{_WGSL_TYPES[m[1]]}(", text)
 
 
 #: By name, what makes of the template a text of the language.
-LANGUAGES: dict[str, Callable[[str], str]] = {"glsl": _glsl, "hlsl": _hlsl, "wgsl": _wgsl, "slang": _slang}
+LANGUAGES: dict[str, Callable[[str], str]] = {
+    "glsl": _glsl,
+    "hlsl": _hlsl,
+    "wgsl": _wgsl,
+    "slang": _slang,
+}

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The kernels `exact` and `quadrature-N` as shader code: one template, and the constants of the Python kernels in it.
+"""The kernels `exact` and `quadrature-N` as shader code: one template, and the constants of
+the Python kernels in it.
 
-The pages of `realtime.kernels.exact` and `realtime.kernels.stepping` derive what the text computes. `exact` has all
-segments by panels in v, without the rules for short ones.
+The pages of `realtime.kernels.exact` and `realtime.kernels.stepping` derive what the text computes.
+`exact` has all segments by panels in v, without the rules for short ones.
 
-**Elementary functions are our own.** Those of drivers are allowed to be, and are, wrong where it matters: on llvmpipe
-`asinh` and `sinh` by 6 % below 1e-5, `log` by 73 % at 1 - 6e-8, `exp` by 4e-6 at -87. `al_exp` reduces its argument as
-Cody and Waite do, x - n hi - n lo, where hi has so few bits that n hi is exact without a fused operation. `al_asinh` is
-2 atanh(x/(1 + sqrt(1 + x^2))), without cancellation, and a logarithm by the bits of its argument for large x.
+**Elementary functions are our own.** Those of drivers are allowed to be, and are, wrong where it
+matters: on llvmpipe `asinh` and `sinh` by 6 % below 1e-5, `log` by 73 % at 1 - 6e-8, `exp` by 4e-6
+at -87. `al_exp` reduces its argument as Cody and Waite do, x - n hi - n lo, where hi has so few
+bits that n hi is exact without a fused operation. `al_asinh` is 2 atanh(x/(1 + sqrt(1 + x^2))),
+without cancellation, and a logarithm by the bits of its argument for large x.
 """
 
 import math
@@ -20,44 +22,76 @@ from airlight.realtime.export.languages import LANGUAGES
 from airlight.realtime.kernels.exact import DEEPEST, MOST_PANELS
 from airlight.realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
 from airlight.realtime.scene.media.medium import OPTICAL_REACH
-from airlight.realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
+from airlight.realtime.scene.phase import (
+    Hazy,
+    HenyeyGreenstein,
+    HgDraine,
+    Isotropic,
+    Murky,
+    Phase,
+    Rayleigh,
+)
 from airlight.realtime.scene.rule_reach import PANEL_DEPTH, PANEL_NODES
 
 _LN2_HIGH = 355 / 512  # nine bits of ln 2
 _ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)
 _UNBOUNDED = 1e30  # x1 [m] beyond which a ray has no end
 
-#: The largest relative error of `exact` on any device that keeps the bounds of Vulkan; a test runs the text with every
-#: operation as wrong as they permit.
+#: The largest relative error of `exact` on any device that keeps the bounds of Vulkan; a test runs
+#: the text with every operation as wrong as they permit.
 CONFORMING = 3e-5
 
 #: Built-in functions that a text may call: those that IEEE rounds, or that take no rounding.
 BUILT_IN: tuple[str, ...] = (
-    *("abs", "ceil", "cross", "dot", "float", "floatBitsToInt", "floor", "int", "intBitsToFloat", "length", "max"),
+    *(
+        "abs",
+        "ceil",
+        "cross",
+        "dot",
+        "float",
+        "floatBitsToInt",
+        "floor",
+        "int",
+        "intBitsToFloat",
+        "length",
+        "max",
+    ),
     *("min", "sqrt", "vec2", "vec3"),
 )
 
 
 def kernel_nodes(kernel: str) -> int | None:
-    """Return the nodes of 'quadrature-N', None for 'exact'; raise InputError for any other kernel."""
+    """Return the nodes of 'quadrature-N', None for 'exact'; raise
+    InputError for any other kernel.
+    """
     if kernel == "exact":
         return None
     name, _, words = kernel.partition("-")
     if name == "quadrature" and words.isdecimal() and 2 <= int(words) <= 64 and int(words) % 2 == 0:
         return int(words)
-    raise InputError(f"kernel: got {kernel!r}, expected 'exact' or 'quadrature-N' with an even N from 2 to 64")
+    raise InputError(
+        f"kernel: got {kernel!r}, expected 'exact' or 'quadrature-N' with an even N from 2 to 64"
+    )
 
 
-def kernel_text(kernel: str, phase: Phase, language: str, rows: Sequence[Sequence[float]] = ()) -> str:
+def kernel_text(
+    kernel: str, phase: Phase, language: str, rows: Sequence[Sequence[float]] = ()
+) -> str:
     """Return the functions of a kernel in a language, without a header.
 
-    `rows`: foot, height, x0, x1, sigma_t, g and J of rays for `al_test`, the largest relative error over them. Raises
-    InputError for a kernel, a phase function or a language that cannot be exported.
+    `rows`: foot, height, x0, x1, sigma_t, g and J of rays for `al_test`, the largest relative error
+    over them. Raises InputError for a kernel, a phase function or a language that cannot be
+    exported.
     """
     if language not in LANGUAGES:
         raise InputError(f"language: got {language!r}, expected one of {', '.join(LANGUAGES)}")
     nodes = kernel_nodes(kernel)
-    parts = [_elementary(), _phase(phase), _exact(phase) if nodes is None else _quadrature(phase, nodes), _RAY]
+    parts = [
+        _elementary(),
+        _phase(phase),
+        _exact(phase) if nodes is None else _quadrature(phase, nodes),
+        _RAY,
+    ]
     if rows:
         parts.append(_test(rows))
     return LANGUAGES[language]("\n".join(parts))
@@ -67,7 +101,11 @@ def _number(value: float) -> str:
     """Return the shortest literal that float32 reads as the nearest to a number."""
     single = np.float32(value)  # whose `str` has fewer digits once colour-science is imported
     plain = value == 0 or 1e-4 <= abs(value) < 1e16
-    return np.format_float_positional(single, trim="0") if plain else np.format_float_scientific(single, trim="0")
+    return (
+        np.format_float_positional(single, trim="0")
+        if plain
+        else np.format_float_scientific(single, trim="0")
+    )
 
 
 def _array(name: str, values: Iterable[float]) -> str:
@@ -151,7 +189,9 @@ _LOBE = """float al_lobe(float down, float a, float b, float c) {
 
 
 def _lobe(fraction: float, g: float) -> str:
-    """Return a lobe of Henyey and Greenstein's: 1 - g in float32 would have lost the digits of a sharp one."""
+    """Return a lobe of Henyey and Greenstein's: 1 - g in float32 would have lost
+    the digits of a sharp one.
+    """
     numbers = (4 * g, (1 - g) ** 2, fraction * (1 - g) * (1 + g))
     return f"al_lobe(down, {', '.join(map(_number, numbers))})"
 
@@ -174,7 +214,8 @@ def _phase(phase: Phase) -> str:
     if isinstance(phase, Isotropic | Rayleigh):
         return f"{start}{signature}    return {_polynomial(phase.polynomial[::-1], 'up')};\n}}\n"
     raise InputError(
-        f"phase: {phase.name!r} reads a table, which cannot be exported; expected isotropic, rayleigh, hazy, murky, hg "
+        f"phase: {phase.name!r} reads a table, which cannot be exported; expected isotropic, "
+        "rayleigh, hazy, murky, hg "
         "or hg-draine:D"
     )
 
@@ -186,7 +227,9 @@ _TAKES = """// The airlight integral J [1/m] of a point light from x0 to x1 [m] 
 
 
 def _interval(tail: str) -> str:
-    """Return the lines that find E = q/h at both ends, and their difference without cancellation."""
+    """Return the lines that find E = q/h at both ends, and their
+    difference without cancellation.
+    """
     return f"""    float s0 = x0 - foot;
     float h = max(height, 1e-9 * (abs(s0) + 1e-28));
     float r0 = sqrt(s0 * s0 + h * h);
@@ -273,7 +316,10 @@ def _quadrature(phase: Phase, nodes: int) -> str:
     arguments = "height, {}, {}, sigma_t, g"
     whole = "al_panel(foot, " + arguments.format("x0", "x1") + ")"
     split = "    float between = min(max(foot, x0), x1);\n"
-    both = " + ".join(f"al_panel(foot, {arguments.format(*ends)})" for ends in (("x0", "between"), ("between", "x1")))
+    both = " + ".join(
+        f"al_panel(foot, {arguments.format(*ends)})"
+        for ends in (("x0", "between"), ("between", "x1"))
+    )
     body = f"    return {whole};\n" if phase.constant else f"{split}    return {both};\n"
     return f"""{_array("AL_X", places)}
 {_array("AL_W", weights)}
@@ -302,7 +348,8 @@ float al_panel(float foot, float height, float x0, float x1, float sigma_t, floa
 
 
 _TAKEN = (
-    "vec3 origin, vec3 direction, vec3 light, vec3 intensity, float x0, float x1, float sigma_t, vec3 albedo, float g"
+    "vec3 origin, vec3 direction, vec3 light, vec3 intensity, float x0, float x1, "
+    "float sigma_t, vec3 albedo, float g"
 )
 _RAY = f"""// foot and height [m] of a light over a ray; direction has unit length.
 vec2 al_ray(vec3 origin, vec3 direction, vec3 light) {{
@@ -322,7 +369,9 @@ def _test(rows: Sequence[Sequence[float]]) -> str:
     lines = []
     for *given, value in rows:
         numbers = ", ".join(_number(min(number, 3e38)) for number in given)
-        lines.append(f"    worst = max(worst, abs(al_integral({numbers}) / {_number(value)} - 1.0));\n")
+        lines.append(
+            f"    worst = max(worst, abs(al_integral({numbers}) / {_number(value)} - 1.0));\n"
+        )
     return (
         "// The largest relative error over rays whose integral is known.\n"
         f"float al_test() {{\n    float worst = 0.0;\n{''.join(lines)}    return worst;\n}}\n"

@@ -4,7 +4,8 @@
 Read in this order:
 
 - `light_on_ray.py`: checks that radiance is finite and that no ray hits a point light.
-- `renderer.py`: a frame as groups of lights times parts of the image, and how its stages follow one another.
+- `renderer.py`: a frame as groups of lights times parts of the image, and how its
+  stages follow one another.
 - `sphere_lights.py`: the airlight of samples on a sphere, scaled to that of the sphere.
 - `surface.py`: camera rays, and the light that surfaces send back through the medium.
 - `history.py`: the mean with the frames before, for any method.

@@ -5,21 +5,24 @@ With alpha the weight of the newest frame L_n, a pixel shows
 
     H_n = (1 - alpha) C(H_{n-1}(P)) + alpha L_n,        H_0 = L_0.
 
-At rest this divides the variance of independent frames by (2 - alpha)/alpha; what changed is late by (1 - alpha)/alpha
-frames, and its ghost fades as (1 - alpha)^n.
+At rest this divides the variance of independent frames by (2 - alpha)/alpha; what changed is late
+by (1 - alpha)/alpha frames, and its ghost fades as (1 - alpha)^n.
 
-P is the same pixel, or with `reproject=surface` where the last camera saw the surface of the pixel, the sky as a point
-at infinity. There the four pixels about P count by bilinear weights, those only whose surface is as far from the last
-camera to 5 %; where there is none, the pixel starts again. Airlight lies before the surface: under a camera that moves
-its parallax is another one. Surfaces are taken to stand still.
+P is the same pixel, or with `reproject=surface` where the last camera saw the surface of the pixel,
+the sky as a point at infinity. There the four pixels about P count by bilinear weights, those only
+whose surface is as far from the last camera to 5 %; where there is none, the pixel starts again.
+Airlight lies before the surface: under a camera that moves its parallax is another one. Surfaces
+are taken to stand still.
 
-C leaves what the frames before showed as it is, or brings each channel into a range about the nine pixels around in
-L_n: from their least to their largest value, or one standard deviation about their mean.
+C leaves what the frames before showed as it is, or brings each channel into a range about the nine
+pixels around in L_n: from their least to their largest value, or one standard deviation about their
+mean.
 
 References
 ----------
-Karis 2014, *High-quality temporal supersampling* (the range). Salvi 2016, *An excursion in temporal supersampling* (the
-deviation). Yang, Liu, Salvi 2020, *A survey of temporal antialiasing techniques* (CGF 39:2).
+Karis 2014, *High-quality temporal supersampling* (the range). Salvi 2016, *An excursion in temporal
+supersampling* (the deviation). Yang, Liu, Salvi 2020, *A survey of temporal antialiasing
+techniques* (CGF 39:2).
 """
 
 from dataclasses import dataclass
@@ -45,20 +48,33 @@ class PastFrames:
 
 
 class HistoryPass:
-    """The mean with the frames before, recorded once for the first frame and once for all others."""
+    """The mean with the frames before, recorded once for the first frame
+    and once for all others.
+    """
 
     def __init__(self, alpha: float, reproject: str, clamp: str, Float: Any):
         self._alpha = dr.opaque(Float, alpha)
 
-        def run(airlight: PerRay, pixel: PerRay, distance: Metres, camera: Camera, alpha: Any, past: PastFrames | None):
+        def run(
+            airlight: PerRay,
+            pixel: PerRay,
+            distance: Metres,
+            camera: Camera,
+            alpha: Any,
+            past: PastFrames | None,
+        ):
             place = row_and_column(camera, pixel)
             mean = airlight
             if past is not None:
                 before, known = (
-                    _same_pixel(past, pixel) if reproject == "none" else _same_surface(past, camera, pixel, distance)
+                    _same_pixel(past, pixel)
+                    if reproject == "none"
+                    else _same_surface(past, camera, pixel, distance)
                 )
                 if clamp != "none":
-                    least, most = _bounds(_by_pixel(airlight, pixel), airlight, camera, place, clamp)
+                    least, most = _bounds(
+                        _by_pixel(airlight, pixel), airlight, camera, place, clamp
+                    )
                     before = dr.clip(before, least, most)
                 # With alpha = 1 this is the newest frame, bit by bit.
                 mean = dr.select(known, dr.fma(1 - alpha, before - airlight, airlight), airlight)
@@ -67,12 +83,18 @@ class HistoryPass:
         self._run = Frozen(run)
 
     def __call__(
-        self, airlight: PerRay, pixel: PerRay, distance: Metres, camera: Camera, past: PastFrames | None
+        self,
+        airlight: PerRay,
+        pixel: PerRay,
+        distance: Metres,
+        camera: Camera,
+        past: PastFrames | None,
     ) -> tuple[PerRay, PastFrames]:
         """Return the mean [W/(m^2 sr)], and what to hand on.
 
-        `airlight`: of this frame [W/(m^2 sr)]; `pixel`, `distance`: the number of the pixel of each ray, and how far
-        its surface is [m]; `camera`: of this frame; `past`: from the last frame; None for the first.
+        `airlight`: of this frame [W/(m^2 sr)]; `pixel`, `distance`: the number of the pixel of each
+        ray, and how far its surface is [m]; `camera`: of this frame; `past`: from the last frame;
+        None for the first.
         """
         dr.eval(airlight)
         return self._run(airlight, pixel, distance, camera, self._alpha, past)
@@ -89,8 +111,12 @@ def _same_pixel(past: PastFrames, pixel: PerRay) -> tuple[PerRay, Any]:
     return dr.gather(type(past.image), past.image, pixel), mi.Bool(True)
 
 
-def _same_surface(past: PastFrames, camera: Camera, pixel: PerRay, distance: Metres) -> tuple[PerRay, Any]:
-    """Return the last frame's values on the surface of each pixel, and whether it saw the surface."""
+def _same_surface(
+    past: PastFrames, camera: Camera, pixel: PerRay, distance: Metres
+) -> tuple[PerRay, Any]:
+    """Return the last frame's values on the surface of each pixel, and
+    whether it saw the surface.
+    """
     Color, Float, last = type(past.image), type(distance), past.camera
     _, aim = ray_directions(camera, pixel)
     there = dr.isfinite(distance)
@@ -108,17 +134,29 @@ def _same_surface(past: PastFrames, camera: Camera, pixel: PerRay, distance: Met
     total, shown = Float(0), Color(0)
     for i, across in enumerate((1 - right, right)):
         for j, along in enumerate((1 - down, down)):
-            inside = (column + i >= 0) & (column + i < camera.width) & (row + j >= 0) & (row + j < camera.height)
+            inside = (
+                (column + i >= 0)
+                & (column + i < camera.width)
+                & (row + j >= 0)
+                & (row + j < camera.height)
+            )
             index = mi.UInt32(dr.select(inside, (row + j) * camera.width + column + i, 0))
             seen = dr.gather(Float, past.distance, index)
             alike = dr.select(there, dr.abs(seen - far) <= _ALIKE * far, ~dr.isfinite(seen))
             weight = dr.select(known & inside & alike, across * along, 0)
-            total, shown = total + weight, dr.fma(Color(weight), dr.gather(Color, past.image, index), shown)
+            total, shown = (
+                total + weight,
+                dr.fma(Color(weight), dr.gather(Color, past.image, index), shown),
+            )
     return shown / dr.select(total > 0, total, 1), total > 0
 
 
-def _bounds(image: PerRay, here: PerRay, camera: Camera, place: tuple[Any, Any], clamp: str) -> tuple[PerRay, PerRay]:
-    """Return the least and the most that the nine pixels about each allow; at the border those that are there."""
+def _bounds(
+    image: PerRay, here: PerRay, camera: Camera, place: tuple[Any, Any], clamp: str
+) -> tuple[PerRay, PerRay]:
+    """Return the least and the most that the nine pixels about each allow; at the
+    border those that are there.
+    """
     Color = type(image)
     row, column = (mi.Int32(each) for each in place)
     least, most, total, squares = Color(here), Color(here), Color(0), Color(0)

@@ -8,8 +8,8 @@
 | light | what was prepared; camera rays too where a black area light is visible |
 | medium, colours | nothing of these |
 
-Surface and airlight are computed for every frame. The caller says what moved: nothing is compared, so what moved
-without being named stays where it was.
+Surface and airlight are computed for every frame. The caller says what moved: nothing is compared,
+so what moved without being named stays where it was.
 """
 
 from collections.abc import Iterator
@@ -50,15 +50,20 @@ def next_frame(
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Render a scene, and reuse what the last frame left.
 
-    `renderer`: the stages of the frame, with the number of the first one. `scene`: the scene as it is now: that of the
-    renderer except for camera, positions, lights, colours and medium. `cache`: that of the last frame; None for the
-    first, for which everything is made. If nothing is said to move in the first frame, it is shaded by the function
-    that later frames use, which then record nothing. `camera_moved`, `geometry_moved`, `light_moved`: whether the
-    camera, shapes or the bounds of media, or a light moved or turned since the last frame. The medium and the colours
-    of lights may have changed in any case. Returns `stages`: bit by bit the result of
+    `renderer`: the stages of the frame, with the number of the first one. `scene`: the scene as it
+    is now: that of the renderer except for camera, positions, lights, colours and medium. `cache`:
+    that of the last frame; None for the first, for which everything is made. If nothing is said to
+    move in the first frame, it is shaded by the function that later frames use, which then record
+    nothing. `camera_moved`, `geometry_moved`, `light_moved`: whether the camera, shapes or the
+    bounds of media, or a light moved or turned since the last frame. The medium and the colours of
+    lights may have changed in any case. Returns `stages`: bit by bit the result of
     `realtime.frame.renderer.run_stages` for this scene; `cache`: for the next frame.
     """
-    moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
+    moved = {
+        "camera_moved": camera_moved,
+        "geometry_moved": geometry_moved,
+        "light_moved": light_moved,
+    }
     return _next_of(replace(renderer, scene=scene), cache, None, **moved)
 
 
@@ -67,9 +72,9 @@ def next_parts(
 ) -> Iterator[tuple[FrameRenderer, tuple[Any, Any, Any], FrameCache]]:
     """Render a scene as `next_frame` does, in parts where a large image can be.
 
-    `renderer`, `scene`, `moved`: see `next_frame`; `caches`: what the parts of the last frame left; None for the first.
-    Yields `part`: the stages of one part, with the scene: for `realtime.frame.renderer.frame_with_part`; `stages`,
-    `cache`: as of `next_frame`.
+    `renderer`, `scene`, `moved`: see `next_frame`; `caches`: what the parts of the last frame left;
+    None for the first. Yields `part`: the stages of one part, with the scene: for
+    `realtime.frame.renderer.frame_with_part`; `stages`, `cache`: as of `next_frame`.
     """
     renderer, state = replace(renderer, scene=scene), None
     for number, part in enumerate(parts(renderer)):
@@ -89,7 +94,9 @@ def _next_of(
     geometry_moved: bool,
     light_moved: bool,
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
-    """Do what `next_frame` does for the scene of a renderer; a `state` was made for it before, where it is not None."""
+    """Do what `next_frame` does for the scene of a renderer; a `state` was made for it
+    before, where it is not None.
+    """
     frames = cache.frames if cache else 0
     renderer = replace(renderer, frame=renderer.frame + frames)
     geometry_moved |= light_moved and any(light.opaque for light in renderer.scene.area_lights)
@@ -105,4 +112,6 @@ def _next_of(
         cast = run_cast_and_shade(renderer)[0] if cast is None else cast
         by_light = run_shade(renderer, cast)
     rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
-    return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra, frames + 1)
+    return evaluated(cast, rendered), FrameCache(
+        cast, state, rendered.carried, rendered.extra, frames + 1
+    )

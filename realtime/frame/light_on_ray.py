@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Pixels that a frame refuses: radiance that is not finite, and rays that meet a point light.
 
-With h the distance from the light to the ray, t the distance to the foot, and theta the angle at the light,
+With h the distance from the light to the ray, t the distance to the foot, and
+theta the angle at the light,
 
     J = exp(-sigma_t t)/h  int exp(-sigma_t h tan(theta/2 + pi/4)) p(-sin theta) dtheta.
 
@@ -9,12 +10,13 @@ As h goes to 0 the exponential under the integral goes to 1 at every angle below
 
     h J -> exp(-sigma_t t) int_{-pi/2}^{pi/2} p(-sin theta) dtheta,            pi exp(-sigma_t t) for p = 1:
 
-J grows like 1/h, and the pixel of a ray that meets the light is infinite; so is a ray that ends at the light, with half
-of the integral or more. With the light at the camera every pixel is infinite. A mean over a pixel is finite, since 1/h
-is integrable over a plane, but a frame holds the radiance of the centres.
+J grows like 1/h, and the pixel of a ray that meets the light is infinite; so is a ray that ends at
+the light, with half of the integral or more. With the light at the camera every pixel is infinite.
+A mean over a pixel is finite, since 1/h is integrable over a plane, but a frame holds the radiance
+of the centres.
 
-Positions are float32 numbers: the position of a light is known to 2^-24 of the largest coordinate at best. Below that
-height, h is noise, and so is 1/h. Such a pixel is refused, by the distance.
+Positions are float32 numbers: the position of a light is known to 2^-24 of the largest coordinate
+at best. Below that height, h is noise, and so is 1/h. Such a pixel is refused, by the distance.
 """
 
 from typing import Any
@@ -34,25 +36,35 @@ _ROUNDING = 2.0**-24
 def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distance: Any) -> None:
     """Refuse the frame of a method that is not finite everywhere, or whose airlight is not.
 
-    `scene`: as it was rendered; `name`: the method's; `airlight`, `surface`: radiances, (height, width, 3) [W/(m^2
-    sr)]; `distance`: to the visible surface, (height, width) [m]. Raises InputError with the first pixel that is wrong,
-    and why.
+    `scene`: as it was rendered; `name`: the method's; `airlight`, `surface`: radiances, (height,
+    width, 3) [W/(m^2 sr)]; `distance`: to the visible surface, (height, width) [m]. Raises
+    InputError with the first pixel that is wrong, and why.
     """
-    # A medium with bounds may end before the light, and a cone look away: there the number says more than the ray.
-    points = [] if scene.medium.clear else [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]
+    # A medium with bounds may end before the light, and a cone look away: there the
+    # number says more than the ray.
+    points = (
+        []
+        if scene.medium.clear
+        else [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]
+    )
     if points:
         camera = read_camera(scene.camera)
         for number, light in points:
-            _check_light(camera, number, np.array(light.position, dtype=np.float64).ravel(), distance)
+            _check_light(
+                camera, number, np.array(light.position, dtype=np.float64).ravel(), distance
+            )
     for what, values in (("airlight", airlight), ("surface radiance", surface)):
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             medium = scene.medium.summary.partition(":")[0]
             raise InputError(
-                f"method {name}: the {what} of {int(wrong.sum())} of {wrong.size} pixels is not finite, first in "
-                f"column {column} of row {row}: {', '.join(f'{value:g}' for value in values[row, column])}; a light "
-                f"may lie on its ray, a segment of it need more panels than the medium ({medium}) tries, or a number "
+                f"method {name}: the {what} of {int(wrong.sum())} of {wrong.size} pixels is not "
+                "finite, first in "
+                f"column {column} of row {row}: "
+                f"{', '.join(f'{value:g}' for value in values[row, column])}; a light "
+                f"may lie on its ray, a segment of it need more panels than the medium ({medium}) "
+                "tries, or a number "
                 "of the scene be too large for float32: move the light, or use other units"
             )
 
@@ -63,7 +75,8 @@ def _check_light(camera: HostCamera, number: int, position: Array, distance: Any
     known = _ROUNDING * max(np.abs(position).max(), np.abs(camera.origin).max())
     if not reach > known:
         raise InputError(
-            f"light {number} is {reach:.3g} m from the camera: the airlight, which grows like 1/distance, is infinite "
+            f"light {number} is {reach:.3g} m from the camera: the airlight, which grows like "
+            "1/distance, is infinite "
             "in every pixel; move the light or the camera"
         )
     # In the plane at distance 1 a pixel has the sides `left` and `up`.
@@ -78,7 +91,9 @@ def _check_light(camera: HostCamera, number: int, position: Array, distance: Any
     ends = float(distance[nearest[1], nearest[0]])
     if height <= max(known, _ROUNDING * reach) and reach <= ends * (1 + 4 * _ROUNDING):
         raise InputError(
-            f"light {number} is {height:.3g} m from the ray through the centre of the pixel in column {nearest[0]} of "
-            f"row {nearest[1]}: the airlight there, which grows like 1/distance, is infinite; move the light or the "
+            f"light {number} is {height:.3g} m from the ray through the centre of the pixel in "
+            f"column {nearest[0]} of "
+            f"row {nearest[1]}: the airlight there, which grows like 1/distance, is infinite; move "
+            "the light or the "
             "camera, or take another size"
         )

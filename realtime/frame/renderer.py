@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame: camera rays, the lit surface, and the airlight of a method, by groups of lights and parts of the image.
+"""A frame: camera rays, the lit surface, and the airlight of a method, by groups of
+lights and parts of the image.
 
-A frame is a list of groups of lights times a list of parts of the image. Each group is run by recorded functions
-(`drjit.freeze`), which record their kernels on the first call and replay them afterwards, so that a frame costs its
-kernels and little else; groups are added up and parts joined. A method whose arrays change their sizes from frame to
-frame is not frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
-`realtime.frame.incremental` says what the next frame uses again.
+A frame is a list of groups of lights times a list of parts of the image. Each group is run by
+recorded functions (`drjit.freeze`), which record their kernels on the first call and replay them
+afterwards, so that a frame costs its kernels and little else; groups are added up and parts joined.
+A method whose arrays change their sizes from frame to frame is not frozen. All that moves (camera,
+lights, medium, shadow maps) is passed in as opaque arrays. `realtime.frame.incremental` says what
+the next frame uses again.
 
-Lights are tables (`realtime.scene.light_table`), one for each structure and area light. A method that looks at all
-lights together has one group of all tables; one that has no state sums a table in one loop, and a table is a group.
-Every other method has a group for each light, a table of one row, and lights of one structure share a recording:
-neither the code of a kernel nor the time to compile it grows with the lights. Surfaces are shaded by whole tables, in
-one loop over lights, except where the method says which of its lights reaches them.
+Lights are tables (`realtime.scene.light_table`), one for each structure and area light. A method
+that looks at all lights together has one group of all tables; one that has no state sums a table in
+one loop, and a table is a group. Every other method has a group for each light, a table of one row,
+and lights of one structure share a recording: neither the code of a kernel nor the time to compile
+it grows with the lights. Surfaces are shaded by whole tables, in one loop over lights, except where
+the method says which of its lights reaches them.
 
-Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: the
-intermediate arrays are then as large as a part. Where the method needs the whole image, its stage is not frozen if the
-image is large: a replay of Dr.Jit 1.5 frees intermediate arrays only at its end, and filters make some twenty
-intermediate images.
+Parts: a large image of a method that computes each ray by itself is rendered in parts, one after
+the other: the intermediate arrays are then as large as a part. Where the method needs the whole
+image, its stage is not frozen if the image is large: a replay of Dr.Jit 1.5 frees intermediate
+arrays only at its end, and filters make some twenty intermediate images.
 """
 
 import gc
@@ -38,17 +41,30 @@ from airlight.realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from airlight.realtime.frame.surface import Cast, surface_stages
 from airlight.realtime.kernels.registry import Kernel
 from airlight.realtime.methods.interface.media_checks import check_media
-from airlight.realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
+from airlight.realtime.methods.interface.method import (
+    Layers,
+    Method,
+    Preparation,
+    camera_view,
+    method_parameters,
+)
 from airlight.realtime.numerics.array_types import PerRay, aligned_array
 from airlight.realtime.numerics.noise import Noise, blue_mask
 from airlight.realtime.numerics.recorded import Frozen, refusals
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.camera import TILE, tiled_pixels
-from airlight.realtime.scene.light_table import LightTable, alike, light_samples, light_tables, structure
+from airlight.realtime.scene.light_table import (
+    LightTable,
+    alike,
+    light_samples,
+    light_tables,
+    structure,
+)
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene
 
-_ROOM = 2**30  # of states of groups of lights, such as shadow maps, and as much of surfaces by group [bytes]
+# of states of groups of lights, such as shadow maps, and as much of surfaces by group [bytes]
+_ROOM = 2**30
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
 _PART = 2**20  # pixels of a part at most
 
@@ -59,7 +75,8 @@ class Stages:
 
     prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
     surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
-    shade: Callable[..., Any]  #: -> surface radiance: by light where the method knows their visibility, or a sum
+    #: -> surface radiance: by light where the method knows their visibility, or a sum
+    shade: Callable[..., Any]
     render: Callable[..., Any]  #: -> what `_composed` returns
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
 
@@ -77,7 +94,9 @@ class LightGroup:
 
     @cached_property
     def tables(self) -> tuple[LightTable, ...]:
-        """The lights for recorded functions; a table by itself is of area light 0, as one recording serves all."""
+        """The lights for recorded functions; a table by itself is of area light 0, as
+        one recording serves all.
+        """
         tables = light_tables(self.scene.lights)
         if len(tables) == 1 and self.source:
             tables = (replace(tables[0], rows=replace(tables[0].rows, source=0)),)
@@ -98,7 +117,8 @@ class FrameRenderer:
     sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
     history: HistoryPass | None  #: takes the mean with the frames before
     mask: Any = None  #: of blue noise, for a noisy method
-    run: int = 0  #: number of the run: a noisy method draws other random numbers in each, below 2^32
+    #: number of the run: a noisy method draws other random numbers in each, below 2^32
+    run: int = 0
     frame: int = 0  #: number of the frame in its run, below 2^32
 
     @property
@@ -108,8 +128,12 @@ class FrameRenderer:
 
     @cached_property
     def lights(self) -> tuple[Light, ...]:
-        """The lights of the scene as it is now and the samples of its area lights, made once for a frame."""
-        return self.scene.lights + light_samples(self.scene, self.light_samples.points, self.light_samples.pattern)
+        """The lights of the scene as it is now and the samples of its area
+        lights, made once for a frame.
+        """
+        return self.scene.lights + light_samples(
+            self.scene, self.light_samples.points, self.light_samples.pattern
+        )
 
     @cached_property
     def groups(self) -> tuple[LightGroup, ...]:
@@ -118,7 +142,9 @@ class FrameRenderer:
 
     @cached_property
     def shaded(self) -> tuple[tuple[LightTable, ...], ...]:
-        """The tables of lights by which surfaces are shaded: those of the groups where visibility is the method's."""
+        """The tables of lights by which surfaces are shaded: those of the groups where
+        visibility is the method's.
+        """
         if self.method.provides_visibility:
             return tuple(group.tables for group in self.groups)
         return (light_tables(self.lights),)
@@ -140,7 +166,8 @@ class Frame:
     airlight: Any  #: in-scattered radiance [W/(m^2 sr)]
     surface: Any  #: radiance of the lit surface through the medium [W/(m^2 sr)]
     distance: Any  #: to the visible surface, infinite where there is none [m]
-    extra: Mapping[str, Any] = field(default_factory=dict)  #: further layers by their names, colours
+    #: further layers by their names, colours
+    extra: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -148,32 +175,44 @@ class Rendered:
     """The result of a method, in the order of the lanes, not evaluated."""
 
     airlight: PerRay  #: in-scattered radiance [W/(m^2 sr)]
-    surface: PerRay | None  #: radiance of the surface through it [W/(m^2 sr)]; None where another group has it
+    #: radiance of the surface through it [W/(m^2 sr)]; None where another group has it
+    surface: PerRay | None
     extra: Mapping[str, PerRay] | None = None  #: further layers by their names
     carried: Any = None  #: for the next frame
 
 
 def frame_renderer(
-    scene: Scene, method: type[Method], *, kernel: Kernel | None = None, extra_layers: bool = False, **parameters
+    scene: Scene,
+    method: type[Method],
+    *,
+    kernel: Kernel | None = None,
+    extra_layers: bool = False,
+    **parameters,
 ) -> FrameRenderer:
     """Prepare the stages of a frame.
 
-    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight
-    kernel; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
-    method names, which puts all lights into one group; never in a scene with area lights; `parameters`: values of the
-    method's parameters, and of `realtime.area_lights.points.LightSamples`; the others have their defaults. Raises
-    InputError for a parameter that the method does not have, a missing kernel, and a scene that the method refuses;
-    refusals that depend on the rays come with the first frame.
+    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an
+    airlight kernel; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have
+    the further layers that the method names, which puts all lights into one group; never in a scene
+    with area lights; `parameters`: values of the method's parameters, and of
+    `realtime.area_lights.points.LightSamples`; the others have their defaults. Raises InputError
+    for a parameter that the method does not have, a missing kernel, and a scene that the method
+    refuses; refusals that depend on the rays come with the first frame.
     """
     chosen, samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
-        raise InputError(f"method {method.name}: got no kernel, expected one of realtime.kernels.registry.KERNELS")
+        raise InputError(
+            f"method {method.name}: got no kernel, expected one of "
+            "realtime.kernels.registry.KERNELS"
+        )
     check_media(scene, chosen)
     extra_layers &= not scene.area_lights
     # Groups of one structure need the same memory and are refused alike.
     lights = scene.lights + light_samples(scene, samples.points, samples.pattern)
     groups = light_groups(scene, lights, chosen, together=extra_layers)
-    for group in {tuple(structure(light)[1] for light in each.scene.lights): each for each in groups}.values():
+    for group in {
+        tuple(structure(light)[1] for light in each.scene.lights): each for each in groups
+    }.values():
         chosen.check(group.scene)
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
     dr.eval(pixel)
@@ -183,16 +222,24 @@ def frame_renderer(
         samples,
         pixel,
         stages=_stages(scene, chosen, extra_layers=extra_layers),
-        kernel=kernel.prepared(type(scene.camera.origin.x)) if chosen.uses_kernel and kernel else None,
+        kernel=kernel.prepared(type(scene.camera.origin.x))
+        if chosen.uses_kernel and kernel
+        else None,
         extra_layers=extra_layers,
         sphere_scales=sphere_scales(scene, chosen),
-        history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
+        history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x))
+        if chosen.history
+        else None,
         mask=blue_mask() if chosen.noisy else None,
     )
 
 
-def light_groups(scene: Scene, lights: tuple[Light, ...], method: Method, *, together: bool) -> tuple[LightGroup, ...]:
-    """Return the groups of some lights of a scene: all together, those that are alike, or one by one."""
+def light_groups(
+    scene: Scene, lights: tuple[Light, ...], method: Method, *, together: bool
+) -> tuple[LightGroup, ...]:
+    """Return the groups of some lights of a scene: all together, those that
+    are alike, or one by one.
+    """
     if method.at_once or together:
         groups = [lights]
     elif method.by_table:
@@ -212,18 +259,37 @@ def _stages(scene: Scene, method: Method, *, extra_layers: bool) -> Stages:
         through_media=not method.renders_clouds,
     )
 
-    def run(geometry, pixel, camera, medium, tables, state, distance, by_light, kernel, first, last=None, noise=None):
-        view = camera_view(camera, pixel, distance, features=features, scene=geometry, medium=medium, tables=tables)
+    def run(
+        geometry,
+        pixel,
+        camera,
+        medium,
+        tables,
+        state,
+        distance,
+        by_light,
+        kernel,
+        first,
+        last=None,
+        noise=None,
+    ):
+        view = camera_view(
+            camera, pixel, distance, features=features, scene=geometry, medium=medium, tables=tables
+        )
         view = replace(view, carried=last, noise=noise, extra_layers=extra_layers)
         if method.provides_visibility:
             view = replace(view, surfaces=by_light)
         with refusals():
             layers = method.render(view, state, kernel)
-        return _composed(layers if extra_layers else replace(layers, extra=None), by_light, first=first)
+        return _composed(
+            layers if extra_layers else replace(layers, extra=None), by_light, first=first
+        )
 
     large = scene.camera.width * scene.camera.height > _LARGE
     frozen = method.frozen and (_by_rays(method) or not large)
-    return Stages(method.preparation(scene), surface, shade, Frozen(run) if frozen else run, shade_casts_rays)
+    return Stages(
+        method.preparation(scene), surface, shade, Frozen(run) if frozen else run, shade_casts_rays
+    )
 
 
 def _by_rays(method: Method) -> bool:
@@ -233,20 +299,28 @@ def _by_rays(method: Method) -> bool:
 def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, first: bool):
     """Return a frame from layers, by the formula of `realtime.methods.interface.method`.
 
-    `layers`: of a method; `by_light`: the radiance of the surfaces by light where the layers have a visibility,
-    otherwise their sum alone, or nothing for a further group; `first`: whether this is the first group of lights, which
-    shows what is of no light. Returns `airlight`, `surface`: in-scattered radiance, and that from behind it
-    [W/(m^2 sr)]; None where that is nothing but the shaded surface; `extra`, `carried`: as the layers have them.
+    `layers`: of a method; `by_light`: the radiance of the surfaces by light where the layers have a
+    visibility, otherwise their sum alone, or nothing for a further group; `first`: whether this is
+    the first group of lights, which shows what is of no light. Returns `airlight`, `surface`:
+    in-scattered radiance, and that from behind it [W/(m^2 sr)]; None where that is nothing but the
+    shaded surface; `extra`, `carried`: as the layers have them.
     """
     parts = list(by_light)
     if layers.visibility is not None:
-        parts = [_lit(fraction, color) for fraction, color in zip(layers.visibility, by_light, strict=True)]
+        parts = [
+            _lit(fraction, color)
+            for fraction, color in zip(layers.visibility, by_light, strict=True)
+        ]
     if first and layers.background is not None:
         parts.append(layers.background)
     surface = _sum(tuple(parts)) if parts else None
     if surface is not None and layers.transmittance is not None:
         surface = layers.transmittance * surface
-    changed = len(parts) != len(by_light) or layers.visibility is not None or layers.transmittance is not None
+    changed = (
+        len(parts) != len(by_light)
+        or layers.visibility is not None
+        or layers.transmittance is not None
+    )
     return layers.in_scattered, surface if changed else None, layers.extra, layers.carried
 
 
@@ -256,7 +330,11 @@ def _sum(colors: tuple[PerRay, ...]) -> PerRay:
 
 
 def _lit(fraction: PerRay, color: PerRay) -> PerRay:
-    return dr.select(fraction, color, 0) if isinstance(fraction, bool) or dr.is_mask_v(fraction) else fraction * color
+    return (
+        dr.select(fraction, color, 0)
+        if isinstance(fraction, bool) or dr.is_mask_v(fraction)
+        else fraction * color
+    )
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -272,7 +350,9 @@ def render_frame(renderer: FrameRenderer) -> Frame:
         give_memory_back(renderer)  # the host's images need room now
         frame = frame_with_part(frame, part, stages, extra)
     assert frame is not None
-    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    check_radiance(
+        renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance
+    )
     return frame
 
 
@@ -289,32 +369,42 @@ def give_memory_back(renderer: FrameRenderer) -> None:
 
 
 def parts(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
-    """Return renderers of the parts of a large image, of about one size each; the renderer itself where that is all."""
+    """Return renderers of the parts of a large image, of about one size each; the renderer
+    itself where that is all.
+    """
     count = dr.width(renderer.pixel)
     if not (renderer.by_rays and is_large(renderer)):
         return (renderer,)
     block = TILE * TILE
     length = -(-count // (-(-count // _PART) * block)) * block
-    lanes = [dr.arange(mi.UInt32, begin, min(begin + length, count)) for begin in range(0, count, length)]
+    lanes = [
+        dr.arange(mi.UInt32, begin, min(begin + length, count)) for begin in range(0, count, length)
+    ]
     pixels = [dr.gather(mi.UInt32, renderer.pixel, lane) for lane in lanes]
     dr.eval(pixels)
     return tuple(replace(renderer, pixel=pixel) for pixel in pixels)
 
 
 def run_stages(renderer: FrameRenderer, state):
-    """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
+    """Run the stages on the device and return distance, surface and airlight, evaluated,
+    in the order of the lanes.
+    """
     cast, by_light = run_cast_and_shade(renderer)
     return evaluated(cast, run_method(renderer, state, cast, by_light))
 
 
 def evaluated(cast: Cast, rendered: Rendered):
-    """Return distance [m], surface and airlight [W/(m^2 sr)], evaluated, of what camera rays met and a method did."""
+    """Return distance [m], surface and airlight [W/(m^2 sr)], evaluated, of what camera
+    rays met and a method did.
+    """
     dr.eval(cast.distance, rendered.surface, rendered.airlight, rendered.extra, rendered.carried)
     return cast.distance, rendered.surface, rendered.airlight
 
 
 def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, tuple[Any, ...]]:
-    """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
+    """Run the stage of camera rays and lit surface; return what the rays meet, and what
+    `run_shade` returns for it.
+    """
     scene = renderer.scene
     shown = scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium
     cast, by_light = renderer.stages.surface(*shown, renderer.shaded[0])
@@ -329,12 +419,16 @@ def run_shade(renderer: FrameRenderer, cast: Cast) -> tuple[Any, ...]:
     return _with_others(renderer, cast, _shaded(renderer, renderer.shaded[0], cast))
 
 
-def _with_others(renderer: FrameRenderer, cast: Cast, by_light: tuple[PerRay, ...]) -> tuple[Any, ...]:
+def _with_others(
+    renderer: FrameRenderer, cast: Cast, by_light: tuple[PerRay, ...]
+) -> tuple[Any, ...]:
     """Return surfaces by groups of lights; `by_light` are those of the first."""
     if not renderer.method.provides_visibility:
         return (by_light, *[()] * (len(renderer.groups) - 1))
     kept, others = kept_groups(by_light), renderer.shaded[1:]
-    shaded = (_shaded(renderer, tables, cast) if k < kept else None for k, tables in enumerate(others, 1))
+    shaded = (
+        _shaded(renderer, tables, cast) if k < kept else None for k, tables in enumerate(others, 1)
+    )
     return (by_light, *shaded)
 
 
@@ -342,14 +436,19 @@ def _shaded(renderer: FrameRenderer, tables: tuple[LightTable, ...], cast: Cast)
     """Return the surfaces that camera rays met in the light of some tables."""
     scene, stages = renderer.scene, renderer.stages
     geometry = scene.geometry if stages.shade_casts_rays else None
-    return stages.shade(geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, tables, cast)
+    return stages.shade(
+        geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, tables, cast
+    )
 
 
-def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: Any = None) -> Rendered:
+def run_method(
+    renderer: FrameRenderer, state, cast: Cast, by_light, carried: Any = None
+) -> Rendered:
     """Run the method for all groups of lights.
 
-    `renderer`, `state`: the frame, and what its `prepare` returned; `cast`, `by_light`: from `run_cast_and_shade`;
-    `carried`: what the method handed on from the last frame; None for the first.
+    `renderer`, `state`: the frame, and what its `prepare` returned; `cast`, `by_light`: from
+    `run_cast_and_shade`; `carried`: what the method handed on from the last frame; None for the
+    first.
     """
     groups, sums, scales = renderer.groups, None, dict[int | None, Any]()
     past = None
@@ -357,13 +456,21 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
         carried, past = carried
     noise = None
     if renderer.method.noisy:
-        noise = Noise(dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame), renderer.mask)
+        noise = Noise(
+            dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame), renderer.mask
+        )
     if renderer.sphere_scales is not None:
         scales = _sphere_scales(renderer, cast)
     for number, group in enumerate(groups):
-        shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group.tables, cast)
+        shaded = (
+            by_light[number]
+            if by_light[number] is not None
+            else _shaded(renderer, group.tables, cast)
+        )
         own = state[number] if state[number] is not None else renderer.stages.prepare(group.scene)
-        rendered = _run_group(renderer, group, own, cast, shaded, first=number == 0, last=carried, noise=noise)
+        rendered = _run_group(
+            renderer, group, own, cast, shaded, first=number == 0, last=carried, noise=noise
+        )
         if (scale := scales.get(group.source)) is not None:
             rendered = replace(rendered, airlight=rendered.airlight * scale)
         if sums is None:
@@ -377,7 +484,9 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     assert sums is not None
     if renderer.history is None:
         return sums
-    airlight, past = renderer.history(sums.airlight, renderer.pixel, cast.distance, renderer.scene.camera, past)
+    airlight, past = renderer.history(
+        sums.airlight, renderer.pixel, cast.distance, renderer.scene.camera, past
+    )
     return replace(sums, airlight=airlight, carried=(sums.carried, past))
 
 
@@ -389,28 +498,57 @@ def _sphere_scales(renderer: FrameRenderer, cast: Cast) -> dict[int | None, Any]
         if light.kind == "sphere":
             sphere = sampled_sphere(light, renderer.light_samples, type(scene.camera.origin.x))
             like = next(sample for sample in renderer.lights if sample.source == number)
-            shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.kernel
+            shown = (
+                scene.camera,
+                renderer.pixel,
+                scene.medium,
+                like,
+                sphere,
+                cast.distance,
+                renderer.kernel,
+            )
             scales[number] = renderer.sphere_scales(*shown)
             dr.eval(scales[number])
     return scales
 
 
 def _run_group(
-    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, *, first: bool, last, noise
+    renderer: FrameRenderer,
+    group: LightGroup,
+    state,
+    cast: Cast,
+    by_light,
+    *,
+    first: bool,
+    last,
+    noise,
 ) -> Rendered:
     """Run the method for one group of lights."""
     scene, method = renderer.scene, renderer.method
     geometry = scene.geometry if method.casts_rays else None
-    shown = geometry, renderer.pixel, scene.camera, scene.medium, group.tables, state, cast.distance, by_light
+    shown = (
+        geometry,
+        renderer.pixel,
+        scene.camera,
+        scene.medium,
+        group.tables,
+        state,
+        cast.distance,
+        by_light,
+    )
     more = (last, noise) if method.noisy else (last,) if method.carries else ()
-    airlight, surface, extra, carried = renderer.stages.render(*shown, renderer.kernel, first, *more)
+    airlight, surface, extra, carried = renderer.stages.render(
+        *shown, renderer.kernel, first, *more
+    )
     if surface is None and by_light:
         surface = _sum(by_light)
     return Rendered(airlight, surface, extra, carried)
 
 
 def kept_groups(state: Any) -> int:
-    """Return of how many groups of lights states, or surfaces, like this are kept: not more than fill the room."""
+    """Return of how many groups of lights states, or surfaces, like this are kept: not
+    more than fill the room.
+    """
     return max(1, _ROOM // max(_bytes_in(state), 1))
 
 
@@ -422,30 +560,51 @@ def _bytes_in(value: Any) -> int:
         return sum(_bytes_in(item) for item in vars(value).values())
     if not dr.is_array_v(value):
         return 0
-    return sum(map(_bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
+    return (
+        sum(map(_bytes_in, value))
+        if dr.depth_v(value) > 1
+        else dr.width(value) * dr.itemsize_v(value)
+    )
 
 
-def image_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
-    """Bring `stages`, what `run_stages` returned, to the host in the order of the image, and `extra` layers."""
+def image_frame(
+    renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None
+) -> Frame:
+    """Bring `stages`, what `run_stages` returned, to the host in the order of the
+    image, and `extra` layers.
+    """
     frame = unchecked_frame(renderer, stages, extra)
-    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    check_radiance(
+        renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance
+    )
     return frame
 
 
-def unchecked_frame(renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None) -> Frame:
-    """Do what `image_frame` does, and return radiance that is not finite too, for anyone who counts it."""
+def unchecked_frame(
+    renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None = None
+) -> Frame:
+    """Do what `image_frame` does, and return radiance that is not finite too,
+    for anyone who counts it.
+    """
     return frame_with_part(None, renderer, stages, extra)
 
 
-def frame_with_part(frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None) -> Frame:
-    """Return a frame with the pixels of a renderer written into it; a new one where there is none yet."""
+def frame_with_part(
+    frame: Frame | None, renderer: FrameRenderer, stages, extra: Mapping[str, PerRay] | None
+) -> Frame:
+    """Return a frame with the pixels of a renderer written into it; a new one
+    where there is none yet.
+    """
     distance, surface, airlight = stages
     shown = {name: _colour(renderer, values) for name, values in (extra or {}).items()}
     return Frame(
         _image(renderer, airlight, frame and frame.airlight),
         _image(renderer, surface, frame and frame.surface),
         _image(renderer, distance, frame and frame.distance),
-        {name: _image(renderer, values, frame and frame.extra[name]) for name, values in shown.items()},
+        {
+            name: _image(renderer, values, frame and frame.extra[name])
+            for name, values in shown.items()
+        },
     )
 
 
@@ -456,9 +615,13 @@ def _colour(renderer: FrameRenderer, values):
 
 
 def _image(renderer: FrameRenderer, values, image=None):
-    """Write values by lane to their pixels of an image (height, width[, 3]), a new one by default, and return it."""
+    """Write values by lane to their pixels of an image (height, width[, 3]), a new one
+    by default, and return it.
+    """
     camera, pixel = renderer.scene.camera, np.array(renderer.pixel)
-    channels = [np.array(channel) for channel in values] if dr.depth_v(values) > 1 else [np.array(values)]
+    channels = (
+        [np.array(channel) for channel in values] if dr.depth_v(values) > 1 else [np.array(values)]
+    )
     if image is None:
         image = np.empty((camera.height, camera.width, len(channels)), dtype=channels[0].dtype)
         image = image if dr.depth_v(values) > 1 else image[..., 0]

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Anti-aliased pictures: the mean of several frames whose camera rays pass through other points of the pixels.
+"""Anti-aliased pictures: the mean of several frames whose camera rays pass through
+other points of the pixels.
 
-The n-th of N rays of a pixel passes through the point ((n + 1/2)/N, phi(n)) of Hammersley's set, phi the binary digits
-of n mirrored at the point (Hammersley 1960), moved so that the middle of all is the centre of the pixel. The set fills
-the pixel evenly, and the mean weighs it alike everywhere, a box filter. One sample is the centre itself. All pixels
-share the points, so that a frame costs what it always does.
+The n-th of N rays of a pixel passes through the point ((n + 1/2)/N, phi(n)) of Hammersley's set,
+phi the binary digits of n mirrored at the point (Hammersley 1960), moved so that the middle of all
+is the centre of the pixel. The set fills the pixel evenly, and the mean weighs it alike everywhere,
+a box filter. One sample is the centre itself. All pixels share the points, so that a frame costs
+what it always does.
 
 This is for pictures. The reference that methods are judged by is that of pixel centres.
 """
@@ -35,22 +37,31 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
         yield (number + 0.5) / samples - 0.5, float(down[number] - middle)
 
 
-def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None) -> Frame:
+def render_samples(
+    renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None
+) -> Frame:
     """Render the mean over some rays of each pixel.
 
-    `renderer`: from `realtime.frame.renderer.frame_renderer`. The method prepares the scene again for each ray.
-    `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the fraction done. Returns `Frame`: mean
-    radiances; the distance is that of the first ray.
+    `renderer`: from `realtime.frame.renderer.frame_renderer`. The method prepares the scene again
+    for each ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the
+    fraction done. Returns `Frame`: mean radiances; the distance is that of the first ray.
     """
     camera, frame = renderer.scene.camera, None
     for number, (right, down) in enumerate(pixel_offsets(samples), 1):
         beside = shifted_camera(camera, right, down) if right or down else camera
-        numbered = replace(renderer, frame=renderer.frame + number - 1)  # each sample has its own random numbers
+        # each sample has its own random numbers
+        numbered = replace(renderer, frame=renderer.frame + number - 1)
         last = render_frame(replace(numbered, scene=replace(renderer.scene, camera=beside)))
-        airlight, surface = (np.asarray(layer, dtype=np.float64) / samples for layer in (last.airlight, last.surface))
+        airlight, surface = (
+            np.asarray(layer, dtype=np.float64) / samples for layer in (last.airlight, last.surface)
+        )
         if samples == 1:
             return last
-        frame = Frame(airlight, surface, last.distance) if frame is None else _sum(frame, airlight, surface)
+        frame = (
+            Frame(airlight, surface, last.distance)
+            if frame is None
+            else _sum(frame, airlight, surface)
+        )
         if progress is not None:
             progress(number / samples)
     assert frame is not None

@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of light samples on a sphere, scaled to the airlight of the sphere where nothing is in the way.
+r"""The airlight of light samples on a sphere, scaled to the airlight of the sphere
+where nothing is in the way.
 
-A sample at the height h over a ray sends J ~ 1/h into it, so that samples at fixed places leave a peak beside the
-sphere wherever a ray passes close to one. With J_i of the N samples and their shadowed V_i, a frame has
+A sample at the height h over a ray sends J ~ 1/h into it, so that samples at fixed places leave a
+peak beside the sphere wherever a ray passes close to one. With J_i of the N samples and their
+shadowed V_i, a frame has
 
     sum V_i J_i  *  U / sum J_i,           U = (N / A) int J dA over the sphere:
 
-the fraction of the light that is not in shadow, as the samples see it, of the whole light, exactly. Without occluders
-that is U. J is that of unshadowed samples, by the same kernel.
+the fraction of the light that is not in shadow, as the samples see it, of the whole light, exactly.
+Without occluders that is U. J is that of unshadowed samples, by the same kernel.
 
-U by places that suit the ray. In half planes about the ray at the azimuth phi from the centre, at the height H over the
-ray, the sphere of radius R is a circle: its middle at the height m = H cos phi, its radius rho, rho^2 = R^2 - H^2 sin^2
-phi. With b the angle on it, the point at the height h = m + rho cos b stands for dA = R h dphi db, and h J is bounded.
-Where the line of the ray misses the sphere, sin phi goes up to S = R/H; with sin phi = S sin g the integrand is
-periodic in g and b, and the midpoint rule converges faster than any power. In an even medium nothing changes at -phi,
-so that half of the azimuths do. A line that meets the sphere has all azimuths, and the circle ends at the line; a ray
-that ends at the sphere sees of it what its beginning sees.
+U by places that suit the ray. In half planes about the ray at the azimuth phi from the centre, at
+the height H over the ray, the sphere of radius R is a circle: its middle at the height m = H cos
+phi, its radius rho, rho^2 = R^2 - H^2 sin^2 phi. With b the angle on it, the point at the height
+h = m + rho cos b stands for dA = R h dphi db, and h J is bounded. Where the line of the ray misses
+the sphere, sin phi goes up to S = R/H; with sin phi = S sin g the integrand is periodic in g and b,
+and the midpoint rule converges faster than any power. In an even medium nothing changes at -phi, so
+that half of the azimuths do. A line that meets the sphere has all azimuths, and the circle ends at
+the line; a ray that ends at the sphere sees of it what its beginning sees.
 """
 
 from dataclasses import dataclass, replace
@@ -48,9 +51,11 @@ class SampledSphere:
 
 
 def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
-    """Return a function for the scale of a sphere light's samples; None where scene, method or medium have no use.
+    """Return a function for the scale of a sphere light's samples; None where scene,
+    method or medium have no use.
 
-    Valid for methods that render samples one by one with a kernel in a homogeneous medium without bounds.
+    Valid for methods that render samples one by one with a kernel in a
+    homogeneous medium without bounds.
     """
     if not any(light.kind == "sphere" for light in scene.area_lights):
         return None
@@ -59,12 +64,16 @@ def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
     features = scene.features
 
     def scale(camera, pixel, medium, light, sphere, distance, kernel):
-        view = camera_view(camera, pixel, distance, features=features, scene=None, medium=medium, tables=())
+        view = camera_view(
+            camera, pixel, distance, features=features, scene=None, medium=medium, tables=()
+        )
         Float = type(distance)
 
         def integral(normal, exact_normal):
             facing = Facing(exact_normal, light.facing.lift, light.facing.chord)
-            sample = replace(light, position=dr.fma(normal, sphere.radius, sphere.centre), facing=facing)
+            sample = replace(
+                light, position=dr.fma(normal, sphere.radius, sphere.centre), facing=facing
+            )
             return view.lit_by(sample, kernel).gamma(distance)
 
         def of_sample(number):
@@ -100,7 +109,9 @@ def sampled_sphere(light: AreaLight, points: LightSamples, Float: Any) -> Sample
 
 
 def _places(view: View, sphere: SampledSphere):
-    """Return a function of the number of a place: its normal, and its fraction of the area times the places."""
+    """Return a function of the number of a place: its normal, and its fraction of
+    the area times the places.
+    """
     Float, pi = type(sphere.radius), dr.pi
     direction, radius = view.direction, sphere.radius
     way = sphere.centre - view.origin
@@ -120,7 +131,9 @@ def _places(view: View, sphere: SampledSphere):
         part = (Float(column) + 0.5) / _ANGLES
         s = sine * dr.sin(0.5 * pi * g)
         phi = dr.select(meets, pi * g, dr.asin(s))
-        rate = dr.select(meets, pi, 0.5 * pi * sine * dr.cos(0.5 * pi * g) * dr.rsqrt((1 - s) * (1 + s)))
+        rate = dr.select(
+            meets, pi, 0.5 * pi * sine * dr.cos(0.5 * pi * g) * dr.rsqrt((1 - s) * (1 + s))
+        )
         beside, middle = height * dr.sin(phi), height * dr.cos(phi)
         rho = dr.safe_sqrt((radius - beside) * (radius + beside))
         reach = dr.select(meets, dr.safe_acos(-middle / rho), pi)

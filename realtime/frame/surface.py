@@ -5,13 +5,15 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
 
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
-zero where a shadow ray is blocked; for a directional light, rho E cos(theta_p) / pi replaces the first fraction. With
-bounded media both exponents are sums over the media that the two segments cross (`realtime.scene.media.bounded`). A
-one-sided surface is black from behind, as in Mitsuba's `diffuse`.
+zero where a shadow ray is blocked; for a directional light, rho E cos(theta_p) / pi replaces the
+first fraction. With bounded media both exponents are sums over the media that the two segments
+cross (`realtime.scene.media.bounded`). A one-sided surface is black from behind, as in Mitsuba's
+`diffuse`.
 
-Primary hits depend on camera and geometry alone, and serve many frames (`realtime.frame.incremental`). There are two
-recorded functions: one casts and shades, and hands on its hits at no cost; the other shades the hits of another frame.
-Casting and shading in two steps whenever something moved would take up to 7 % longer.
+Primary hits depend on camera and geometry alone, and serve many frames
+(`realtime.frame.incremental`). There are two recorded functions: one casts and shades, and hands on
+its hits at no cost; the other shades the hits of another frame. Casting and shading in two steps
+whenever something moved would take up to 7 % longer.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +38,9 @@ from airlight.realtime.scene.triangle_table import Facets, facet_at, facet_numbe
 
 @dataclass(frozen=True)
 class Cast:
-    """The first hits of camera rays: all of a frame that depends on the camera and the geometry alone."""
+    """The first hits of camera rays: all of a frame that depends on the
+    camera and the geometry alone.
+    """
 
     distance: Metres  #: infinite where there is nothing [m]
     triangle: PerRay | None = None  #: its number in the table of facets, where there is one
@@ -60,8 +64,9 @@ class VisibleSurface:
 def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     """Cast the camera rays.
 
-    `scene`: the Mitsuba scene; `facets`: its triangles, or None: then Mitsuba will be asked for the surfaces; `origin`,
-    `direction`: rays in any precision [m] and their unit directions; they are cast in float32.
+    `scene`: the Mitsuba scene; `facets`: its triangles, or None: then Mitsuba will be asked for the
+    surfaces; `origin`, `direction`: rays in any precision [m] and their unit directions; they are
+    cast in float32.
     """
     Float = type(origin.x)
     hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
@@ -72,7 +77,9 @@ def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     return Cast(distance, facet_number(facets, hit, valid), hit.prim_uv if facets.smooth else None)
 
 
-def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
+def visible_surface(
+    cast: Cast, facets: Facets | None, origin, direction, *, color
+) -> VisibleSurface:
     """Return the surfaces that camera rays meet; `color` is the type of an albedo.
 
     `origin` [m] and unit `direction`s as for `cast_rays`.
@@ -81,7 +88,9 @@ def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, col
     distance = cast.distance
     valid = dr.isfinite(distance)
     if facets is None:
-        interaction = cast.hit.compute_surface_interaction(_ray(origin, direction), ray_flags=mi.RayFlags.All)
+        interaction = cast.hit.compute_surface_interaction(
+            _ray(origin, direction), ray_flags=mi.RayFlags.All
+        )
         bsdf = interaction.bsdf()
         albedo = color(bsdf.eval_diffuse_reflectance(interaction))
         point, normal = Vector(interaction.p), Vector(interaction.sh_frame.n)
@@ -91,35 +100,50 @@ def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, col
         normal, albedo = Vector(*unit), color(*reflectance)
         point = dr.fma(direction, dr.select(valid, distance, 0), origin)
         interaction = dr.zeros(mi.Interaction3f)
-        interaction.t, interaction.p, interaction.n = mi.Float(distance), mi.Point3f(point), mi.Normal3f(normal)
+        interaction.t, interaction.p, interaction.n = (
+            mi.Float(distance),
+            mi.Point3f(point),
+            mi.Normal3f(normal),
+        )
     facing = -dr.dot(normal, direction)
     normal = dr.select(two_sided & (facing < 0), -normal, normal)
-    return VisibleSurface(distance, point, normal, albedo, valid & (two_sided | (facing > 0)), interaction)
+    return VisibleSurface(
+        distance, point, normal, albedo, valid & (two_sided | (facing > 0)), interaction
+    )
 
 
 def _ray(origin, direction):
     return mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
 
 
-def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool = True):
-    """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
+def lit_surface(
+    scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool = True
+):
+    """Return the radiance that the visible surface sends to the eye through the medium,
+    from one light [W/(m^2 sr)].
 
-    `scene`: the Mitsuba scene, for shadow rays; `surface`: from `visible_surface`; `medium`, `light`: what the light
-    crosses and where it comes from; `depths`: the optical depths of the camera rays, by channel; `shadows`: whether to
-    cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
+    `scene`: the Mitsuba scene, for shadow rays; `surface`: from `visible_surface`; `medium`,
+    `light`: what the light crosses and where it comes from; `depths`: the optical depths of the
+    camera rays, by channel; `shadows`: whether to cast shadow rays; a method that finds out
+    otherwise what is lit leaves them to that.
     """
     cosine, r, arriving = _arriving(light, surface)
     lit = surface.seen & (cosine > 0)
     if shadows:
         lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
-    reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
+    reflected = (
+        surface.albedo
+        * arriving
+        * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
+    )
     both = zip(depths, medium.depth_to_light(light, surface.point, r, active=lit), strict=True)
     kept = medium.transmittance([camera + own for camera, own in both])
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 
 def _arriving(light: Light, surface: VisibleSurface):
-    """Return the cosine at which a light meets a surface, the distance that it came, and its intensity there.
+    """Return the cosine at which a light meets a surface, the distance that it came,
+    and its intensity there.
 
     Light from infinity has an irradiance for an intensity, and its distance counts nowhere.
     """
@@ -136,16 +160,21 @@ def surface_stages(
 ) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
     """Return the stages for a scene.
 
-    `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method finds out which
-    surfaces are lit; `by_source`: whether it does so for all points of an area light together; `through_media`:
-    whether the bounded media dim the surfaces; if not, the method says how much they do. Returns `surface`: (geometry,
-    facets, pixel, camera, medium, tables) -> what camera rays meet, and what `shade` returns; `shade`: (geometry,
-    facets, pixel, camera, medium, tables, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
+    `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method
+    finds out which surfaces are lit; `by_source`: whether it does so for all points of an area
+    light together; `through_media`: whether the bounded media dim the surfaces; if not, the method
+    says how much they do. Returns `surface`: (geometry, facets, pixel, camera, medium, tables) ->
+    what camera rays meet, and what `shade` returns; `shade`: (geometry, facets, pixel, camera,
+    medium, tables, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
     whether `shade` needs the geometry.
     """
 
     def apart(tables: Sequence[LightTable]) -> list[LightTable]:
-        return list(sources(tables)) if by_source else [light for table in tables for light in one_by_one(table)]
+        return (
+            list(sources(tables))
+            if by_source
+            else [light for table in tables for light in one_by_one(table)]
+        )
 
     if not scene.features.surfaces:
         return *_no_surfaces(lambda tables: len(apart(tables)) if provides_visibility else 1), False
@@ -153,7 +182,9 @@ def surface_stages(
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
         cast = cast_rays(geometry, facets, camera.origin, direction)
-        return replace(cast, crossed=medium.rays(camera.origin, direction).crossed if through_media else ())
+        return replace(
+            cast, crossed=medium.rays(camera.origin, direction).crossed if through_media else ()
+        )
 
     def shade_all(geometry, facets, pixel, camera, medium, tables, cast):
         direction, _ = ray_directions(camera, pixel)
@@ -163,9 +194,12 @@ def surface_stages(
         depths = medium.optical_depth(rays, 0, dr.select(seen.seen, cast.distance, 0))
 
         def lit(light: Light, number: Any = 0):
-            # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
+            # The map of a light at infinity covers the media alone; surfaces
+            # beside them are lit too.
             shadows = not (light.w and provides_visibility)
-            return lit_surface(geometry, seen, medium=medium, light=light, depths=depths, shadows=shadows)
+            return lit_surface(
+                geometry, seen, medium=medium, light=light, depths=depths, shadows=shadows
+            )
 
         nothing = dr.zeros(type(medium.albedo), dr.width(pixel))
         if not provides_visibility:
@@ -181,8 +215,12 @@ def surface_stages(
     return surface, Frozen(shade_all), scene.facets is None or asks
 
 
-def _no_surfaces(colors: Callable[[Sequence[LightTable]], int]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the stages of a scene without surfaces, whose `shade` returns so many black colours."""
+def _no_surfaces(
+    colors: Callable[[Sequence[LightTable]], int],
+) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the stages of a scene without surfaces, whose `shade`
+    returns so many black colours.
+    """
 
     def shade(geometry, facets, pixel, camera, medium, tables, cast):
         return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in range(colors(tables)))

@@ -1,75 +1,84 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The default kernel: as few Gauss-Legendre nodes as a segment needs, placed by the phase function's own lobe.
+"""The default kernel: as few Gauss-Legendre nodes as a segment needs, placed by the
+phase function's own lobe.
 
 With E = q/h (q = (x - foot) + r, the path form of DESIGN section 2),
 
     J = (2/h) exp(-sigma_t (x0 + r0)) int_{E0}^{E1} exp(-sigma_t h (E - E0)) p / (1 + E^2) dE,
     sin^2(angle/2) = E^2/(1 + E^2),   cos^2(angle/2) = 1/(1 + E^2).
 
-The integrand varies on two scales: where the extinction and 1/(1 + E^2) do, E ~ 1, and where a forward lobe does. That
-of Henyey and Greenstein with g > 0 has the branch points E = +-i d, d = (1 - g)/(1 + g), so close to the real axis that
-nodes in asinh E, even below E = 1, step over it. The substitution
+The integrand varies on two scales: where the extinction and 1/(1 + E^2) do, E ~ 1, and where a
+forward lobe does. That of Henyey and Greenstein with g > 0 has the branch points E = +-i d, d =
+(1 - g)/(1 + g), so close to the real axis that nodes in asinh E, even below E = 1, step over it.
+The substitution
 
     E = d sinh v,     dE = d cosh v dv
 
-is even where E < d and logarithmic above. It takes both pairs of singularities, +-i d and the poles +-i of 1/(1 + E^2)
-(and the branch points +-i/d of a backward lobe), to |Im v| = pi/2, whatever g is: one panel serves, and no cut at the
-foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"), whose poles lie at +-i already, d is
-their width.
+is even where E < d and logarithmic above. It takes both pairs of singularities, +-i d and the poles
++-i of 1/(1 + E^2) (and the branch points +-i/d of a backward lobe), to |Im v| = pi/2, whatever g
+is: one panel serves, and no cut at the foot point. For the lobes cos^16 and cos^64 of half the
+angle ("hazy", "murky"), whose poles lie at +-i already, d is their width.
 
-Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, in float32 four nodes
-in x if it is short; they leave less than 1e-6. In float64 the panels have 22 nodes, which leave that to
-the power of 22/8, 1e-16, and hold more depth: by the bound below 22 nodes leave 1e-20 of T = 24.
+Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for,
+in float32 four nodes in x if it is short; they leave less than 1e-6. In float64 the panels have 22
+nodes, which leave that to the power of 22/8, 1e-16, and hold more depth: by the bound below 22
+nodes leave 1e-20 of T = 24.
 
-**Panels** of Gauss-Legendre nodes: every ray takes as many as its segment needs. The integral in v is
+**Panels** of Gauss-Legendre nodes: every ray takes as many as its segment
+needs. The integral in v is
 
     I = int_{v0}^{v1} exp(-a (E - E0)) P(E) d cosh v dv,     a = sigma_t h,     P = p/(1 + E^2).
 
-**How many panels.** P has its singularities at |Im v| = pi/2. On a panel of half width D, Gauss's rule with n nodes is
-wrong by about M rho^(-2n), where rho = H + sqrt(1 + H^2), H = pi/(2 D), is the size of the largest ellipse about the
-panel that holds none of them (Trefethen 2013, theorem 19.3) and M the largest value of the integrand on it: for a given
-accuracy a panel may have some width, whatever the ray. Two things make M large. Lobes of a high power of 1/(1 + E^2)
-grow steeply towards their poles; their panels are narrower. And the extinction, bounded by 1 where Re E > E0, grows to
+**How many panels.** P has its singularities at |Im v| = pi/2. On a panel of half width D, Gauss's
+rule with n nodes is wrong by about M rho^(-2n), where rho = H + sqrt(1 + H^2), H = pi/(2 D), is the
+size of the largest ellipse about the panel that holds none of them (Trefethen 2013, theorem 19.3)
+and M the largest value of the integrand on it: for a given accuracy a panel may have some width,
+whatever the ray. Two things make M large. Lobes of a high power of 1/(1 + E^2) grow steeply towards
+their poles; their panels are narrower. And the extinction, bounded by 1 where Re E > E0, grows to
 the left of the panel like exp(T t), with t the distance in widths of the panel and
 
     T = a d cosh(v0) (v1 - v0)
 
-the optical depth that the segment would have, if all of it were as dense in v as its beginning. For a pure exponential
-the rule errs by less than T^2n (n!)^4 / ((2n + 1) (2n)!^3) of the first value, 4e-7 for n = 8 and T = 10.5: a panel may
-also have some T. Hence there are
+the optical depth that the segment would have, if all of it were as dense in v as its beginning. For
+a pure exponential the rule errs by less than T^2n (n!)^4 / ((2n + 1) (2n)!^3) of the first value,
+4e-7 for n = 8 and T = 10.5: a panel may also have some T. Hence there are
 
     m = ceil(max((v1 - v0)/w, T/T1))
 
-equal panels. w is the largest width at which the error of the rule is at most 1e-6 of any panel, found for each phase
-function (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_exact.py` tries random rays.
+equal panels. w is the largest width at which the error of the rule is at most 1e-6 of any panel,
+found for each phase function (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_exact.py`
+tries random rays.
 
-**Cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray are
-equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
-panel, with F = E/d and C = sqrt(1 + F^2) there,
+**Cost.** All rays of a packet take part in as many steps as the one that needs most, no more.
+Panels of a ray are equally wide: sinh and cosh of the offsets of the nodes are the same in each,
+and computed once. From the start of a panel, with F = E/d and C = sqrt(1 + F^2) there,
 
     F' - F = F (cosh u - 1) + C sinh u,     C' = C cosh u + F sinh u,
 
-are sums of positive terms, for its nodes and for its end, where the next begins. The extinctions of a coloured medium
-share all but the exponential: the range is that of the smallest, T that of the largest.
+are sums of positive terms, for its nodes and for its end, where the next begins. The extinctions of
+a coloured medium share all but the exponential: the range is that of the smallest, T that of the
+largest.
 
-Against the panels of any medium (`realtime.scene.media.integrate`), which differ by 4e-7 of the brightest pixel, this
-kernel takes half of the time in `open-fog` (26 and 57 ms, unshadowed, 400 x 300), where rays have no end, and a
-twentieth less in `hall` (288 and 303 ms, shadow planes, 800 x 600, 29 November 2026, processor time in turns).
+Against the panels of any medium (`realtime.scene.media.integrate`), which differ by 4e-7 of the
+brightest pixel, this kernel takes half of the time in `open-fog` (26 and 57 ms, unshadowed, 400 x
+300), where rays have no end, and a twentieth less in `hall` (288 and 303 ms, shadow planes, 800 x
+600, 29 November 2026, processor time in turns).
 
-**Segments that are short** compared with their distance from the light have few nodes, in float32. Between the edges of
-shadows most segments are short. Over them the integrand of
+**Segments that are short** compared with their distance from the light have few nodes, in float32.
+Between the edges of shadows most segments are short. Over them the integrand of
 
     J = int_{x0}^{x1} exp(-sigma_t (x + r)) p/r^2 dx,     r^2 = s^2 + h^2,     s = x - foot,
 
-needs no substitution. It has singularities where r vanishes, s = +-i h; the singularities of p are no closer: with E =
-(s + r)/h, dE/ds = E/r, and E is never closer to +-i d, the singularities of a lobe, than to 0. Over a segment of the
-length L all of them are therefore r/L or more lengths away, r being the least distance between segment and light, and
-Gauss's rule converges as fast for every ray with the same r/L (by the theorem above). The exponent changes fastest at
-the end, by sigma_t (1 + s1/r1) a metre.
+needs no substitution. It has singularities where r vanishes, s = +-i h; the singularities of p are
+no closer: with E = (s + r)/h, dE/ds = E/r, and E is never closer to +-i d, the singularities of a
+lobe, than to 0. Over a segment of the length L all of them are therefore r/L or more lengths away,
+r being the least distance between segment and light, and Gauss's rule converges as fast for every
+ray with the same r/L (by the theorem above). The exponent changes fastest at the end, by sigma_t
+(1 + s1/r1) a metre.
 
-A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes leave no more than 1e-6,
-wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot: close to the
-light, x itself lacks the digits.
+A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes leave
+no more than 1e-6, wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places
+s0 + f L, s0 = x0 - foot: close to the light, x itself lacks the digits.
 """
 
 from collections.abc import Callable
@@ -80,7 +89,13 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.numerics.array_types import is_single, smallest
-from airlight.realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
+from airlight.realtime.numerics.functions import (
+    LOG2_E,
+    exp2_bounded,
+    exp_bounded,
+    sinh_bounded,
+    unit_nodes,
+)
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous, optical_reach
@@ -89,9 +104,11 @@ from airlight.realtime.scene.rule_reach import FEW_DEPTH, FEW_NODES, PANEL_DEPTH
 
 
 def is_short(geometry: RayGeometry, x0, x1, extinctions, phase: Phase):
-    """Return whether the rule of few nodes serves segments [x0, x1] [m]; False where a value is not finite.
+    """Return whether the rule of few nodes serves segments [x0, x1] [m]; False
+    where a value is not finite.
 
-    Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
+    Length and depth each spoil part of it: by themselves they may reach their
+    limits, together an ellipse.
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     s1 = s0 + length
@@ -105,7 +122,8 @@ def is_short(geometry: RayGeometry, x0, x1, extinctions, phase: Phase):
 def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions):
     """Return J of short segments for each extinction [1/m].
 
-    `geometry`, `x0`, `x1`: see `realtime.kernels`; `phase`: the phase function; `extinctions`: one or more [1/m].
+    `geometry`, `x0`, `x1`: see `realtime.kernels`; `phase`: the phase function;
+    `extinctions`: one or more [1/m].
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     totals = [type(length)(0) for _ in extinctions]
@@ -119,12 +137,17 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions):
         if not phase.constant:
             value *= phase.evaluate_half(*_half_angle(s, r, inverse, height_squared))
         path = x0 + (step + r)
-        totals = [dr.fma(value, exp_bounded(-sigma_t * path), total) for sigma_t, total in zip(extinctions, totals)]
+        totals = [
+            dr.fma(value, exp_bounded(-sigma_t * path), total)
+            for sigma_t, total in zip(extinctions, totals)
+        ]
     return [total * length for total in totals]
 
 
 def _half_angle(s, r, inverse, height_squared):
-    """Return sin^2 and cos^2 of half the scattering angle, (r +- s)/(2 r), the smaller one without cancellation."""
+    """Return sin^2 and cos^2 of half the scattering angle, (r +- s)/(2 r), the smaller
+    one without cancellation.
+    """
     small = 0.5 * height_squared * inverse * dr.rcp(r + dr.abs(s))
     large = 1 - small
     behind = s > 0
@@ -132,7 +155,8 @@ def _half_angle(s, r, inverse, height_squared):
 
 
 _NODES_DOUBLE, _DEPTH_DOUBLE = 22, 24.0  # of a panel in float64
-MOST_PANELS = 160  #: no segment needs as many, but a loop over values that are not numbers must end too
+#: no segment needs as many, but a loop over values that are not numbers must end too
+MOST_PANELS = 160
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
 DEEPEST = 116.0  #: power of 2 beyond which nothing is left: e^-80
@@ -151,10 +175,10 @@ def panels_mean(
 ):
     """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
-    `phase`: the phase function; `start`: (F, C), sinh and cosh of v0; `scale`: d, see above; `width`: v1 - v0;
-    0 where there is nothing to integrate; `decays`: a = sigma_t h, one or more; `weight`: relative intensity of the
-    light by E, or None where it is 1 everywhere; `nodes`, `most`: of a panel,
-    and T1.
+    `phase`: the phase function; `start`: (F, C), sinh and cosh of v0; `scale`: d, see above;
+    `width`: v1 - v0; 0 where there is nothing to integrate; `decays`: a = sigma_t h, one or more;
+    `weight`: relative intensity of the light by E, or None where it is 1 everywhere; `nodes`,
+    `most`: of a panel, and T1.
 
     Valid for any decay. The values are 0 where e^-80 is.
     """
@@ -164,27 +188,44 @@ def panels_mean(
     count = panel_count(phase, width, largest * scale * c * width / most, soft=weight is not None)
     part_of_all = dr.rcp(dr.maximum(Float(count), 1))
     part = width * part_of_all
-    offsets = [(node_weight, *_offset(part * fraction)) for fraction, node_weight in unit_nodes(nodes)]
+    offsets = [
+        (node_weight, *_offset(part * fraction)) for fraction, node_weight in unit_nodes(nodes)
+    ]
     sinh_end, less_end = _offset(part)
-    # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
+    # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes,
+    # and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
     def panel(index, f, c, depths, totals):
         for node_weight, sinh, less in offsets:
             step = dr.fma(f, less, c * sinh)
-            value = node_weight * phase.density(f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
+            value = node_weight * phase.density(
+                f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale
+            )
             if weight is not None:
                 value *= weight(scale * (f + step))
             kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]
             totals = [dr.fma(value, attenuation, total) for attenuation, total in zip(kept, totals)]
         step = dr.fma(f, less_end, c * sinh_end)
         c = dr.fma(f, sinh_end, dr.fma(c, less_end, c))
-        return index + 1, f + step, c, [dr.fma(rate, step, depth) for rate, depth in zip(rates, depths)], totals
+        return (
+            index + 1,
+            f + step,
+            c,
+            [dr.fma(rate, step, depth) for rate, depth in zip(rates, depths)],
+            totals,
+        )
 
     lanes = dr.zeros(Float, dr.width(width, f, *decays))
     none = [lanes + 0 for _ in decays]
     *_, totals = dr.while_loop(
-        state=(mi.UInt32(0) + dr.zeros(mi.UInt32, dr.width(lanes)), f + lanes, c + lanes, none, [*none]),
+        state=(
+            mi.UInt32(0) + dr.zeros(mi.UInt32, dr.width(lanes)),
+            f + lanes,
+            c + lanes,
+            none,
+            [*none],
+        ),
         cond=lambda index, f, c, depths, totals: index < count,
         body=panel,
         labels=("index", "f", "c", "depths", "totals"),
@@ -197,7 +238,9 @@ def _kept(depth):
 
 
 def panel_count(phase: Phase, width, depths, *, soft: bool = False):
-    """Return the number of panels m of segments of some width in v, and T/T1 [1]; 0 where the width is 0."""
+    """Return the number of panels m of segments of some width in v, and T/T1
+    [1]; 0 where the width is 0.
+    """
     Float = type(width)
     widest = phase.panel_width(Float)
     if soft:
@@ -221,16 +264,16 @@ def _offset(u):
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
-    Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,
-    unbounded ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
-    its ends included, the integral is infinite, and so is the result.
+    Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0)
+    included, any segment, unbounded ones and those of length 0 included, and |g| < 1. Where the ray
+    meets the light (height 0) on the segment, its ends included, the integral is infinite, and so
+    is the result.
 
-    Largest relative error found on the certified cases: see `airlight study integrals`; in float32 below 3e-5 for
-    |g| <= 0.9.
-    A tabulated phase function is integrated across its kinks, which is wrong by up to a quarter of the largest second
-    difference of its values, relative to them: 7e-4 was found with 513 values of "murky", 1.8e-3 with 129. Where a
-    spot's intensity falls off between beam and cut-off, the segment is cut into three; those that are empty cost
-    nothing.
+    Largest relative error found on the certified cases: see `airlight study integrals`; in float32
+    below 3e-5 for |g| <= 0.9. A tabulated phase function is integrated across its kinks, which is
+    wrong by up to a quarter of the largest second difference of its values, relative to them: 7e-4
+    was found with 513 values of "murky", 1.8e-3 with 129. Where a spot's intensity falls off
+    between beam and cut-off, the segment is cut into three; those that are empty cost nothing.
     """
     # The extinctions share their nodes.
     J = medium.colour(_by_extinction(geometry, (x0, x1), medium.sigma_t, medium.phase, light))
@@ -240,9 +283,14 @@ def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
 
 def _by_extinction(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    # Branches hand no derivatives on to what they see from outside. The rule for all segments needs none.
+    # Branches hand no derivatives on to what they see from outside. The rule for
+    # all segments needs none.
     single = is_single(type(geometry.height))
-    if not single or light.varies or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase):
+    if (
+        not single
+        or light.varies
+        or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase)
+    ):
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     return dr.if_stmt(
@@ -254,16 +302,18 @@ def _by_extinction(geometry: RayGeometry, segment, extinctions, phase: Phase, li
 
 
 def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
-    """Return the height [m], E = q/h at both ends of [x0, x1] [m], and their difference without cancellation [1].
+    """Return the height [m], E = q/h at both ends of [x0, x1] [m], and their difference
+    without cancellation [1].
 
-    The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is the E from which on
-    p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends. `sigma_t` is the extinction [1/m]. Valid for any
-    segment.
+    The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is
+    the E from which on p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends. `sigma_t` is
+    the extinction [1/m]. Valid for any segment.
     """
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     single = is_single(Float)
-    # J is even in h, so a height below rounding of the distances is as good as zero, and this one keeps E finite.
+    # J is even in h, so a height below rounding of the distances is as good as zero, and
+    # this one keeps E finite.
     s0, s1 = x0 - foot, x1 - foot
     h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
@@ -288,7 +338,8 @@ def path_over_height(s, r, h):
 def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
     parts = [
-        _subsegment(geometry, a, b, extinctions, phase, light) for a, b in geometry.smooth_subsegments(light, *segment)
+        _subsegment(geometry, a, b, extinctions, phase, light)
+        for a, b in geometry.smooth_subsegments(light, *segment)
     ]
     return [sum(values) for values in zip(*parts)]
 
@@ -302,7 +353,10 @@ def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light:
     weight = falloff_by_path(geometry, light, h)
     means = panels_mean(phase, start, scale, width, decays, weight, nodes=nodes, most=most)
     shared = (width * scale) * (2 / h)
-    return [mean * shared * transmittance_before(geometry, x0, h, sigma_t) for mean, sigma_t in zip(means, extinctions)]
+    return [
+        mean * shared * transmittance_before(geometry, x0, h, sigma_t)
+        for mean, sigma_t in zip(means, extinctions)
+    ]
 
 
 def range_of_v(geometry: RayGeometry, x0, x1, sigma_t, scale=1.0, tail=1.0):
@@ -314,8 +368,14 @@ def range_of_v(geometry: RayGeometry, x0, x1, sigma_t, scale=1.0, tail=1.0):
 
 
 def falloff_by_path(geometry: RayGeometry, light: Light, h):
-    """Return the function of E that gives the relative intensity of a light; None for one that does not vary."""
-    return (lambda e: geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))) if light.varies else None
+    """Return the function of E that gives the relative intensity of a light; None
+    for one that does not vary.
+    """
+    return (
+        (lambda e: geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e))))
+        if light.varies
+        else None
+    )
 
 
 def transmittance_before(geometry: RayGeometry, x0, h, sigma_t):

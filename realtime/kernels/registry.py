@@ -2,16 +2,16 @@
 """Airlight kernels: J between two distances along a ray, for a whole array of rays.
 
 A kernel is a function ``function(geometry, x0, x1, medium, light, **parameters) -> J [1/m]`` in a
-record, `Kernel`, which answers what else media ask of it. `geometry` is a `realtime.rays.RayGeometry`,
-``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the result has one value per
-ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo sigma_t
-intensity J / (4 pi)``. `realtime.scene.media.medium` clips the segment to the cone of a spot before it
-calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs
-its integrand by `RayGeometry.falloff`.
+record, `Kernel`, which answers what else media ask of it. `geometry` is a
+`realtime.rays.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite),
+and the result has one value per ray for a grey medium, a colour for a coloured one. The
+in-scattered radiance is ``albedo sigma_t intensity J / (4 pi)``. `realtime.scene.media.medium`
+clips the segment to the cone of a spot before it calls the kernel; where the intensity falls off
+inside the cone (``light.varies``), the kernel weighs its integrand by `RayGeometry.falloff`.
 
-**Tables.** A frozen function cannot take an array from the host, and reads one on the device only if it is among its
-inputs. A kernel that reads tables has a `prepare`; code that freezes a function passes it the kernel that
-`Kernel.prepared` returns as an input.
+**Tables.** A frozen function cannot take an array from the host, and reads one on the device only
+if it is among its inputs. A kernel that reads tables has a `prepare`; code that freezes a function
+passes it the kernel that `Kernel.prepared` returns as an input.
 
 `KERNELS` is the registry: add a `Kernel` to it and every method, command and report knows it.
 """
@@ -35,10 +35,14 @@ class Kernel:
     function: Callable[..., Any]
     summary: str = ""
     source: str = ""
-    parameters: dict[str, int] = field(default_factory=dict)  #: name -> value; 'name-N' sets the first
-    exact: bool = False  #: right to the precision of the arrays: media may take their best integral in its place
-    in_asinh: bool = False  #: whether its nodes lie in w = asinh(q/h), by which media of any density can integrate
-    #: ``prepare(Float, **parameters) -> tables``, which the function then takes as its keyword `tables`
+    #: name -> value; 'name-N' sets the first
+    parameters: dict[str, int] = field(default_factory=dict)
+    #: right to the precision of the arrays: media may take their best integral in its place
+    exact: bool = False
+    #: whether its nodes lie in w = asinh(q/h), by which media of any density can integrate
+    in_asinh: bool = False
+    #: ``prepare(Float, **parameters) -> tables``, which the function then
+    #: takes as its keyword `tables`
     prepare: Callable[..., Any] | None = None
     tables: Any = None  #: on the device
 
@@ -48,14 +52,19 @@ class Kernel:
         return self.function(*arguments, **self.parameters, **tables)
 
     def prepared(self, Float: type) -> "Kernel":
-        """Return the kernel with its tables, evaluated, in the precision of `Float`, the type of a number per ray.
+        """Return the kernel with its tables, evaluated, in the precision of `Float`, the
+        type of a number per ray.
 
         Raises
         ------
         InputError
             For what the kernel's `prepare` refuses.
         """
-        return self if self.prepare is None else replace(self, tables=self.prepare(Float, **self.parameters))
+        return (
+            self
+            if self.prepare is None
+            else replace(self, tables=self.prepare(Float, **self.parameters))
+        )
 
     @property
     def asinh_nodes(self) -> int | None:

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rules of a fixed size: midpoint steps or Gauss's nodes along the ray, in the angle at the light, or in asinh E.
+"""Rules of a fixed size: midpoint steps or Gauss's nodes along the ray, in the angle at
+the light, or in asinh E.
 
 * `uniform`: J ~ sum_k dx exp(-sigma_t (x_k + r_k)) p / r_k^2.
-* `equiangular` and `quadrature_theta`: with x = foot + h tan theta, dx/r^2 = dtheta/h, so J ~ sum_k w_k/h exp(-sigma_t
-  (x_k + r_k)) p, the papers' form. The peak near the light is gone; the end of an unbounded ray is at theta = pi/2.
+* `equiangular` and `quadrature_theta`: with x = foot + h tan theta, dx/r^2 = dtheta/h, so J ~ sum_k
+  w_k/h exp(-sigma_t (x_k + r_k)) p, the papers' form. The peak near the light is gone; the end of
+  an unbounded ray is at theta = pi/2.
 
-The midpoint rule is of order 2 in the number of steps once these resolve the integrand. Gauss and Legendre's converges
-like a power of it where the segment ends before theta nears pi/2; there exp(-sigma_t h/cos theta) has an essential
-singularity, which `quadrature` avoids: in v = asinh E (`realtime.kernels.exact` with d = 1) no singularity is near the
-real axis, and the integrand decays on its own.
+The midpoint rule is of order 2 in the number of steps once these resolve the integrand. Gauss and
+Legendre's converges like a power of it where the segment ends before theta nears pi/2; there
+exp(-sigma_t h/cos theta) has an essential singularity, which `quadrature` avoids: in v = asinh E
+(`realtime.kernels.exact` with d = 1) no singularity is near the real axis, and the integrand decays
+on its own.
 """
 
 from typing import Any
@@ -27,8 +30,9 @@ from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
 def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 100):
     """Return the airlight integral J by midpoint steps in the distance [1/m].
 
-    Valid where a step is shorter than the distance to the light, everywhere on the ray. An unbounded ray is cut after
-    20 optical depths; through a vacuum it has no step length, and the result means nothing.
+    Valid where a step is shorter than the distance to the light, everywhere on the ray. An
+    unbounded ray is cut after 20 optical depths; through a vacuum it has no step length, and the
+    result means nothing.
     """
     _check("steps", steps)
     thinnest = dr.maximum(medium.least_extinction(), smallest(type(x1)))
@@ -38,16 +42,21 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *,
         r = geometry.distance_to_light(x)
         return _integrand(geometry, medium, light, sigma_t, x, r) / dr.square(r)
 
-    return medium.per_extinction(lambda sigma_t: _midpoints(lambda x: term(sigma_t, x), x0, x1 - x0, steps))
+    return medium.per_extinction(
+        lambda sigma_t: _midpoints(lambda x: term(sigma_t, x), x0, x1 - x0, steps)
+    )
 
 
-def equiangular(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 16):
+def equiangular(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 16
+):
     """Return the airlight integral J by midpoint steps in the angle at the light [1/m].
 
-    Valid for any ray that does not meet the light (height above 0); thick media need many steps, since a few angles
-    hold all the light.
+    Valid for any ray that does not meet the light (height above 0); thick media need many steps,
+    since a few angles hold all the light.
 
-    Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media*, section 4.
+    Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in
+    participating media*, section 4.
     """
     _check("steps", steps)
     theta0 = dr.atan2(x0 - geometry.foot, geometry.height)
@@ -62,11 +71,14 @@ def equiangular(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
     return medium.per_extinction(integral)
 
 
-def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
+def quadrature_theta(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16
+):
     """Return the airlight integral J by Gauss-Legendre quadrature in theta [1/m].
 
-    The range is split at the foot point unless the phase function is isotropic. Valid for rays that do not meet the
-    light (height above 0). The difference of the angles is one arc tangent, so that short segments do not cancel.
+    The range is split at the foot point unless the phase function is isotropic. Valid for rays that
+    do not meet the light (height above 0). The difference of the angles is one arc tangent, so that
+    short segments do not cancel.
     """
     _check("nodes", nodes)
     split = dr.clip(geometry.foot, x0, x1)
@@ -77,8 +89,12 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: 
         foot, h = geometry.foot, geometry.height
         s0, s1 = x0 - foot, dr.select(dr.isinf(x1), 0, x1 - foot)
         begin = dr.atan2(s0, h)
-        width = dr.select(dr.isinf(x1), 0.5 * dr.pi - begin, dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h)))
-        angles = [(dr.fma(width, fraction, begin), weight) for fraction, weight in unit_nodes(nodes)]
+        width = dr.select(
+            dr.isinf(x1), 0.5 * dr.pi - begin, dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h))
+        )
+        angles = [
+            (dr.fma(width, fraction, begin), weight) for fraction, weight in unit_nodes(nodes)
+        ]
         total: Any = type(h)(0)
         for theta, weight in angles:
             total += weight * _at_angle(geometry, medium, light, sigma_t, theta)
@@ -87,15 +103,19 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: 
     return medium.per_extinction(lambda sigma_t: sum(panel(sigma_t, a, b) for a, b in panels))
 
 
-def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
+def quadrature(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16
+):
     """Return the airlight integral J by one Gauss-Legendre rule in v = asinh E, d = 1 [1/m].
 
-    `nodes`: how many. The segment is split at the foot (E = 1), where forward lobes end, unless
-    the phase function is isotropic, and at the cone of the beam where a spot falls off between beam and cut-off.
+    `nodes`: how many. The segment is split at the foot (E = 1), where forward lobes end, unless the
+    phase function is isotropic, and at the cone of the beam where a spot falls off between beam and
+    cut-off.
 
-    Valid for any ray that does not pass through the light, any extinction, vacuum included, and `x1` infinite. With 16
-    nodes and an isotropic phase function the relative error in float32 stays below about 1e-5 for optical depths up to
-    100; sharp phase functions (g above 0.8) need more nodes.
+    Valid for any ray that does not pass through the light, any extinction, vacuum included, and
+    `x1` infinite. With 16 nodes and an isotropic phase function the relative error in float32 stays
+    below about 1e-5 for optical depths up to 100; sharp phase functions (g above 0.8) need more
+    nodes.
     """
     _check("nodes", nodes)
     if not medium.phase.constant and not light.varies:
@@ -119,7 +139,9 @@ def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light,
             total += weight * value * exp_bounded(-sigma_t * h * step)
         return total * width * (2 / h) * transmittance_before(geometry, x0, h, sigma_t)
 
-    return medium.per_extinction(lambda sigma_t: sum(of_segment(sigma_t, a, b) for a, b in segments))
+    return medium.per_extinction(
+        lambda sigma_t: sum(of_segment(sigma_t, a, b) for a, b in segments)
+    )
 
 
 def _check(name: str, count: int) -> None:

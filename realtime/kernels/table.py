@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The published table of the airlight integral.
 
-J as the difference of two reads. With E = q/h (path form of DESIGN section 2), a = sigma_t h and an isotropic phase
-function
+J as the difference of two reads. With E = q/h (path form of DESIGN section 2), a = sigma_t h and an
+isotropic phase function
 
     J = (2/h) exp(-sigma_t foot) int_{E0}^{E1} exp(-a E) / (1 + E^2) dE,
 
@@ -10,14 +10,14 @@ and E = tan xi turns the integral into the difference of two values of
 
     F(u, v) = int_0^v exp(-u tan xi) dxi,      u = a,  v = atan(q/h) = theta/2 + pi/4,
 
-which Sun et al. tabulate over u in [0, 10] and v in [0, pi/2]. The entries follow from the tail of the integral: with
-E = tan v and E' = E + y/cos v,
+which Sun et al. tabulate over u in [0, 10] and v in [0, pi/2]. The entries follow from the tail of
+the integral: with E = tan v and E' = E + y/cos v,
 
     int_E^inf exp(-a E') / (1 + E'^2) dE' = exp(-a E) cos v K(a/cos v, sin v),
     K(alpha, s) = int_0^inf exp(-alpha y) / (1 + 2 s y + y^2) dy.
 
-Reads are bilinear, in software: the texture units of graphics hardware have 8-bit weights. The table holds the four
-corners of each cell side by side, one fetch a read.
+Reads are bilinear, in software: the texture units of graphics hardware have 8-bit weights. The
+table holds the four corners of each cell side by side, one fetch a read.
 """
 
 from functools import lru_cache
@@ -33,7 +33,8 @@ from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous
 
 _LARGEST_U = 10.0  # of Sun's table
-_LARGEST_SIZE = 2048  # 128 MiB in float32 on the device; the quadratures below are good to this size
+# 128 MiB in float32 on the device; the quadratures below are good to this size
+_LARGEST_SIZE = 2048
 
 
 def upload_table(Float, *, size: int = 64):
@@ -41,12 +42,14 @@ def upload_table(Float, *, size: int = 64):
     _check(size)
     if Float is float:
         raise InputError(
-            "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA variant, or another "
+            "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA "
+            "variant, or another "
             "kernel"
         )
     if dr.flag(dr.JitFlag.FreezingScope):
         raise InputError(
-            "kernel table: got a frozen function that records while the table is not on the device; call "
+            "kernel table: got a frozen function that records while the table is not on the "
+            "device; call "
             "Kernel.prepared before, and pass on what it returns"
         )
     records = Float(table_records(size).ravel())
@@ -59,42 +62,52 @@ def _check(size: int) -> None:
         raise InputError(f"size: got {size!r}, expected a whole number from 2 to {_LARGEST_SIZE}")
 
 
-def table(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, size: int = 64, tables=None):
+def table(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, size: int = 64, tables=None
+):
     """Return the airlight integral J as the difference of two reads of a table [1/m].
 
-    `size`: entries along each side, 64 in the paper; `tables`: what `upload_table` returned; None uploads the table for
-    this call alone. Raises InputError for a phase function that is not isotropic, a spot that falls off inside its
-    cone, a size outside [2, 2048], and where a frozen function records that was given no table.
+    `size`: entries along each side, 64 in the paper; `tables`: what `upload_table` returned; None
+    uploads the table for this call alone. Raises InputError for a phase function that is not
+    isotropic, a spot that falls off inside its cone, a size outside [2, 2048], and where a frozen
+    function records that was given no table.
 
-    Valid for x1 infinite, vacuum and segments of zero length (J = 0). Where J is small against the reads (slivers, rays
-    that leave the light behind, thick media) errors grow as much, and small values can become negative.
+    Valid for x1 infinite, vacuum and segments of zero length (J = 0). Where J is small against the
+    reads (slivers, rays that leave the light behind, thick media) errors grow as much, and small
+    values can become negative.
 
-    Within 1 % for 64 entries where the ray passes near the light. sigma_t h > 10 is outside the table and reads its
-    edge, u = 10, as published: the result is then wrong, mostly by orders of magnitude. A ray through the light's line,
-    h = 0, gives NaN: the method divides by h. Where the light lies more than 88 optical depths behind the camera (709
-    in float64) exp(-sigma_t foot) overflows.
+    Within 1 % for 64 entries where the ray passes near the light. sigma_t h > 10 is outside the
+    table and reads its edge, u = 10, as published: the result is then wrong, mostly by orders of
+    magnitude. A ray through the light's line, h = 0, gives NaN: the method divides by h. Where the
+    light lies more than 88 optical depths behind the camera (709 in float64) exp(-sigma_t foot)
+    overflows.
 
-    Sun, Ramamoorthi, Narasimhan, Nayar 2005, *A practical analytic single scattering model for real time rendering*,
-    ACM Transactions on Graphics 24(3).
+    Sun, Ramamoorthi, Narasimhan, Nayar 2005, *A practical analytic single scattering model for real
+    time rendering*, ACM Transactions on Graphics 24(3).
     """
     _check(size)
     if not medium.phase.constant:
         raise InputError(
-            f"kernel table: phase function {medium.phase.name!r} is not tabulated; use the kernel 'quadrature' or an "
+            f"kernel table: phase function {medium.phase.name!r} is not tabulated; use the kernel "
+            "'quadrature' or an "
             "isotropic medium"
         )
     if light.varies:
         raise InputError(
-            "kernel table: a spot that falls off between beam and cut-off, or an area light, is not tabulated; "
+            "kernel table: a spot that falls off between beam and cut-off, or an area light, is "
+            "not tabulated; "
             "use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     if dr.grad_enabled((geometry.foot, geometry.height, x0, x1), medium.sigma_t):
         raise InputError(
-            "kernel table: what is read between entries of a table has no derivative worth the name; use the kernel "
+            "kernel table: what is read between entries of a table has no derivative worth the "
+            "name; use the kernel "
             "'exact'"
         )
     records = upload_table(type(geometry.height), size=size) if tables is None else tables
-    return medium.per_extinction(lambda sigma_t: _difference(geometry, (x0, x1), sigma_t, records, size))
+    return medium.per_extinction(
+        lambda sigma_t: _difference(geometry, (x0, x1), sigma_t, records, size)
+    )
 
 
 def _difference(geometry: RayGeometry, ends, sigma_t, records, size: int):
@@ -129,7 +142,9 @@ def table_records(size: int):
 
 
 def _values(u, v):
-    """Return F(u, v) = K(u, 0) - exp(-u tan v) cos v K(u / cos v, sin v), shape (len(u), len(v))."""
+    """Return F(u, v) = K(u, 0) - exp(-u tan v) cos v K(u / cos v, sin
+    v), shape (len(u), len(v)).
+    """
     whole = _tail_integral(u, 0.0)
     columns = [np.zeros_like(u)]
     for angle in v[1:-1]:
@@ -140,8 +155,9 @@ def _values(u, v):
 
 
 def _tail_integral(alpha, s: float):
-    """K(alpha, s) by the trapezoidal rule in log y, whose integrand decays like exp(-|log y|) and has no pole within
-    pi/2 of the real axis: with steps of 1/4 the error is exp(-4 pi^2), below rounding.
+    """K(alpha, s) by the trapezoidal rule in log y, whose integrand decays like exp(-|log y|) and
+    has no pole within pi/2 of the real axis: with steps of 1/4 the error is exp(-4 pi^2), below
+    rounding.
     """
     y = np.exp(0.25 * np.arange(-160, 161))
     return np.exp(-np.multiply.outer(alpha, y)) @ (0.25 * y / (1 + 2 * s * y + y * y))

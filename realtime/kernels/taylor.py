@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The polynomial kernel of Biri, Arques and Michelin 2006 (section 4.1), with coefficients re-derived.
+"""The polynomial kernel of Biri, Arques and Michelin 2006 (section 4.1), with
+coefficients re-derived.
 
 In the angle form of DESIGN section 2 the integrand is
 
@@ -11,33 +12,35 @@ Its Taylor series about theta = 0, cut after degree N, is integrated term by ter
 
 The coefficients follow from three recurrences, for any degree:
 
-* g = (1 + sin)/cos = sec + tan solves 2 g' = 1 + g^2, hence (n + 1) g_{n+1} = (delta_{n0} + sum_k g_k g_{n-k})/2, g_0 =
-  1.
-* e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The factor e^-a is left
-  out.
+* g = (1 + sin)/cos = sec + tan solves 2 g' = 1 + g^2, hence (n + 1) g_{n+1} = (delta_{n0} + sum_k
+  g_k g_{n-k})/2, g_0 = 1.
+* e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The
+  factor e^-a is left out.
 * c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `realtime.scene.phase`.
 
-The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 - theta0 as one arc
-tangent, so that short segments and rays that pass the light do not cancel.
+The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 -
+theta0 as one arc tangent, so that short segments and rays that pass the light do not cancel.
 
-**As printed.** The paper's annex, misprints included, so that the paper's own error can be shown. The factor e^-a is
-left out, and an asterisk stands where the printed term is not the derived one (DESIGN section 3):
+**As printed.** The paper's annex, misprints included, so that the paper's own error can be shown.
+The factor e^-a is left out, and an asterisk stands where the printed term is not the derived one
+(DESIGN section 3):
 
     isotropic   1;   -a;   a^2 - a *;   -a^3/6 + a^2/2 - a *;   a^4/24 - a^3/4 + 11 a^2/24 - 5 a/24
     Rayleigh    3/4;   -3a/4;   3a^2/8 + 3/4 *
     hazy        265/256;   -265a/256 + 9/36 *;   265a^2/256 - 121a/512 + 63/64 *
     murky       n/2^31;   +n a/2^31 - 25/367108864 *;   n a^2/2^32 - 2147482073 a/2^32 + 775/134217728
 
-where n = 2147483673. Derived, the six starred terms are (a^2 - a)/2; -a^3/6 + a^2/2 - a/3; 3a^2/8 - 3a/8 + 3/4;
--265a/256 - 9/32; 265a^2/512 - 121a/512 + 63/64; -n a/2^31 - 25/67108864. The text at hand comes from scanned pages: a
-wrong digit may be the scan's.
+where n = 2147483673. Derived, the six starred terms are (a^2 - a)/2; -a^3/6 + a^2/2 - a/3; 3a^2/8 -
+3a/8 + 3/4; -265a/256 - 9/32; 265a^2/512 - 121a/512 + 63/64; -n a/2^31 - 25/67108864. The text at
+hand comes from scanned pages: a wrong digit may be the scan's.
 
 Two choices let it be compared with other kernels:
 
-* The printed hazy and murky functions, 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2 and 83/33 over the
-  sphere: all their coefficients are divided by these.
-* For all but the isotropic function the annex ends with "..." after c_2. The missing c_3 and c_4 are the derived ones,
-  so that whatever differs from the derived polynomial of the same degree is the print's.
+* The printed hazy and murky functions, 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means
+  2 and 83/33 over the sphere: all their coefficients are divided by these.
+* For all but the isotropic function the annex ends with "..." after c_2. The missing c_3 and c_4
+  are the derived ones, so that whatever differs from the derived polynomial of the same degree is
+  the print's.
 """
 
 import drjit as dr
@@ -57,28 +60,34 @@ HIGHEST_DEGREE = 4
 def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
-    `degree`: of the polynomial, 4 in the paper. Raises InputError for a phase function that has no series, and for a
-    degree below 0.
+    `degree`: of the polynomial, 4 in the paper. Raises InputError for a phase function that has no
+    series, and for a degree below 0.
 
-    Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
-    sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
+    Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from
+    the foot or where sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That
+    is the published method's own limit.
     """
     return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=False)
 
 
-def taylor_printed(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4):
-    """Return J by the polynomial with the coefficients of the paper's annex, misprints included [1/m].
+def taylor_printed(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4
+):
+    """Return J by the polynomial with the coefficients of the paper's annex,
+    misprints included [1/m].
 
-    `degree`: at most 4; with 2 every coefficient is a printed one. Raises InputError for a phase function that the
-    annex does not have, and for a degree beyond.
+    `degree`: at most 4; with 2 every coefficient is a printed one. Raises InputError for a phase
+    function that the annex does not have, and for a degree beyond.
 
-    Valid nowhere in particular: even near the foot the error is of first order in theta (hazy, murky) or of second
-    (isotropic, Rayleigh).
+    Valid nowhere in particular: even near the foot the error is of first order in theta (hazy,
+    murky) or of second (isotropic, Rayleigh).
     """
     return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=True)
 
 
-def _by_extinction(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int, printed: bool):
+def _by_extinction(
+    geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int, printed: bool
+):
     h = geometry.height
 
     def integral(sigma_t):
@@ -91,16 +100,22 @@ def _by_extinction(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Li
 
 
 def coefficients_of(a, phase: Phase, degree: int, *, printed: bool) -> list:
-    """Return c_0 to c_N without e^-a; as printed, those that the annex does not have are the derived ones."""
+    """Return c_0 to c_N without e^-a; as printed, those that the annex does not
+    have are the derived ones.
+    """
     check_degree(degree)
     name = phase.name
     if printed and name not in PRINTED_PHASES:
         raise InputError(
-            f"kernel taylor-printed: the paper prints no coefficients for the phase function {name!r}; use the kernel "
+            "kernel taylor-printed: the paper prints no coefficients for the phase function "
+            f"{name!r}; use the kernel "
             f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
         )
     if printed and degree > HIGHEST_DEGREE:
-        raise InputError(f"degree: got {degree}, expected 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
+        raise InputError(
+            f"degree: got {degree}, expected 0 to {HIGHEST_DEGREE}; for more use the kernel "
+            "'taylor'"
+        )
     series = phase_series(phase, degree, "taylor-printed" if printed else "taylor")
     derived = series_product(_extinction_series(a, degree), series, degree)
     if not printed:
@@ -110,10 +125,11 @@ def coefficients_of(a, phase: Phase, degree: int, *, printed: bool) -> list:
 
 
 def printed_coefficients(a, name: str) -> list:
-    """Return the printed coefficients of theta^0, theta^1, ..., without e^-a, over the phase function's mean [1].
+    """Return the printed coefficients of theta^0, theta^1, ..., without e^-a, over the
+    phase function's mean [1].
 
-    `a`: sigma_t h [1], a number or an array of any kind; `name`: 'isotropic' (five coefficients), 'rayleigh', 'hazy' or
-    'murky' (three).
+    `a`: sigma_t h [1], a number or an array of any kind; `name`: 'isotropic' (five coefficients),
+    'rayleigh', 'hazy' or 'murky' (three).
     """
     unit = 0 * a + 1
     if name == "isotropic":
@@ -170,7 +186,9 @@ def _integrated(geometry: RayGeometry, ends, angles, coefficients):
 
 
 def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
-    """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int I(theta) theta^n dtheta."""
+    """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int
+    I(theta) theta^n dtheta.
+    """
     theta0, theta1 = angles
     half, middle = 0.5 * (theta1 - theta0), 0.5 * (theta1 + theta0)
     total = type(half)(0)
@@ -179,7 +197,11 @@ def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
         value = coefficients[-1]
         for c in reversed(coefficients[:-1]):
             value = dr.fma(value, theta, c)
-        total += float(weight) * value * geometry.falloff(light, geometry.foot + geometry.height * dr.tan(theta))
+        total += (
+            float(weight)
+            * value
+            * geometry.falloff(light, geometry.foot + geometry.height * dr.tan(theta))
+        )
     return total * half
 
 
@@ -194,12 +216,17 @@ def _extinction_series(a, degree: int):
 
 
 def phase_series(phase: Phase, degree: int, kernel: str):
-    """Return the coefficients of p(-sin theta) in powers of theta; refuse a phase function without them."""
+    """Return the coefficients of p(-sin theta) in powers of theta; refuse a
+    phase function without them.
+    """
     series = phase.series(degree)
     if series is None:
-        known = ", ".join(candidate.name for candidate in PHASES if candidate.series is not Phase.series)
+        known = ", ".join(
+            candidate.name for candidate in PHASES if candidate.series is not Phase.series
+        )
         raise InputError(
-            f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel 'quadrature' or one "
+            f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel "
+            "'quadrature' or one "
             f"of {known}"
         )
     return series

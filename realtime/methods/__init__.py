@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The methods under test, each a class with its parameters, and a user's own.
 
-A method answers one question: which radiance do the lit media scatter into each camera ray? `unshadowed` and
-`ray_march` are one file each; what needs more has a folder, and none of these imports another.
+A method answers one question: which radiance do the lit media scatter into each camera ray?
+`unshadowed` and `ray_march` are one file each; what needs more has a folder, and none of these
+imports another.
 
 Read in this order:
 
@@ -15,5 +16,6 @@ Read in this order:
 - `registry.py`: the methods by name, and how a name becomes a method.
 - `published/`: methods as their papers have them, with their errors.
 - `shader/`: a user's shader, drawn by OpenGL in a separate process.
-- `user_method.py`: a user's plain function or class, made a method with its errors named and its results checked.
+- `user_method.py`: a user's plain function or class, made a method with its errors named
+  and its results checked.
 """

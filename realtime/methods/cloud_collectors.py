@@ -1,28 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Clouds by collectors: light scattered many times, without a walk through the volume (Bouthors 2008).
+r"""Clouds by collectors: light scattered many times, without a walk through
+the volume (Bouthors 2008).
 
-Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the eye. Single
-scattering is integrated along the ray. The light of each set of orders from 2 on is the canonical transport from the
-collector that `realtime.clouds.collector_search` finds for it. Each sun has its own maps and searches. A uniform sky
-has no direction and needs no search (`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines
-from above (`Light.sky`), as the paper does. The ray dims the surface behind the clouds by its transmittance.
+Where a camera ray meets a cloud, or at the camera if that is within one, light leaves towards the
+eye. Single scattering is integrated along the ray. The light of each set of orders from 2 on is the
+canonical transport from the collector that `realtime.clouds.collector_search` finds for it. Each
+sun has its own maps and searches. A uniform sky has no direction and needs no search
+(`realtime.clouds.uniform_sky`); `sky=beams` makes it one more sun, which shines from above
+(`Light.sky`), as the paper does. The ray dims the surface behind the clouds by its transmittance.
 
-Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order 1 along the ray,
-for the others at the collector, over whose width the shade of other clouds is a mean.
+Other clouds dim the light of all orders on its way to a cloud, and opaque shapes hide it: for order
+1 along the ray, for the others at the collector, over whose width the shade of other clouds is a
+mean.
 
-The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
-way: with f the fraction of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a
-f); single scattering has P/(1 - a f) with that density (TMS), so that nothing is counted twice. `peak=matched` takes
-the f of the phase function, `full` cuts nothing: only then the sets hold the orders of the medium as it is.
+The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the
+peak hardly leaves its way: with f the fraction of the peak and a the albedo, the density is (1 - a
+f) sigma_t and the albedo a (1 - f)/(1 - a f); single scattering has P/(1 - a f) with that density
+(TMS), so that nothing is counted twice. `peak=matched` takes the f of the phase function, `full`
+cuts nothing: only then the sets hold the orders of the medium as it is.
 
-For each cloud, a ray shows the light that leaves at its first entry; if the ray enters the same cloud again, the slab
-of the first entry stands for both.
+For each cloud, a ray shows the light that leaves at its first entry; if the ray enters the same
+cloud again, the slab of the first entry stands for both.
 
 References
 ----------
-Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic scattering in clouds*. Nakajima, Tanaka
-1988, *Algorithms for radiative intensity calculations in moderately thick atmospheres using a truncation approximation*
-(TMS).
+Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic scattering in
+clouds*. Nakajima, Tanaka 1988, *Algorithms for radiative intensity calculations in moderately thick
+atmospheres using a truncation approximation* (TMS).
 """
 
 from collections.abc import Callable, Sequence
@@ -34,9 +38,20 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
+from airlight.realtime.clouds.canonical.coordinates import (
+    OPACITY,
+    ORDER_LAYERS,
+    SETS,
+    fraction_of_peak,
+    slab_phase,
+)
 from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
-from airlight.realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
+from airlight.realtime.clouds.collector_search import (
+    Collector,
+    OrdersLight,
+    Search,
+    light_of_orders,
+)
 from airlight.realtime.clouds.density_maps import (
     LightDepths,
     dense_surface,
@@ -52,7 +67,12 @@ from airlight.realtime.clouds.light_maps import (
     maps_memory,
     shade,
 )
-from airlight.realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
+from airlight.realtime.clouds.march import (
+    CloudSurfaces,
+    cloud_surfaces,
+    segment_by_lengths,
+    segment_through,
+)
 from airlight.realtime.clouds.single_scattering import (
     Beam,
     CloudRays,
@@ -103,18 +123,24 @@ class CloudCollectors(Method):
     )
     sky: str = parameter(
         "uniform",
-        "the light of a sky, the same from everywhere, or a beam from above of pi times its radiance, as printed",
+        "the light of a sky, the same from everywhere, or a beam from above of pi times its "
+        "radiance, as printed",
         choices=("uniform", "beams"),
     )
     steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
     threshold: float = parameter(
         0.5,
-        "density, as a fraction of the largest, from which on a cloud with a grid of densities has its surface",
+        "density, as a fraction of the largest, from which on a cloud with a grid of densities has "
+        "its surface",
         above=0,
         below=1,
     )
     stride: float = parameter(
-        1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
+        1.0,
+        "longest step through a grid of densities where a ray enters",
+        above=0,
+        most=100,
+        unit="voxels",
     )
     map: int = map_size(256, "texels on a side of the maps of a sun")
 
@@ -127,8 +153,12 @@ class CloudCollectors(Method):
         """Return the fraction of the light of a phase function that is cut from its peak [1]."""
         return fraction_of_peak(phase, types) if self.peak == "matched" else 0.0
 
-    def light_once(self, rays: CloudRays, beams: Sequence[Beam], stride: Any) -> tuple[tuple[Any, ...], ...]:
-        """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)]."""
+    def light_once(
+        self, rays: CloudRays, beams: Sequence[Beam], stride: Any
+    ) -> tuple[tuple[Any, ...], ...]:
+        """Return the radiance that clouds scatter once into rays, by beam and
+        octave, RGB [W/(m^2 sr)].
+        """
         return light_once(rays, beams, steps=self.steps, stride=stride)
 
     def opacity_along(self, rays: CloudRays, stride: Any) -> Any:
@@ -141,7 +171,8 @@ class CloudCollectors(Method):
         return self.start == "previous"
 
     def preparation(self, scene):
-        """Return a function that makes the light maps of a frame; grids and boundaries are made here, once.
+        """Return a function that makes the light maps of a frame; grids and
+        boundaries are made here, once.
 
         Raises InputError if the maps need more memory than the machine has.
         """
@@ -161,7 +192,8 @@ class Filling:
     """A phase function and an albedo that occur in clouds, and the canonical transport of both."""
 
     transport: Any
-    clouds: tuple[Any, ...]  #: by channel, 1 for each cloud that is filled with it, otherwise 0; None if none is
+    #: by channel, 1 for each cloud that is filled with it, otherwise 0; None if none is
+    clouds: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -171,11 +203,14 @@ class CloudState:
     surfaces: CloudSurfaces
     maps: tuple[LightMap | None, ...]  #: by light, None for a sky that is no beam
     fillings: tuple[Filling, ...]
-    left: tuple[Any, ...]  #: by channel, what is left of the extinction of each cloud without the peak [1]
+    #: by channel, what is left of the extinction of each cloud without the peak [1]
+    left: tuple[Any, ...]
     stride: Any  #: longest step through a grid of densities [voxels]
     threshold: Any  #: density at the surface of a cloud with a grid [1]
-    depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by sun and cloud, where clouds have densities
-    body: Any = None  #: by cloud the mean density above the threshold [1]; None where none has densities
+    #: by sun and cloud, where clouds have densities
+    depths: tuple[tuple[LightDepths, ...], ...] = ()
+    #: by cloud the mean density above the threshold [1]; None where none has densities
+    body: Any = None
     escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
 
 
@@ -196,13 +231,19 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
     of_each = maps_memory(Float, parameters.map) + (depths_memory(Float) if density else 0)
     needed = len(suns) * clouds * of_each
     check_memory(
-        f"map: {parameters.map} texels for {len(suns)} sun(s) and {clouds} cloud(s)", needed, "use a smaller map"
+        f"map: {parameters.map} texels for {len(suns)} sun(s) and {clouds} cloud(s)",
+        needed,
+        "use a smaller map",
     )
     fillings, left = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
     bodies = [scene_of((shape,)) for shape in scene.boundaries]
-    stride, threshold = (dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold))
-    cast = Frozen(lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights))
+    stride, threshold = (
+        dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold)
+    )
+    cast = Frozen(
+        lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights)
+    )
     escapes = sky_escapes(scene) if len(suns) < len(scene.lights) else None
 
     def state(scene: Scene) -> CloudState:
@@ -219,7 +260,12 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
             filtered_map(
                 [
                     lit_dense_surface(
-                        surfaces, filled, light, parameters.map, cloud=dr.opaque(mi.UInt32, cloud), **settings
+                        surfaces,
+                        filled,
+                        light,
+                        parameters.map,
+                        cloud=dr.opaque(mi.UInt32, cloud),
+                        **settings,
                     )
                     for cloud in range(clouds)
                 ],
@@ -236,7 +282,9 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
     return state
 
 
-def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
+def _fillings(
+    scene: Scene, parameters: CloudCollectors
+) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
     """Return the fillings of clouds, each phase function and albedo once, and `CloudState.left`."""
     clouds = scene.medium.clouds
     assert clouds is not None
@@ -246,7 +294,9 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
     grey = len(clouds.sigma_t) == 1 and np.all(albedos == albedos[0])
     albedos = albedos[:1] if grey else albedos
     fillings, left = [], np.ones_like(albedos)
-    for phase, albedo in sorted({(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}):
+    for phase, albedo in sorted(
+        {(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}
+    ):
         known = clouds.phases[phase]
         fraction = parameters.cut(known, types)
         filled = (phases == phase) & (albedos == albedo)
@@ -267,17 +317,25 @@ def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> La
     """Return the light of clouds along every ray [W/(m^2 sr)]."""
     Color = type(view.medium.albedo)
     rays, thin_rays = _rays(view, state)
-    by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
+    by_set, kept = (
+        [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)],
+        [],
+    )
     entry = _entry(view, state, rays)
     suns = _suns(view, parameters)
     for number, sun in enumerate(suns):
         last = view.carried[number] if view.carried is not None else None
         orders = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
-        by_set[1:] = [sum_ + view.lights[sun].intensity * part for sum_, part in zip(by_set[1:], orders.by_set)]
+        by_set[1:] = [
+            sum_ + view.lights[sun].intensity * part
+            for sum_, part in zip(by_set[1:], orders.by_set)
+        ]
         kept.append(orders.collectors)
     for number, light in enumerate(view.lights):
         if state.escapes is not None and number not in suns:
-            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            of_sky = sky_light(
+                state.escapes, light, rays, view.visible if view.features.shadows else None
+            )
             by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
     opacity = parameters.opacity_along(rays, state.stride)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
@@ -292,12 +350,16 @@ def _suns(view: View, parameters: CloudCollectors) -> list[int]:
 
 
 def _rays(view: View, state: CloudState) -> tuple[CloudRays, CloudRays]:
-    """Return camera rays through clouds as dense as they are, and through those without the peak."""
+    """Return camera rays through clouds as dense as they are, and
+    through those without the peak.
+    """
     assert view.medium.clouds is not None
     clouds = view.medium.clouds
     thin = _without_peak(clouds, state)
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
-    rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance, stride=state.stride)
+    rays = cloud_rays(
+        state.surfaces, both, view.origin, view.direction, view.distance, stride=state.stride
+    )
     channels = len(clouds.sigma_t)
     thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
     return replace(rays, clouds=clouds, depths=rays.depths[:channels]), thin_rays
@@ -318,26 +380,34 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
             stride=state.stride,
         )
         there = dr.isfinite(met.distance)
-        return _Entry(view.origin + view.direction * dr.select(there, met.distance, 0), met.cloud, there)
+        return _Entry(
+            view.origin + view.direction * dr.select(there, met.distance, 0), met.cloud, there
+        )
     first = rays.first
     begin = dr.select(first.leaves, 0, first.distance)
     there = dr.isfinite(begin) & (begin < view.distance)
     return _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
 
 
-def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CloudCollectors) -> Any:
+def _scattered_once(
+    view: View, state: CloudState, thin_rays: CloudRays, parameters: CloudCollectors
+) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
     beams = [_beam(view, state, thin_rays.clouds, number) for number in _suns(view, parameters)]
     once = parameters.light_once(thin_rays, beams, state.stride)
     return sum((radiance for (radiance,) in once), type(view.medium.albedo)(0))
 
 
-def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: Any, opacity: Any) -> Layers:
+def _with_opacity(
+    view: View, state: CloudState, rays: CloudRays, in_scattered: Any, opacity: Any
+) -> Layers:
     """Return layers with what is seen behind clouds."""
     return Layers(
         in_scattered,
         tuple(
-            light_on_surfaces(rays, segment_through(state.surfaces, rays.clouds, light, stride=state.stride))
+            light_on_surfaces(
+                rays, segment_through(state.surfaces, rays.clouds, light, stride=state.stride)
+            )
             for light in view.lights
         ),
         1 - opacity,
@@ -346,9 +416,13 @@ def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: 
 
 
 def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
-    """Return clouds without the peak of their phase functions, which scatter once as much as those with it (TMS)."""
+    """Return clouds without the peak of their phase functions, which scatter once as
+    much as those with it (TMS).
+    """
     channels = range(len(state.left))
-    sigma_t = tuple(clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.left[c] for c in channels)
+    sigma_t = tuple(
+        clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.left[c] for c in channels
+    )
     albedo = [value / state.left[min(c, channels[-1])] for c, value in enumerate(clouds.albedo)]
     return replace(clouds, sigma_t=sigma_t, albedo=type(clouds.albedo)(*albedo))
 
@@ -365,21 +439,37 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int) -> Beam:
     segment = segment_by_lengths(clouds, lengths)
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     cosine = -dr.dot(view.direction, light.axis)
-    return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), segment, lit)
+    return Beam(
+        light.intensity,
+        (Float(1),),
+        (tuple(phase.evaluate(cosine) for phase in clouds.phases),),
+        segment,
+        lit,
+    )
 
 
 def _many_times(
-    view: View, state: CloudState, rays: CloudRays, entry: _Entry, sun: int, *, last: Any, parameters: Any
+    view: View,
+    state: CloudState,
+    rays: CloudRays,
+    entry: _Entry,
+    sun: int,
+    *,
+    last: Any,
+    parameters: Any,
 ) -> OrdersLight:
-    """Return the light of the sun of a number that was scattered twice and more, for unit irradiance [1/sr].
+    """Return the light of the sun of a number that was scattered twice and more,
+    for unit irradiance [1/sr].
 
-    Its sets are colours; `collectors` are by channel and filling what the next frame takes as `last`.
+    Its sets are colours; `collectors` are by channel and filling what the
+    next frame takes as `last`.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(
         parameters.iterations,
         parameters.along_light,
-        # Where a density stays below the threshold the map has no cloud, but light passes there, too.
+        # Where a density stays below the threshold the map has no cloud, but
+        # light passes there, too.
         covered=state.body is None,
     )
     of_sun = state.maps[sun]
@@ -409,8 +499,13 @@ def _many_times(
                 last=None if last is None else last[channel][len(of_channel)],
                 active=filled,
             )
-            lit = [_reaching(view, of_sun, own, entry, sun, collector) for collector in light.collectors]
-            of_fillings.append(tuple(radiance * fraction for radiance, fraction in zip(light.by_set, lit)))
+            lit = [
+                _reaching(view, of_sun, own, entry, sun, collector)
+                for collector in light.collectors
+            ]
+            of_fillings.append(
+                tuple(radiance * fraction for radiance, fraction in zip(light.by_set, lit))
+            )
             of_channel.append(light.collectors)
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
@@ -418,8 +513,11 @@ def _many_times(
     return OrdersLight(by_set, tuple(kept))
 
 
-def _reaching(view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector) -> Any:
-    """Return the fraction of a sun's light that other clouds and opaque shapes leave to a collector [1].
+def _reaching(
+    view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector
+) -> Any:
+    """Return the fraction of a sun's light that other clouds and opaque shapes
+    leave to a collector [1].
 
     `sigma_t` is the extinction of each cloud, one channel [1/m].
     """

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Octaves: multiple scattering as single scattering with less and less extinction, as in game engines.
+r"""Octaves: multiple scattering as single scattering with less and less
+extinction, as in game engines.
 
-Light that was scattered more often arrives with less extinction and from more directions. Octave n is therefore single
-scattering with the optical depth of the shadow segment times a^n, the radiance times b^n, and the mean cosine of the
-phase function times c^n:
+Light that was scattered more often arrives with less extinction and from more directions. Octave n
+is therefore single scattering with the optical depth of the shadow segment times a^n, the radiance
+times b^n, and the mean cosine of the phase function times c^n:
 
     L = sum_{n < N} b^n w E/(4 pi) int kappa P_n(cos) exp(-tau(x) - a^n l(x)) dx.
 
-Wrenninge 2013 halves all three with every octave; Hillaire 2016 leaves a, b and c to the artist and asks for b <= a, so
-that no octave creates light. Octave 0 is single scattering with the phase function of the scene; the others use the
-Henyey-Greenstein function with c^n times the mean cosine of the scene's. Errors by order of scattering count octave n
-as the order n + 1, which it stands for.
+Wrenninge 2013 halves all three with every octave; Hillaire 2016 leaves a, b and c to the artist and
+asks for b <= a, so that no octave creates light. Octave 0 is single scattering with the phase
+function of the scene; the others use the Henyey-Greenstein function with c^n times the mean cosine
+of the scene's. Errors by order of scattering count octave n as the order n + 1, which it stands
+for.
 """
 
 import math
@@ -23,7 +25,12 @@ import numpy as np
 
 from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
 from airlight.realtime.clouds.density_maps import LightDepths, sun_depths
-from airlight.realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
+from airlight.realtime.clouds.march import (
+    CloudSurfaces,
+    cloud_surfaces,
+    segment_by_lengths,
+    segment_through,
+)
 from airlight.realtime.clouds.single_scattering import (
     Beam,
     cloud_rays,
@@ -50,20 +57,30 @@ def _check_phase(words: Any) -> None:
         values = [float(cell) for cell in cells]
     except ValueError:
         values = [math.nan]
-    if len(values) > numbers.get(name, -1) or (name == "hg" and not values) or not all(map(math.isfinite, values)):
-        raise InputError(f"phase: got {words!r}, expected scene, isotropic, hg:G or hg-draine:DIAMETER [um]")
+    if (
+        len(values) > numbers.get(name, -1)
+        or (name == "hg" and not values)
+        or not all(map(math.isfinite, values))
+    ):
+        raise InputError(
+            f"phase: got {words!r}, expected scene, isotropic, hg:G or hg-draine:DIAMETER [um]"
+        )
     if name == "hg" and not -1 < values[0] < 1:
-        raise InputError(f"phase: got {words!r}, expected a mean cosine between -1 and 1, such as hg:0.85")
+        raise InputError(
+            f"phase: got {words!r}, expected a mean cosine between -1 and 1, such as hg:0.85"
+        )
 
 
 @dataclass(frozen=True)
 class CloudOctaves(Method):
-    """The light of clouds by octaves, their opacity, and how much they attenuate the light on surfaces.
+    """The light of clouds by octaves, their opacity, and how much they
+    attenuate the light on surfaces.
 
     References
     ----------
-    Wrenninge, Kulla, Lundqvist 2013, *Oz: the great and volumetric*, SIGGRAPH talks. Hillaire 2016, *Physically based
-    sky, atmosphere and cloud rendering in Frostbite*, SIGGRAPH course, section 5.6.
+    Wrenninge, Kulla, Lundqvist 2013, *Oz: the great and volumetric*, SIGGRAPH talks. Hillaire 2016,
+    *Physically based sky, atmosphere and cloud rendering in Frostbite*, SIGGRAPH course, section
+    5.6.
     """
 
     name = "cloud-octaves"
@@ -75,8 +92,12 @@ class CloudOctaves(Method):
     casts_rays = True
     provides_visibility = True
 
-    octaves: int = parameter(8, "number of octaves; each multiplies the last by a, b and c", least=1, most=31)
-    extinction: float = parameter(0.5, "a: factor on the optical depth to the light", above=0, most=1)
+    octaves: int = parameter(
+        8, "number of octaves; each multiplies the last by a, b and c", least=1, most=31
+    )
+    extinction: float = parameter(
+        0.5, "a: factor on the optical depth to the light", above=0, most=1
+    )
     contribution: float = parameter(0.5, "b: factor on the radiance", above=0, most=1)
     anisotropy: float = parameter(0.5, "c: factor on the mean cosine", least=0, most=1)
     phase: str = parameter(
@@ -87,11 +108,16 @@ class CloudOctaves(Method):
     )
     steps: int = parameter(32, "steps of every ray", least=1)
     stride: float = parameter(
-        1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
+        1.0,
+        "longest step through a grid of densities where a ray enters",
+        above=0,
+        most=100,
+        unit="voxels",
     )
     sky: str = parameter(
         "uniform",
-        "the light of a sky, the same from everywhere, or octaves of a beam from above of pi times its radiance",
+        "the light of a sky, the same from everywhere, or octaves of a beam from above of pi times "
+        "its radiance",
         choices=("uniform", "beams"),
     )
 
@@ -114,7 +140,8 @@ class OctaveState:
     anisotropy: Any
     means: Any  #: by phase function of the clouds, its mean cosine [1]
     stride: Any  #: longest step through a grid of densities [voxels]
-    depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by light and cloud, where clouds have densities
+    #: by light and cloud, where clouds have densities
+    depths: tuple[tuple[LightDepths, ...], ...] = ()
     escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
 
 
@@ -139,7 +166,9 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
         return lambda now: state
 
     def with_depths(now: Scene) -> OctaveState:
-        return replace(state, depths=sun_depths(state.surfaces, clouds, now.lights, stride=state.stride))
+        return replace(
+            state, depths=sun_depths(state.surfaces, clouds, now.lights, stride=state.stride)
+        )
 
     return with_depths
 
@@ -149,7 +178,9 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     clouds, surfaces = view.medium.clouds, state.surfaces
     assert clouds is not None
     Color = type(clouds.albedo)
-    rays = cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride)
+    rays = cloud_rays(
+        surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride
+    )
     suns = beams_of(view.lights, parameters.sky, clouds)
     beams = [_beam(view, state, number, parameters) for number in suns]
     by_light = light_once(rays, beams, steps=parameters.steps, stride=state.stride)
@@ -161,7 +192,9 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     parts = [(order_layer(octave + 1), radiance) for octave, radiance in enumerate(amounts)]
     for number, light in enumerate(view.lights):
         if state.escapes is not None and number not in suns:
-            of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
+            of_sky = sky_light(
+                state.escapes, light, rays, view.visible if view.features.shadows else None
+            )
             parts += zip(ORDER_LAYERS, of_sky)
     opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
@@ -185,7 +218,9 @@ def mean_cosine(phase: Phase, Float: Any) -> float:
     """Return the mean cosine of a phase function [1]; `Float` is the type of its arrays."""
     root = (np.arange(_ANGLES) + 0.5) / _ANGLES
     angle = np.pi * root**2
-    fraction = np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
+    fraction = (
+        np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
+    )
     return float(fraction @ np.cos(angle) / fraction.sum())
 
 

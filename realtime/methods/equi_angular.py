@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Equi-angular sampling: a few random samples a ray, each of one light chosen by its power.
 
-With N lights of the airlight L_i along a ray, a fraction q_i of the power and an even random angle theta between those
-of the ends of the ray at light i, x = foot + h tan theta,
+With N lights of the airlight L_i along a ray, a fraction q_i of the power and an even random angle
+theta between those of the ends of the ray at light i, x = foot + h tan theta,
 
     L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],        f_i the integrand with the visibility,
 
-is the mean of one sample: dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and visibility, which is
-bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the fraction (k + c)/S of the power, c the shift of the
-pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the mean of all stays
-the integral, since each sample alone is right in the mean.
+is the mean of one sample: dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and
+visibility, which is bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the fraction
+(k + c)/S of the power, c the shift of the pattern, and another place for each k, by the step of
+Roberts' sequence in one dimension of two; the mean of all stays the integral, since each sample
+alone is right in the mean.
 
-Lights of different structure (points, spots, samples of area lights) are in separate tables, and one of each is
-sampled. Lights at infinity have one sample each, even in the distance.
+Lights of different structure (points, spots, samples of area lights) are in separate tables, and
+one of each is sampled. Lights at infinity have one sample each, even in the distance.
 
 References
 ----------
-Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media* (CGF 31:4).
+Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in
+participating media* (CGF 31:4).
 """
 
 from dataclasses import dataclass
@@ -54,18 +56,24 @@ class EquiAngular(Method):
 
     samples: int = parameter(1, "samples of every ray", least=1)
     jitter: str = parameter(
-        "white", "noise of the samples: white, a mask of blue noise, or interleaved gradient noise", choices=PATTERNS
+        "white",
+        "noise of the samples: white, a mask of blue noise, or interleaved gradient noise",
+        choices=PATTERNS,
     )
     animate: str = animate()
 
     def preparation(self, scene):
         """Return a function of what draws the lights of each table that have a place."""
-        return lambda now: tuple(light_choice(table) if table.rows.w else None for table in light_tables(now.lights))
+        return lambda now: tuple(
+            light_choice(table) if table.rows.w else None for table in light_tables(now.lights)
+        )
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by chance [W/(m^2 sr)]."""
         golden = self.animate == "golden"
-        place, choice = (view.pattern(self.jitter, golden=golden, stream=stream) for stream in (0, 1))
+        place, choice = (
+            view.pattern(self.jitter, golden=golden, stream=stream) for stream in (0, 1)
+        )
         total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
         for table, by_power in zip(view.tables, state, strict=True):
 
@@ -79,7 +87,9 @@ class EquiAngular(Method):
         return Layers(total)
 
     def _mean(self, sample: Any, place: Any, choice: Any, like: Any) -> Any:
-        """Return the mean of samples, each a function of where it lies and of which light it takes, from 0 to 1."""
+        """Return the mean of samples, each a function of where it lies and of which
+        light it takes, from 0 to 1.
+        """
         if self.samples == 1:
             return sample(place, choice)
         Float = type(place)
@@ -92,7 +102,9 @@ class EquiAngular(Method):
 
 
 def _sample(view: View, light: Light, at: Any) -> Any:
-    """Return the radiance of one sample of a light, at a fraction of the angle at it [W/(m^2 sr)]."""
+    """Return the radiance of one sample of a light, at a fraction of the
+    angle at it [W/(m^2 sr)].
+    """
     rays = view.lit_by(light)
     span = marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(at, span.width, span.begin))

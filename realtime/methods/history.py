@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`NAME+history`: any method with a mean over the frames before, which `realtime.frame.history` takes."""
+"""`NAME+history`: any method with a mean over the frames before, which
+`realtime.frame.history` takes.
+"""
 
 from dataclasses import dataclass, field, fields, make_dataclass
 
@@ -22,21 +24,26 @@ class History(Parameters):
     )
     clamp: str = parameter(
         "none",
-        "values of the last frames as they are, in the range of the 3 x 3 pixels of the newest, or within one standard "
+        "values of the last frames as they are, in the range of the 3 x 3 pixels of the newest, or "
+        "within one standard "
         "deviation of their mean",
         choices=("none", "range", "variance"),
     )
 
 
 def with_history(method: type[Method]) -> type[Method]:
-    """Return a method that averages the airlight of its frames, with the parameters of `History` beside its own.
+    """Return a method that averages the airlight of its frames, with the parameters of
+    `History` beside its own.
 
     Raises InputError for a method that has parameters of these names.
     """
     own = [item.name for item in fields(History)]
     taken = sorted(set(own) & set(defaults(method)))
     if taken:
-        raise InputError(f"method {method.name}{ENDING}: the method has a parameter {taken[0]!r} of its own; rename it")
+        raise InputError(
+            f"method {method.name}{ENDING}: the method has a parameter {taken[0]!r} of its own; "
+            "rename it"
+        )
 
     def history(self) -> History:
         return History(*(getattr(self, name) for name in own))
@@ -46,5 +53,8 @@ def with_history(method: type[Method]) -> type[Method]:
         "summary": f"{method.summary}; averaged over the frames before",
         "history": property(history),
     }
-    added = [(item.name, item.type, field(default=item.default, metadata=item.metadata)) for item in fields(History)]
+    added = [
+        (item.name, item.type, field(default=item.default, metadata=item.metadata))
+        for item in fields(History)
+    ]
     return make_dataclass("WithHistory", added, bases=(method,), frozen=True, namespace=what)

@@ -3,25 +3,29 @@
 
 Two spacings of the same number of steps:
 
-* `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. Most shaders do this; it misses the peak near
-  the light. Where nothing ends the ray it stops at 20 optical depths (e^-20 = 2e-9 is left).
-* `equiangular` in theta, the angle at the light; for a light at infinity these are equal steps in x. With x = foot + h
-  tan theta, dx / r^2 = dtheta / h: the peak is gone and the weight is dtheta/h exp(-sigma_t (x + r)) p.
+* `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. Most shaders do this; it
+  misses the peak near the light. Where nothing ends the ray it stops at 20 optical depths (e^-20 =
+  2e-9 is left).
+* `equiangular` in theta, the angle at the light; for a light at infinity these are equal steps in
+  x. With x = foot + h tan theta, dx / r^2 = dtheta / h: the peak is gone and the weight is dtheta/h
+  exp(-sigma_t (x + r)) p.
 
-The order of convergence in the number of steps is 2 on a ray without shadows and 1 where shadow edges fall between
-steps.
+The order of convergence in the number of steps is 2 on a ray without shadows and 1 where shadow
+edges fall between steps.
 
-``sum=transitions`` is the marcher with which Billeter, Sintorn and Assarsson 2010 compare (their section 6): N samples
-of the visibility alone, and the airlight "only calculated when a transition between a lit and an unlit region is
-detected", as the integral up to there (their eq. 3). The paper does not say where between two samples the transition
-is. With the cells [u_k, u_k+1] about the samples, u the variable of the spacing and V_k the visibility in the middle of
-a cell, it is here at their border:
+``sum=transitions`` is the marcher with which Billeter, Sintorn and Assarsson 2010 compare (their
+section 6): N samples of the visibility alone, and the airlight "only calculated when a transition
+between a lit and an unlit region is detected", as the integral up to there (their eq. 3). The paper
+does not say where between two samples the transition is. With the cells [u_k, u_k+1] about the
+samples, u the variable of the spacing and V_k the visibility in the middle of a cell, it is here at
+their border:
 
     J = sum_k V_k J(x_k, x_k+1) = sum over the runs of lit cells of J(x_i, x_j),     x_k = x(u_k),
 
-for neighbouring cells that are lit add up to one integral, by the kernel. Nothing is left of the error of the
-integrand, so on a ray without shadows the sum is that of the kernel with any N. A shadow edge is wrong by half a cell
-at most: the order is 1. The paper starts at the farthest sample; the sum is the same from either end.
+for neighbouring cells that are lit add up to one integral, by the kernel. Nothing is left of the
+error of the integrand, so on a ray without shadows the sum is that of the kernel with any N. A
+shadow edge is wrong by half a cell at most: the order is 1. The paper starts at the farthest
+sample; the sum is the same from either end.
 """
 
 from dataclasses import dataclass
@@ -36,7 +40,12 @@ from airlight.realtime.methods.interface.marching import marched_integral, march
 from airlight.realtime.methods.interface.method import Method, animate, jitter
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.media.medium import LitRays
-from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
+from airlight.realtime.shadow_maps.shadow_map import (
+    cast_shadow_map,
+    check_maps,
+    lit_in_map,
+    map_size,
+)
 
 _DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
 
@@ -47,31 +56,40 @@ class RayMarch(Method):
 
     References
     ----------
-    Billeter, Sintorn, Assarsson 2010, section 6 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
-    sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
+    Billeter, Sintorn, Assarsson 2010, section 6 (the marcher that they compare with). Kulla,
+    Fajardo 2012, *Importance sampling techniques for path tracing in participating media*, section
+    4 (the equi-angular variable).
     """
 
     name = "ray-march"
     summary = "midpoint steps with one visibility test each: the baseline to beat"
-    source = "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)"
+    source = (
+        "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)"
+    )
     prepared_from = frozenset({"geometry", "light"})
     by_rays = True
 
     steps: int = parameter(100, "steps of every ray and light", least=1)
     spacing: str = parameter(
-        "equiangular", "in the angle at the light, or in the distance", choices=("equiangular", "uniform")
+        "equiangular",
+        "in the angle at the light, or in the distance",
+        choices=("equiangular", "uniform"),
     )
     shadow: str = parameter(
-        "ray", "a shadow ray a step, a look-up in a shadow map, or no shadows", choices=("ray", "map", "none")
+        "ray",
+        "a shadow ray a step, a look-up in a shadow map, or no shadows",
+        choices=("ray", "map", "none"),
     )
     sum: str = parameter(
         "steps",
-        "the integrand at every step, or an integral by the kernel for each run of lit steps, as Billeter 2010 marches",
+        "the integrand at every step, or an integral by the kernel for each run of lit steps, as "
+        "Billeter 2010 marches",
         choices=("steps", "transitions"),
     )
     depth: str = parameter(
         "exact",
-        "optical depth up to a step, with `sum=steps`: exact, or a running sum over the steps, as engines have it",
+        "optical depth up to a step, with `sum=steps`: exact, or a running sum over the steps, as "
+        "engines have it",
         choices=("exact", "running"),
     )
     jitter: str = jitter()
@@ -81,10 +99,14 @@ class RayMarch(Method):
     def _check_together(self) -> None:
         if self.jitter != "none" and self.sum == "transitions":
             raise InputError(
-                f"jitter: got {self.jitter} with sum=transitions, expected sum=steps: a mean of runs is no integral"
+                f"jitter: got {self.jitter} with sum=transitions, expected sum=steps: a mean of "
+                "runs is no integral"
             )
         if self.jitter == "none" and self.animate != "none":
-            raise InputError(f"animate: got {self.animate} without jitter, expected jitter=white, blue or ign with it")
+            raise InputError(
+                f"animate: got {self.animate} without jitter, expected jitter=white, blue or ign "
+                "with it"
+            )
 
     @property
     def by_table(self):
@@ -100,7 +122,8 @@ class RayMarch(Method):
         """Refuse maps that have no room, and uniform steps on an unbounded ray through a vacuum."""
         if self.spacing == "uniform" and scene.medium.vacuum and not scene.medium.clear:
             raise InputError(
-                "spacing=uniform: an unbounded ray through a vacuum has no step length; use spacing=equiangular"
+                "spacing=uniform: an unbounded ray through a vacuum has no step length; use "
+                "spacing=equiangular"
             )
         if self.shadow == "map" and scene.features.shadows:
             check_maps(scene.lights, self.map)
@@ -116,10 +139,16 @@ class RayMarch(Method):
         def lit(x):
             if self.shadow == "none" or not view.features.shadows:
                 return True
-            return lit_in_map(state, light, view.at(x)) if self.shadow == "map" else view.visible(view.at(x), light)
+            return (
+                lit_in_map(state, light, view.at(x))
+                if self.shadow == "map"
+                else view.visible(view.at(x), light)
+            )
 
         if self.sum == "transitions":
-            integral = _lit_runs(airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit)
+            integral = _lit_runs(
+                airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit
+            )
         else:
             how: dict[str, Any] = {
                 "steps": self.steps,
@@ -146,7 +175,11 @@ def _lit_runs(airlight: LitRays, distance, *, steps: int, spacing: str, lit) -> 
     x0, x1 = cells.x0, cells.x1
 
     def step(index, was_lit, opened, intervals):
-        border = dr.select(index == 0, x0, dr.maximum(cells.place(dr.fma(Float(index), cells.width, cells.begin)), x0))
+        border = dr.select(
+            index == 0,
+            x0,
+            dr.maximum(cells.place(dr.fma(Float(index), cells.width, cells.begin)), x0),
+        )
         x = cells.place(dr.fma(Float(index) + 0.5, cells.width, cells.begin))
         now = meets & lit(x)
         closes = was_lit & ~now

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real-time methods by name.
 
-`METHODS` is the registry: add a class to it and every command and report knows it. `find_method` also
-finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog loads
-neither clouds nor shaders.
+`METHODS` is the registry: add a class to it and every command and report knows it. `find_method`
+also finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog
+loads neither clouds nor shaders.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,7 +13,8 @@ from airlight.errors import InputError, nearest
 from airlight.realtime.methods.history import ENDING, with_history
 from airlight.realtime.methods.interface.method import Method
 
-#: By name, the module and the class. The key of a result counts the code of the modules that are named here in full.
+#: By name, the module and the class. The key of a result counts the code of the modules
+#: that are named here in full.
 _CLASSES: Mapping[str, tuple[str, str]] = {
     "unshadowed": ("airlight.realtime.methods.unshadowed", "Unshadowed"),
     "ray-march": ("airlight.realtime.methods.ray_march", "RayMarch"),
@@ -23,9 +24,18 @@ _CLASSES: Mapping[str, tuple[str, str]] = {
     "min-max": ("airlight.realtime.methods.epipolar.method", "MinMax"),
     "froxel-fog": ("airlight.realtime.methods.froxel_fog.method", "FroxelFog"),
     "soft-shafts": ("airlight.realtime.methods.soft_shafts.method", "SoftShafts"),
-    "shadow-planes-2006": ("airlight.realtime.methods.published.biri2006.method", "ShadowPlanes2006"),
-    "light-volumes-2010": ("airlight.realtime.methods.published.billeter2010.method", "LightVolumes2010"),
-    "cloud-collectors-2008": ("airlight.realtime.methods.published.bouthors2008", "CloudCollectors2008"),
+    "shadow-planes-2006": (
+        "airlight.realtime.methods.published.biri2006.method",
+        "ShadowPlanes2006",
+    ),
+    "light-volumes-2010": (
+        "airlight.realtime.methods.published.billeter2010.method",
+        "LightVolumes2010",
+    ),
+    "cloud-collectors-2008": (
+        "airlight.realtime.methods.published.bouthors2008",
+        "CloudCollectors2008",
+    ),
     "cloud-octaves": ("airlight.realtime.methods.cloud_octaves", "CloudOctaves"),
     "cloud-collectors": ("airlight.realtime.methods.cloud_collectors", "CloudCollectors"),
 }
@@ -82,7 +92,10 @@ def find_method(name: str) -> type[Method]:
 
     if name.endswith(ENDING):
         if is_shader(own := name.removesuffix(ENDING)):
-            raise InputError(f"method {name}: a shader keeps its own frames; expected its name without '{ENDING}'")
+            raise InputError(
+                f"method {name}: a shader keeps its own frames; expected its name without "
+                f"'{ENDING}'"
+            )
         return with_history(find_method(own))
     if is_shader(name):
         from airlight.realtime.methods.shader.method import shader_method
@@ -93,6 +106,7 @@ def find_method(name: str) -> type[Method]:
 
         return user_method(name)
     raise InputError(
-        f"method: got {name!r}, expected one of {', '.join(METHODS)}, 'module:function', or a shader, 'fog.glsl'"
+        f"method: got {name!r}, expected one of {', '.join(METHODS)}, 'module:function', or a "
+        "shader, 'fog.glsl'"
         f"{nearest(name, METHODS)}"
     )

@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light.
+"""Airlight without volumetric shadows: one integral from the camera to the visible
+surface, for each light.
 
-Three published closed forms of fog shading take its place with `form`. They are no airlight: a fog colour C, blended by
-an amount F of fog, without phase function, paths from lights and shadows,
+Three published closed forms of fog shading take its place with `form`. They are no airlight: a fog
+colour C, blended by an amount F of fog, without phase function, paths from lights and shadows,
 
     L = C F,     C = albedo (Ls + sum_k E_k q(cos_k)/(4 pi)),     F = 1 - exp(-tau),
 
-Ls the radiance of a uniform sky and E_k the irradiances of suns. Artists choose C. Here the mean of q over the sphere
-is 1, so that no more light is scattered than there is. Local lights have no term in these forms.
+Ls the radiance of a uniform sky and E_k the irradiances of suns. Artists choose C. Here the mean of
+q over the sphere is 1, so that no more light is scattered than there is. Local lights have no term
+in these forms.
 
-- `wenzel`: q = 1. Wenzel 2006 and 2007: the optical depth of an exponential layer in closed form, and one colour.
-- `quilez`: q = 18 max(cos, 0)^8, F = tau up to 1. Quilez 2010, "Better fog": `mix(colours, pow(max(dot, 0), 8))`, and
-  height fog that mixes by `(a/b) exp(-b y) (1 - exp(-b t dy))/dy`, the optical depth itself, which copies clamp.
-- `unreal`: q = 10 max(cos, 0)^4. HeightFogCommon.ush: `FogColor (1 - 2^-I)` and `DirectionalInscatteringColor
-  pow(saturate(dot), DirectionalInscatteringExponent) (1 - 2^-I)`, the exponent 4 by default.
+- `wenzel`: q = 1. Wenzel 2006 and 2007: the optical depth of an exponential layer in
+  closed form, and one colour.
+- `quilez`: q = 18 max(cos, 0)^8, F = tau up to 1. Quilez 2010, "Better fog": `mix(colours,
+  pow(max(dot, 0), 8))`, and height fog that mixes by `(a/b) exp(-b y) (1 - exp(-b t dy))/dy`, the
+  optical depth itself, which copies clamp.
+- `unreal`: q = 10 max(cos, 0)^4. HeightFogCommon.ush: `FogColor (1 - 2^-I)` and
+  `DirectionalInscatteringColor pow(saturate(dot), DirectionalInscatteringExponent) (1 - 2^-I)`, the
+  exponent 4 by default.
 
-The depth is that of the scene's medium. Unreal's two terms of a series near level rays (8e-6 of the depth) and its
-FogMaxOpacity, StartDistance and cut-off are left out.
+The depth is that of the scene's medium. Unreal's two terms of a series near level rays (8e-6 of the
+depth) and its FogMaxOpacity, StartDistance and cut-off are left out.
 """
 
 from dataclasses import dataclass
@@ -34,12 +39,14 @@ _EXPONENTS = {"wenzel": 0, "quilez": 8, "unreal": 4}  # of the cosine about a su
 class Unshadowed(Method):
     """Airlight as if nothing cast a shadow.
 
-    Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
-    light the volumetric shadows take away. Bounded media have their own nodes, except with a polynomial kernel.
+    Valid for any scene without occluders between a light and a visible part of the medium;
+    elsewhere it shows how much light the volumetric shadows take away. Bounded media have their own
+    nodes, except with a polynomial kernel.
 
     References
     ----------
-    Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005. The module cites the other forms.
+    Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005. The
+    module cites the other forms.
     """
 
     name = "unshadowed"
@@ -49,7 +56,8 @@ class Unshadowed(Method):
 
     form: str = parameter(
         "airlight",
-        "the airlight, or a fog colour without light paths and phase function, as shaders blend it over an image: only "
+        "the airlight, or a fog colour without light paths and phase function, as shaders blend it "
+        "over an image: only "
         "suns and skies have one",
         choices=("airlight", *_EXPONENTS),
     )
@@ -73,7 +81,8 @@ class Unshadowed(Method):
         """Refuse a fog colour where only local lights are."""
         if self.form != "airlight" and all(light.w for light in scene.lights):
             raise InputError(
-                f"form={self.form}: a fog colour has no term for local lights, and the scene has no sun; expected a "
+                f"form={self.form}: a fog colour has no term for local lights, and the scene has "
+                "no sun; expected a "
                 "'directional' light, or form=airlight"
             )
 
@@ -82,8 +91,14 @@ class Unshadowed(Method):
         return super().preparation(scene) if self.form == "airlight" else lambda now: now.sky
 
     def render(self, view, state, kernel):
-        """Return the airlight of every ray, or what the closed form shows in its place [W/(m^2 sr)]."""
-        return super().render(view, state, kernel) if self.form == "airlight" else Layers(self._colour(view, state))
+        """Return the airlight of every ray, or what the closed form shows
+        in its place [W/(m^2 sr)].
+        """
+        return (
+            super().render(view, state, kernel)
+            if self.form == "airlight"
+            else Layers(self._colour(view, state))
+        )
 
     def _colour(self, view, sky):
         medium, end, exponent = view.medium, dr.minimum(view.distance, 1e30), _EXPONENTS[self.form]
@@ -97,7 +112,9 @@ class Unshadowed(Method):
         if self.form != "quilez":
             return shown
         depths = medium.optical_depth(view, 0, end)
-        taken = [dr.select(tau > 1e-4, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), 1) for tau in depths]
+        taken = [
+            dr.select(tau > 1e-4, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), 1) for tau in depths
+        ]
         return shown * medium.colour(taken)
 
     def airlight(self, view, light, state, kernel):
@@ -111,5 +128,7 @@ class Unshadowed(Method):
 
 
 def unshadowed(view, *, kernel):
-    """Return the airlight of all lights of a view as if nothing cast a shadow, for a user's function [W/(m^2 sr)]."""
+    """Return the airlight of all lights of a view as if nothing cast a shadow, for a
+    user's function [W/(m^2 sr)].
+    """
     return Unshadowed().render(view, (), kernel).in_scattered

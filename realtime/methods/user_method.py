@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A user's own method, named 'module:function' or 'path/to/file.py:function'.
 
-The signature of the function decides: a keyword `kernel` means that it calls a kernel; other keywords are parameters,
-with the types of their defaults. The result is checked, because nothing else checks it. See docs/your-method.md.
+The signature of the function decides: a keyword `kernel` means that it calls a kernel; other
+keywords are parameters, with the types of their defaults. The result is checked, because nothing
+else checks it. See docs/your-method.md.
 
-It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays in or reads values
-out ends the process (Dr.Jit 1.5). Tracing `unshadowed` again for every frame costs 0.3 ms (2 threads).
+It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays
+in or reads values out ends the process (Dr.Jit 1.5). Tracing `unshadowed` again for every frame
+costs 0.3 ms (2 threads).
 
 The result is converted to a colour for every pixel, or refused.
 """
@@ -44,14 +46,14 @@ def user_method(name: str) -> type[Method]:
     Parameters
     ----------
     name
-        'module:function', the current folder first on the path, or 'path/to/file.py:function'. The object may also be a
-        class derived from `Method`; what it returns is checked.
+        'module:function', the current folder first on the path, or 'path/to/file.py:function'. The
+        object may also be a class derived from `Method`; what it returns is checked.
 
     Raises
     ------
     InputError
-        For what cannot be imported, is not there or is no function, a function that no frame can call, and a parameter
-        with the name of a member of `Method`.
+        For what cannot be imported, is not there or is no function, a function that no frame can
+        call, and a parameter with the name of a member of `Method`.
     """
     found = user_object(name, "method")
     if isinstance(found, type) and issubclass(found, Method):
@@ -60,7 +62,8 @@ def user_method(name: str) -> type[Method]:
     if isinstance(found, type) or not callable(found):
         kind = "class" if isinstance(found, type) else type(found).__name__
         raise InputError(
-            f"method {name}: this is a {kind}; expected a function of the view, or a class of airlight.Method"
+            f"method {name}: this is a {kind}; expected a function of the view, or a class of "
+            "airlight.Method"
         )
     return _of_function(found, name)
 
@@ -84,7 +87,10 @@ def check_names(method: str, names: Iterable[str], kind: type[Method]) -> None:
     """
     taken = sorted(set(names) & set(dir(kind)))
     if taken:
-        raise InputError(f"method {method}: a parameter cannot be called {taken[0]}, a name that frames use; rename it")
+        raise InputError(
+            f"method {method}: a parameter cannot be called {taken[0]}, a name that frames use; "
+            "rename it"
+        )
 
 
 def _of_function(function: Any, name: str) -> type[Method]:
@@ -95,7 +101,8 @@ def _of_function(function: Any, name: str) -> type[Method]:
     prepare = getattr(function, "prepare", None)
     if prepare is not None and not callable(prepare):
         raise InputError(
-            f"method {name}: its `prepare` is a {type(prepare).__name__}; expected a function of the scene"
+            f"method {name}: its `prepare` is a {type(prepare).__name__}; expected a function of "
+            "the scene"
         )
 
     def preparation(self, scene):
@@ -105,7 +112,8 @@ def _of_function(function: Any, name: str) -> type[Method]:
             made = prepare(scene, **values(self))
         if not callable(made):
             raise InputError(
-                f"method {name}: `prepare` returned a {type(made).__name__}; expected a function of the scene"
+                f"method {name}: `prepare` returned a {type(made).__name__}; expected a function "
+                "of the scene"
             )
 
         def run(now):
@@ -143,13 +151,19 @@ def _guarded(method: type[Method], name: str) -> type[Method]:
     def render(self, view, state, kernel):
         with user_errors(f"method {name}", file):
             returned = method.render(self, view, state, kernel)
-        return checked_layers(returned, view, name, visibility=self.provides_visibility, by_source=self.by_source)
+        return checked_layers(
+            returned, view, name, visibility=self.provides_visibility, by_source=self.by_source
+        )
 
-    return dataclass(frozen=True)(type(method.__name__, (method,), {"name": name, "render": render}))
+    return dataclass(frozen=True)(
+        type(method.__name__, (method,), {"name": name, "render": render})
+    )
 
 
 def method_file(name: str) -> Path | None:
-    """Return the file of a user's own method without running it; None if it has none, or cannot be found."""
+    """Return the file of a user's own method without running it; None if it has
+    none, or cannot be found.
+    """
     module_name = name.rpartition(":")[0]
     if _is_file(module_name):
         return Path(module_name)
@@ -160,7 +174,11 @@ def method_file(name: str) -> Path | None:
     spec = None
     for number, part in enumerate(module_name.split(".")):
         whole = ".".join(module_name.split(".")[: number + 1])
-        spec = importlib.machinery.PathFinder.find_spec(whole, places) if part and places is not None else None
+        spec = (
+            importlib.machinery.PathFinder.find_spec(whole, places)
+            if part and places is not None
+            else None
+        )
         places = None if spec is None else spec.submodule_search_locations
     return Path(spec.origin) if spec is not None and spec.origin else None
 
@@ -170,7 +188,8 @@ def _is_file(module_name: str) -> bool:
 
 
 def user_object(name: str, kind: str) -> Any:
-    """Import a module or a file of the user's, and return the object in it; `kind` says in messages what it is.
+    """Import a module or a file of the user's, and return the object in it; `kind`
+    says in messages what it is.
 
     Raises
     ------
@@ -182,7 +201,11 @@ def user_object(name: str, kind: str) -> Any:
         raise InputError(f"{kind}: got {name!r}, {_WANTED}")
     what = f"{kind} {name}"
     with user_errors(what):
-        module = _from_file(Path(module_name), what) if _is_file(module_name) else _from_path(module_name, what)
+        module = (
+            _from_file(Path(module_name), what)
+            if _is_file(module_name)
+            else _from_path(module_name, what)
+        )
     named_object: Any = module
     for part in path.split("."):
         if not hasattr(named_object, part):
@@ -195,7 +218,9 @@ def user_object(name: str, kind: str) -> Any:
 
 @contextmanager
 def _imports_from(folder: str) -> Iterator[None]:
-    """Within the block, a folder is the first on the path, and imports write no `__pycache__` into it."""
+    """Within the block, a folder is the first on the path, and imports write
+    no `__pycache__` into it.
+    """
     before = sys.dont_write_bytecode
     sys.dont_write_bytecode = True
     sys.path.insert(0, folder)
@@ -209,11 +234,17 @@ def _imports_from(folder: str) -> Iterator[None]:
 def _is_candidate(value: Any, module: ModuleType) -> bool:
     if isinstance(value, type) and issubclass(value, Method):
         return value.__module__ == module.__name__
-    return inspect.isfunction(value) and value.__module__ == module.__name__ and not value.__name__.startswith("_")
+    return (
+        inspect.isfunction(value)
+        and value.__module__ == module.__name__
+        and not value.__name__.startswith("_")
+    )
 
 
 def _from_path(module_name: str, what: str) -> ModuleType:
-    """Import a module, the current folder first on the path: the console script's own folder stands there otherwise."""
+    """Import a module, the current folder first on the path: the console script's own
+    folder stands there otherwise.
+    """
     if not all(part.isidentifier() for part in module_name.split(".")):
         raise InputError(f"{what}: no module can have the name {module_name!r}; {_WANTED}")
     folder = os.getcwd()
@@ -224,7 +255,9 @@ def _from_path(module_name: str, what: str) -> ModuleType:
     except ModuleNotFoundError as error:
         missing = error.name or ""
         if missing and f"{module_name}.".startswith(f"{missing}."):
-            raise InputError(f"{what}: there is no module {missing!r} in {folder} or installed; {_WANTED}") from None
+            raise InputError(
+                f"{what}: there is no module {missing!r} in {folder} or installed; {_WANTED}"
+            ) from None
         raise
 
 
@@ -266,7 +299,10 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
         inspect.Parameter.POSITIONAL_ONLY,
         inspect.Parameter.POSITIONAL_OR_KEYWORD,
     ):
-        raise InputError(f"method {name}: it takes no view; expected function(view, *, kernel=None, **parameters)")
+        raise InputError(
+            f"method {name}: it takes no view; expected function(view, *, kernel=None, "
+            "**parameters)"
+        )
     parameters = {}
     takes_kernel = False
     for argument in arguments[1:]:
@@ -274,11 +310,16 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
             continue
         if argument.name == "kernel":
             takes_kernel = True
-        elif argument.default is inspect.Parameter.empty or argument.kind == inspect.Parameter.POSITIONAL_ONLY:
+        elif (
+            argument.default is inspect.Parameter.empty
+            or argument.kind == inspect.Parameter.POSITIONAL_ONLY
+        ):
             raise InputError(
-                f"method {name}: nothing gives {argument.name!r} a value; expected a keyword with a default"
+                f"method {name}: nothing gives {argument.name!r} a value; expected a keyword with "
+                "a default"
             )
-        elif type(argument.default) in _TYPES:  # what has another type cannot be set, and keeps its default
+        # what has another type cannot be set, and keeps its default
+        elif type(argument.default) in _TYPES:
             parameters[argument.name] = argument.default
     return takes_kernel, parameters
 
@@ -290,21 +331,30 @@ def user_errors(what: str, file: str | None = None) -> Iterator[None]:
         yield
     except InputError:  # what it refuses by name
         raise
-    # The user's code may raise anything, and end the program: that is his to repair, never a failure of ours.
+    # The user's code may raise anything, and end the program: that is his to repair,
+    # never a failure of ours.
     except (Exception, SystemExit) as error:
         root = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop
         words = " ".join(str(root).split())
         if isinstance(root, InputError):
             raise InputError(words) from error
-        raise InputError(f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}") from error
+        raise InputError(
+            f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}"
+        ) from error
 
 
 def _place(root: BaseException, error: BaseException, file: str | None) -> str:
-    """Return 'file, line N: ' of the innermost step in the user's file, or of the innermost of all."""
+    """Return 'file, line N: ' of the innermost step in the user's file, or
+    of the innermost of all.
+    """
     if isinstance(root, SyntaxError):
         return f"{root.filename}, line {root.lineno}: "
-    steps = [step for raised in (error, root) for step in traceback.extract_tb(raised.__traceback__)]
-    outside = [step for step in steps if step.filename != __file__ and "importlib" not in step.filename]
+    steps = [
+        step for raised in (error, root) for step in traceback.extract_tb(raised.__traceback__)
+    ]
+    outside = [
+        step for step in steps if step.filename != __file__ and "importlib" not in step.filename
+    ]
     inside = [step for step in outside if step.filename == file]
     chosen = inside or outside
     return f"{chosen[-1].filename}, line {chosen[-1].lineno}: " if chosen else ""
@@ -329,8 +379,9 @@ def checked_radiance(returned: Any, view: View, name: str):
     Parameters
     ----------
     returned
-        The result of the method `name`: a Dr.Jit colour, three-vector or number, or an array (pixels, 3) or (pixels,)
-        of another kind, which goes through NumPy; one entry per pixel of `view`, or one for all.
+        The result of the method `name`: a Dr.Jit colour, three-vector or number, or an array
+        (pixels, 3) or (pixels,) of another kind, which goes through NumPy; one entry per pixel of
+        `view`, or one for all.
     view
         The view that the method was given.
     name
@@ -343,15 +394,23 @@ def checked_radiance(returned: Any, view: View, name: str):
     """
     Color, Float = type(view.medium.albedo), type(view.distance)
     width = dr.width(view.pixel)
-    channels = _dr_channels(returned, name) if dr.is_array_v(returned) else _channels(returned, width, name)
+    channels = (
+        _dr_channels(returned, name)
+        if dr.is_array_v(returned)
+        else _channels(returned, width, name)
+    )
     for channel in channels:
         if dr.width(channel) not in (1, width):
-            raise InputError(f"method {name}: returned {dr.width(channel)} values for {width} pixels; {_RESULT}")
+            raise InputError(
+                f"method {name}: returned {dr.width(channel)} values for {width} pixels; {_RESULT}"
+            )
     # A constant has one entry: every pixel gets it.
     return Color(*(Float(channel) + dr.zeros(Float, width) for channel in channels))
 
 
-def checked_layers(returned: Any, view: View, name: str, *, visibility: bool, by_source: bool) -> Layers:
+def checked_layers(
+    returned: Any, view: View, name: str, *, visibility: bool, by_source: bool
+) -> Layers:
     """Return the layers of a method, their in-scattered radiance as `checked_radiance` does.
 
     Parameters
@@ -370,18 +429,25 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool, by
     Raises
     ------
     InputError
-        For an object other than `Layers`, radiance of another type or shape, and a visibility that lacks a light.
+        For an object other than `Layers`, radiance of another type or shape, and a
+        visibility that lacks a light.
     """
     if not isinstance(returned, Layers):
         raise InputError(
-            f"method {name}: returned a {type(returned).__name__}; expected realtime.methods.interface.method.Layers"
+            f"method {name}: returned a {type(returned).__name__}; expected "
+            "realtime.methods.interface.method.Layers"
         )
     fractions = 0 if returned.visibility is None else len(returned.visibility)
-    several = sources(view.tables) if by_source else (light for table in view.tables for light in one_by_one(table))
+    several = (
+        sources(view.tables)
+        if by_source
+        else (light for table in view.tables for light in one_by_one(table))
+    )
     wanted = len(list(several)) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
-            f"method {name}: returned the visibility of {fractions} lights, expected that of {wanted}: one for each "
+            f"method {name}: returned the visibility of {fractions} lights, expected that of "
+            f"{wanted}: one for each "
             "light where `provides_visibility`, otherwise None"
         )
     return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))
@@ -410,6 +476,13 @@ def _channels(returned: Any, width: int, name: str) -> tuple[Any, ...]:
     if values.ndim == 0:
         return (float(values),) * 3
     if values.shape not in ((width,), (width, 3)):
-        raise InputError(f"method {name}: returned an array of shape {values.shape} for {width} pixels; {_RESULT}")
+        raise InputError(
+            f"method {name}: returned an array of shape {values.shape} for {width} pixels; "
+            f"{_RESULT}"
+        )
     double = np.ascontiguousarray(values, dtype=np.float64)
-    return (mi.Float64(double),) * 3 if double.ndim == 1 else tuple(mi.Float64(column) for column in double.T.copy())
+    return (
+        (mi.Float64(double),) * 3
+        if double.ndim == 1
+        else tuple(mi.Float64(column) for column in double.T.copy())
+    )

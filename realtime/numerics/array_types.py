@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arrays of Dr.Jit: types of one precision, arrays from NumPy, and the way back to the host.
 
-Types come in sets of one precision, so that every method runs in float32 and float64 from the same source.
+Types come in sets of one precision, so that every method runs in float32 and
+float64 from the same source.
 
 NumPy's arrays are copied to memory that is aligned as Dr.Jit's own is.
 
-A frame has one way to bring numbers of a scene from the device to the host. It reads a few numbers of lights and
-cameras; each such read waits until the device has come to rest.
+A frame has one way to bring numbers of a scene from the device to the host. It reads a few numbers
+of lights and cameras; each such read waits until the device has come to rest.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from airlight.realtime.errors import InputError
 
 PRECISIONS = ("single", "double")
 
-# Contents of arrays, for signatures. Dr.Jit has a class for each precision and backend, so their type is not checked.
+# Contents of arrays, for signatures. Dr.Jit has a class for each precision and backend, so
+# their type is not checked.
 PerRay: TypeAlias = Any  #: one entry per ray: a number, a vector or a colour
 Metres: TypeAlias = Any  #: lengths [m]
 PerMetre: TypeAlias = Any  #: extinctions, inverse depths and airlight integrals [1/m]
@@ -39,8 +41,8 @@ class ArrayTypes:
 def array_types(precision: str = "single") -> ArrayTypes:
     """Return the array types of a precision.
 
-    `precision`: 'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of
-    Mitsuba's wheels. Raises InputError if the precision has another name.
+    `precision`: 'single' (float32) or 'double' (float64). Rays are always cast in float32, the only
+    precision of Mitsuba's wheels. Raises InputError if the precision has another name.
     """
     if precision == "single":
         return ArrayTypes(mi.Float, mi.Vector3f, mi.Color3f)
@@ -55,7 +57,9 @@ def types_of(Float) -> ArrayTypes:
 
 
 def is_single(Float) -> bool:
-    """Return whether a number type is float32; Python's float, the number of the scalar backend, is not."""
+    """Return whether a number type is float32; Python's float, the number of
+    the scalar backend, is not.
+    """
     return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
 
 
@@ -75,7 +79,9 @@ def four_numbers(Float):
 
 
 def packed(numbers):
-    """Return an array with the four numbers of every lane side by side, for gathers that read them at once."""
+    """Return an array with the four numbers of every lane side by side, for
+    gathers that read them at once.
+    """
     width = dr.width(numbers)
     array = dr.zeros(type(numbers.x), 4 * width)
     dr.scatter(array, numbers, dr.arange(mi.UInt32, width))
@@ -93,7 +99,9 @@ def largest(Float) -> float:
 
 
 def chosen_value(values, number):
-    """Return the value of a number, counted from 0, which may differ between lanes; `values` are arrays of one type."""
+    """Return the value of a number, counted from 0, which may differ between lanes;
+    `values` are arrays of one type.
+    """
     chosen, *others = values
     for place, value in enumerate(others, 1):
         chosen = dr.select(number == place, value, chosen)
@@ -106,8 +114,9 @@ _ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
 def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
     """Return numbers as a Dr.Jit array in memory that is aligned as Dr.Jit's own is.
 
-    A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled, a frozen function recorded, for the
-    alignment of each of its arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
+    A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled, a frozen
+    function recorded, for the alignment of each of its arrays: where NumPy puts them by chance, the
+    same kernel is compiled again and again.
 
     `scalar`: the type of the array, such as `mi.Float`; `numbers`: (n,), in any unit.
     """
@@ -130,12 +139,18 @@ def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
 
 
 def _dtype(scalar: Any, numbers: NDArray[Any]) -> np.dtype[Any]:
-    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
-    return floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
+    floats: dict[Any, np.dtype[Any]] = {
+        dr.VarType.Float32: np.dtype("f4"),
+        dr.VarType.Float64: np.dtype("f8"),
+    }
+    # truth values and whole numbers come in their own type
+    return floats.get(dr.type_v(scalar), numbers.dtype)
 
 
 def _memory(size: int) -> NDArray[np.uint8]:
-    """Return at least so many bytes of aligned memory, and as many again as Embree may read beyond the last number."""
+    """Return at least so many bytes of aligned memory, and as many again as Embree may
+    read beyond the last number.
+    """
     memory = np.empty(size + 2 * _ALIGNMENT, dtype=np.uint8)
     return memory[-memory.ctypes.data % _ALIGNMENT :]
 
@@ -143,8 +158,8 @@ def _memory(size: int) -> NDArray[np.uint8]:
 def host_numbers(*values: Any) -> tuple[NDArray[np.float64], ...]:
     """Bring values to the host together.
 
-    `values`: Dr.Jit numbers and vectors of one entry each, in any unit and precision. Returns `numbers`: by value its
-    components, (n,), in float64.
+    `values`: Dr.Jit numbers and vectors of one entry each, in any unit and precision. Returns
+    `numbers`: by value its components, (n,), in float64.
     """
     components = [tuple(value) if dr.depth_v(value) > 1 else (value,) for value in values]
     every = [component for of_value in components for component in of_value]
@@ -158,10 +173,14 @@ def _on_processor(number: Any) -> bool:
 
 
 def _element_by_element(numbers: list[Any]) -> NDArray[np.float64]:
-    """Read where they lie: on a processor a read takes less than a microsecond, and a copy of all a kernel."""
+    """Read where they lie: on a processor a read takes less than a microsecond,
+    and a copy of all a kernel.
+    """
     return np.array([number[0] for number in numbers], dtype=np.float64)
 
 
 def _in_one_transfer(numbers: list[Any]) -> NDArray[np.float64]:
-    """Gather on the device, then transfer once: every transfer from a GPU waits for all that runs there."""
+    """Gather on the device, then transfer once: every transfer from a GPU waits
+    for all that runs there.
+    """
     return np.array(dr.concat([mi.Float64(number) for number in numbers]))

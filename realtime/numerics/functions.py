@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions that are faster than Dr.Jit's where their arguments allow it, look-ups in tables, and nodes as constants.
+"""Functions that are faster than Dr.Jit's where their arguments allow it, look-ups in
+tables, and nodes as constants.
 
 **The diamond angle: an azimuth without trigonometry.**
 
 
-x/(|x| + |y|) and its like, continued round the square |x| + |y| = 1: 0 to 4 for a full turn, from the x axis over the
-y axis, monotone in the angle and exact to rounding.
+x/(|x| + |y|) and its like, continued round the square |x| + |y| = 1: 0 to 4 for a full turn, from
+the x axis over the y axis, monotone in the angle and exact to rounding.
 
 **Exponentials and a hyperbolic sine for bounded arguments.**
 
 
-Dr.Jit's exp guards overflow, underflow and NaN, which costs more than the function itself on a processor: 24 of them
-take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quadrature kernel spends most of its time
-here.
+Dr.Jit's exp guards overflow, underflow and NaN, which costs more than the function itself on a
+processor: 24 of them take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The
+quadrature kernel spends most of its time here.
 
 **Gauss-Legendre nodes as Python numbers: constants in the kernels that Dr.Jit records.**
 """
@@ -31,7 +32,9 @@ TURN = 4.0  #: a full turn
 
 
 def diamond_angle(x, y):
-    """Return the azimuth of (x, y), Dr.Jit arrays, in [0, 4) in diamond angles; 0 for the origin."""
+    """Return the azimuth of (x, y), Dr.Jit arrays, in [0, 4) in diamond
+    angles; 0 for the origin.
+    """
     return _diamond_angle(x, y, dr.select)
 
 
@@ -59,7 +62,8 @@ def _diamond_angle(x, y, select):
     return select((total > 0) & (angle < TURN), angle, 0)
 
 
-#: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8.
+#: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with
+#: relative error below 1.5e-8.
 EXP2 = (
     1.5353362e-4,
     1.3398874e-3,
@@ -69,7 +73,8 @@ EXP2 = (
     6.9314720e-1,
     1.0,
 )
-#: Coefficients of sinh(y)/y in y^2 for |y| up to `WIDEST`, highest power first: relative error below 2e-8.
+#: Coefficients of sinh(y)/y in y^2 for |y| up to `WIDEST`, highest power first:
+#: relative error below 2e-8.
 SINH = (2.9275649e-6, 1.9801041e-4, 8.3337125e-3, 1.6666654e-1, 1.0)
 WIDEST = 1.65  #: largest argument of `sinh_bounded`
 LOG2_E = 1.4426950408889634
@@ -81,8 +86,9 @@ _LOG2_E_LOW = 1.9259629911266175e-8  # the rest
 def exp_bounded(x):
     """Return exp(x) for float32 lanes on a processor, `drjit.exp` elsewhere.
 
-    Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative error below 2e-7.
-    NaN stays NaN. A number that is made of bits has no derivative: where one is asked for, `drjit.exp` is taken.
+    Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative
+    error below 2e-7. NaN stays NaN. A number that is made of bits has no derivative: where one is
+    asked for, `drjit.exp` is taken.
     """
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
@@ -95,13 +101,15 @@ def exp_expm1_bounded(x):
 
     Relative errors in float32 are below 2e-7 and 5e-7.
 
-    The polynomial of 2^f has the term 1 apart, so that float32 lanes on a processor pay no more than for exp(x).
-    Elsewhere the rounding of exp(x) is taken back by its logarithm (Kahan).
+    The polynomial of 2^f has the term 1 apart, so that float32 lanes on a processor pay no more
+    than for exp(x). Elsewhere the rounding of exp(x) is taken back by its logarithm (Kahan).
     """
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
         power = dr.exp(x)
-        less = dr.select(dr.abs(x) > 1, power - 1, dr.select(power == 1, x, (power - 1) * (x / dr.log(power))))
+        less = dr.select(
+            dr.abs(x) > 1, power - 1, dr.select(power == 1, x, (power - 1) * (x / dr.log(power)))
+        )
         return power, less
     f, n = _power_of_two(x)
     value = Float(EXP2[0])
@@ -115,8 +123,8 @@ def exp_expm1_bounded(x):
 def exp2_bounded(x):
     """Return 2^x for float32 lanes on a processor, `drjit.exp2` elsewhere.
 
-    Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7. Where a derivative is
-    asked for, it is `drjit.exp2` too.
+    Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7.
+    Where a derivative is asked for, it is `drjit.exp2` too.
     """
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
@@ -138,7 +146,8 @@ def sinh_bounded(y):
 
 
 def _power_of_two(x):
-    """Return f and n of exp(x) = 2^(n + f), n a whole number and |f| <= 1/2, for x >= -87; below it is that of -87.
+    """Return f and n of exp(x) = 2^(n + f), n a whole number and |f| <= 1/2, for x >= -87;
+    below it is that of -87.
 
     The fused steps keep f exact up to the rounding of log2(e) in two parts.
     """
@@ -159,13 +168,16 @@ def _scaled_power(f, n):
 
 @lru_cache
 def unit_nodes(count: int) -> tuple[tuple[float, float], ...]:
-    """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]; the weights add up to 1."""
+    """Return the nodes and weights of the Gauss-Legendre rule on [0, 1];
+    the weights add up to 1.
+    """
     xi, weight = np.polynomial.legendre.leggauss(count)
     return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))
 
 
 def summed(count: Any, term: Callable[[Any], Any], zero: Any) -> Any:
-    """Return the sum of `term(number)` over the numbers below `count`, in one loop: the kernel does not grow with them.
+    """Return the sum of `term(number)` over the numbers below `count`, in one loop: the kernel
+    does not grow with them.
 
     `zero` is the sum of nothing, one for each lane.
     """
@@ -179,7 +191,8 @@ def summed(count: Any, term: Callable[[Any], Any], zero: Any) -> Any:
 
 
 def cell_of(position, count) -> tuple[Any, Any]:
-    """Return the entry before a position, and the fraction of the way to the next, of `count` entries at whole numbers.
+    """Return the entry before a position, and the fraction of the way to the next, of `count`
+    entries at whole numbers.
 
     Positions are clipped to the entries; the last entry begins no cell.
     """
@@ -189,11 +202,14 @@ def cell_of(position, count) -> tuple[Any, Any]:
     return entry, inside - Float(entry)
 
 
-def between_entries(table, places: Sequence[tuple[Any, int]], width: int = 1, first: Any = 0) -> list[Any]:
-    """Return the numbers of a table, `width` an entry, linear between entries along each of some coordinates.
+def between_entries(
+    table, places: Sequence[tuple[Any, int]], width: int = 1, first: Any = 0
+) -> list[Any]:
+    """Return the numbers of a table, `width` an entry, linear between entries along
+    each of some coordinates.
 
-    `places`: by coordinate the place from 0 to 1, and how many entries there are; those of the last lie side by side;
-    `first`: index of the first entry.
+    `places`: by coordinate the place from 0 to 1, and how many entries there are; those of the last
+    lie side by side; `first`: index of the first entry.
     """
     Float = type(table)
     corners: list[tuple[Any, Any]] = [(first, Float(1))]
@@ -205,7 +221,9 @@ def between_entries(table, places: Sequence[tuple[Any, int]], width: int = 1, fi
             for step in (0, 1)
         ]
     if width == 4:  # read at once
-        return list(sum(part * dr.gather(four_numbers(Float), table, index) for index, part in corners))
+        return list(
+            sum(part * dr.gather(four_numbers(Float), table, index) for index, part in corners)
+        )
     return [
         sum(part * dr.gather(Float, table, index * width + number) for index, part in corners)
         for number in range(width)

@@ -1,26 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Random numbers of a frame: the same in each repetition of a run, others in each run, frame and pixel.
+"""Random numbers of a frame: the same in each repetition of a run, others in
+each run, frame and pixel.
 
-A generator with a state would need one for each pixel, and the order of its calls would matter. A hash of where and
-when a number is wanted needs neither: four whole numbers go in, four come out.
+A generator with a state would need one for each pixel, and the order of its calls would matter. A
+hash of where and when a number is wanted needs neither: four whole numbers go in, four come out.
 
-**Patterns** are the numbers by which samples are shifted. Over the runs each number of each pixel is evenly distributed
-in [0, 1), so that the mean of runs is the integral; they differ in how pixels and frames are alike:
+**Patterns** are the numbers by which samples are shifted. Over the runs each number of each pixel
+is evenly distributed in [0, 1), so that the mean of runs is the integral; they differ in how pixels
+and frames are alike:
 
 * `white`: a hash, independent of all others;
-* `blue`: a mask of 64 x 64 pixels in 16 frames, alike neither beside nor before (`docs/tools/blue_noise.py`). A run
-  shifts it on its torus by a random offset, and a hash fills in the bits below its 256 levels;
-* `ign`: interleaved gradient noise, fract(52.9829189 fract(0.06711056 i + 0.00583715 j)) in column i of row j: in any
-  3 x 3 pixels the nine values are about those of nine equal steps. A frame moves it by 5.588238 pixels along both; a
-  run adds a random number modulo 1.
+* `blue`: a mask of 64 x 64 pixels in 16 frames, alike neither beside nor before
+  (`docs/tools/blue_noise.py`). A run shifts it on its torus by a random offset, and a hash fills in
+  the bits below its 256 levels;
+* `ign`: interleaved gradient noise, fract(52.9829189 fract(0.06711056 i + 0.00583715 j)) in column
+  i of row j: in any 3 x 3 pixels the nine values are about those of nine equal steps. A frame moves
+  it by 5.588238 pixels along both; a run adds a random number modulo 1.
 
-`golden` in place of their own change from frame to frame adds n times the golden ratio to the pattern of frame 0.
+`golden` in place of their own change from frame to frame adds n times the golden ratio
+to the pattern of frame 0.
 
 References
 ----------
-Jarzynski and Olano 2020, *Hash functions for GPU rendering* (JCGT 9:3), `pcg4d`. Jimenez 2014, *Next generation
-post processing in Call of Duty: Advanced Warfare* (interleaved gradient noise). Wolfe, Morrical, Akenine-Moller,
-Ramamoorthi 2022, *Spatiotemporal blue noise masks* (EGSR).
+Jarzynski and Olano 2020, *Hash functions for GPU rendering* (JCGT 9:3), `pcg4d`. Jimenez 2014,
+*Next generation post processing in Call of Duty: Advanced Warfare* (interleaved gradient noise).
+Wolfe, Morrical, Akenine-Moller, Ramamoorthi 2022, *Spatiotemporal blue noise masks* (EGSR).
 """
 
 from dataclasses import dataclass
@@ -40,12 +44,15 @@ _GOLDEN = 2654435769  # 2^32 (sqrt(5) - 1)/2
 _GRADIENT = tuple(round(2**32 * slope) for slope in (0.06711056, 0.00583715))
 _MOVED = round(2**32 * 5.588238 * (0.06711056 + 0.00583715)) % 2**32  # of the gradient in a frame
 _SIDE, _FRAMES = 64, 16  # of the mask
-_OF_PATTERNS, _OF_RUN = 2**30, 2**31  # where streams of patterns begin, and of what all pixels of a run share
+# where streams of patterns begin, and of what all pixels of a run share
+_OF_PATTERNS, _OF_RUN = 2**30, 2**31
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The numbers of a run and of a frame in it; opaque, so that a recorded method has new numbers in each frame."""
+    """The numbers of a run and of a frame in it; opaque, so that a recorded method has
+    new numbers in each frame.
+    """
 
     run: Any
     frame: Any
@@ -63,18 +70,23 @@ class Noise:
         """Return four random words that all pixels and frames of the run share."""
         return pcg4d(0, 0, self.run, _OF_RUN + stream)
 
-    def pattern(self, kind: str, *, golden: bool, pixel: Any, place: tuple[Any, Any], stream: int = 0) -> Any:
+    def pattern(
+        self, kind: str, *, golden: bool, pixel: Any, place: tuple[Any, Any], stream: int = 0
+    ) -> Any:
         """Return a number from 0 to 1 for each pixel, by one of `PATTERNS`.
 
-        `golden`: whether frames differ by the golden ratio; `pixel`, `place`: numbers of pixels, and their rows and
-        columns; `stream`: below 2^30; patterns of two streams are independent over the runs.
+        `golden`: whether frames differ by the golden ratio; `pixel`, `place`: numbers of pixels,
+        and their rows and columns; `stream`: below 2^30; patterns of two streams are independent
+        over the runs.
         """
         frame = mi.UInt32(0) if golden else self.frame
         row, column = place
         hashed = pcg4d(pixel, frame, self.run, _OF_PATTERNS + stream)[0]
         shared = self.of_run(stream)
         if kind == "blue":
-            x, y, n = (base + offset for base, offset in zip((column, row, frame), shared, strict=False))
+            x, y, n = (
+                base + offset for base, offset in zip((column, row, frame), shared, strict=False)
+            )
             index = ((n % _FRAMES) * _SIDE + y % _SIDE) * _SIDE + x % _SIDE
             level = dr.gather(mi.UInt32, self.mask, index >> 2) >> ((index & 3) << 3)
             hashed = (level << 24) | (hashed >> 8)

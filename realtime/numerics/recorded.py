@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frozen functions that Python's garbage collector does not interrupt.
 
-While Dr.Jit records a function, no memory of the device may be freed, and no object may vanish that virtual calls use:
-a Mitsuba scene that is collected in the middle ends the process, or the recording fails. Garbage is collected later.
+While Dr.Jit records a function, no memory of the device may be freed, and no object may vanish that
+virtual calls use: a Mitsuba scene that is collected in the middle ends the process, or the
+recording fails. Garbage is collected later.
 
-The collector is one for all threads of the process, so it pauses until the last of several calls has returned.
+The collector is one for all threads of the process, so it pauses until the last of
+several calls has returned.
 
-An exception in the function, an interrupt by the user among them, ends the recording as if the function had returned
-nothing, and is raised after the recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
+An exception in the function, an interrupt by the user among them, ends the recording as if the
+function had returned nothing, and is raised after the recording: Dr.Jit 1.5 answers an exception in
+a recording by aborting a later one.
 """
 
 import gc
@@ -22,7 +25,9 @@ from airlight.realtime.errors import InputError, root_of
 
 
 class _CollectorPause:
-    """A context in which no garbage is collected; of contexts that overlap, the last one ends the pause."""
+    """A context in which no garbage is collected; of contexts that overlap, the
+    last one ends the pause.
+    """
 
     def __init__(self) -> None:
         self._lock, self._contexts, self._enabled = threading.Lock(), 0, False
@@ -48,15 +53,20 @@ class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
-        # Not an attribute: a function that held this object would be collected at any moment, with the scenes it holds.
+        # Not an attribute: a function that held this object would be collected at any moment,
+        # with the scenes it holds.
         raised = threading.local()  # another thread may call the function meanwhile
 
         def recorded(*args):
             try:
                 return function(*args)
-            except BaseException as error:  # of any kind: `__call__` raises it when the recording has ended
-                interrupt = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop or a branch
-                raised.error = _without_frames(interrupt if isinstance(interrupt, KeyboardInterrupt) else error)
+            # of any kind: `__call__` raises it when the recording has ended
+            except BaseException as error:
+                # Dr.Jit wraps what is raised in the body of a loop or a branch
+                interrupt = root_of(error)
+                raised.error = _without_frames(
+                    interrupt if isinstance(interrupt, KeyboardInterrupt) else error
+                )
                 return None
 
         self._raised = raised
@@ -80,7 +90,9 @@ class Frozen:
 
 
 def _without_frames(error: BaseException) -> BaseException:
-    """Return an exception whose causes hold no frames: their arrays must not outlive the recording."""
+    """Return an exception whose causes hold no frames: their arrays must
+    not outlive the recording.
+    """
     links: list[BaseException | None] = [error]
     seen = set()  # Dr.Jit may wrap an exception in one that has the first as its context: a circle
     while links:
@@ -94,7 +106,9 @@ def _without_frames(error: BaseException) -> BaseException:
 
 @contextmanager
 def refusals() -> Iterator[None]:
-    """Raise an `InputError` as it was: Dr.Jit wraps what is raised in the body of a loop or a branch."""
+    """Raise an `InputError` as it was: Dr.Jit wraps what is raised in the
+    body of a loop or a branch.
+    """
     try:
         yield
     except RuntimeError as error:

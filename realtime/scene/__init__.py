@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scene as methods see it: camera, lights, media, phase functions and meshes, read from Mitsuba once.
+"""The scene as methods see it: camera, lights, media, phase functions and
+meshes, read from Mitsuba once.
 
 Read in this order:
 
@@ -11,7 +12,8 @@ Read in this order:
 - `lights.py`: point, spot and directional lights as homogeneous positions;
 - `media/`: media, which answer for themselves: extinction, optical depths, airlight;
 - `closed_mesh.py`: closed meshes of any shape, what lies inside, and the convex bounds of media;
-- `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
+- `directional_extent.py`: the smallest rectangle across a directional light through which all
+  light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
 - `read_media.py`: reads the media of a Mitsuba scene;

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Motion from frame to frame: lights, the medium, objects.
 
-A scene with something moved is a new `Scene` that shares all the rest. Its arrays have the types and sizes of the old
-ones and are opaque, so a frame that was recorded once serves for all. Only objects move in Mitsuba's own scene, too, so
-that rays meet them; methods prepare their state from `Scene.positions`.
+A scene with something moved is a new `Scene` that shares all the rest. Its arrays have the types
+and sizes of the old ones and are opaque, so a frame that was recorded once serves for all. Only
+objects move in Mitsuba's own scene, too, so that rays meet them; methods prepare their state from
+`Scene.positions`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,8 @@ Array = NDArray[np.float64]
 
 
 def turned_light(light: Light, about: Array, turn: Array) -> Light:
-    """Return a light turned about a point, with its axis if it has one; a light at infinity only turns its axis.
+    """Return a light turned about a point, with its axis if it has one; a light at
+    infinity only turns its axis.
 
     A uniform sky is the same whichever way it turns, and the beam that stands for it stays.
 
@@ -49,14 +51,20 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
 def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) -> dict[str, Any]:
     types = types_of(type(extent.back))
     return directional_fields(
-        turn @ np.array(light.exact_axis).ravel(), extent_spheres(extent), float(extent.back[0]), types
+        turn @ np.array(light.exact_axis).ravel(),
+        extent_spheres(extent),
+        float(extent.back[0]),
+        types,
     )
 
 
 def coloured_light(light: Light, fraction: float) -> Light:
     """Return a light whose red, green and blue rotate by a fraction of a turn; their sum stays."""
     colours = {"intensity": light.intensity} | ({} if light.sky is None else {"sky": light.sky})
-    turned = {name: _rotated(np.array(colour, dtype=np.float64).ravel(), fraction) for name, colour in colours.items()}
+    turned = {
+        name: _rotated(np.array(colour, dtype=np.float64).ravel(), fraction)
+        for name, colour in colours.items()
+    }
     return replace(light, **{name: _like(colours[name], colour) for name, colour in turned.items()})
 
 
@@ -67,12 +75,16 @@ def _rotated(colour: Array, fraction: float) -> Array:
 
 
 def coloured_area_light(light: AreaLight, fraction: float) -> AreaLight:
-    """Return an area light whose red, green and blue rotate by a fraction of a turn; their sum stays."""
+    """Return an area light whose red, green and blue rotate by a fraction of
+    a turn; their sum stays.
+    """
     return replace(light, radiance=_rotated(light.radiance, fraction))
 
 
 def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
-    """Return a scene with its area lights elsewhere; the shapes of black ones move in its Mitsuba scene."""
+    """Return a scene with its area lights elsewhere; the shapes of black ones
+    move in its Mitsuba scene.
+    """
     black = [light for light in area_lights if light.opaque]
     if not black:
         return replace(scene, area_lights=tuple(area_lights))
@@ -93,12 +105,15 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
-    """Return a medium, and the bounded media in it, with the extinction times a factor; the albedo stays.
+    """Return a medium, and the bounded media in it, with the extinction times a
+    factor; the albedo stays.
 
     Raises InputError for a factor that is negative or not finite.
     """
     if not 0 <= factor < np.inf:
-        raise InputError(f"factor of the extinction: got {factor!r}, expected a finite value of 0 or more")
+        raise InputError(
+            f"factor of the extinction: got {factor!r}, expected a finite value of 0 or more"
+        )
     return medium.thicker(factor)
 
 
@@ -123,20 +138,28 @@ def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
     for name in names:
         key = f"{name}.vertex_positions"
         if key not in parameters:
-            raise InputError(f"shape {name!r} cannot move: expected the name of a mesh (obj, ply) in the scene")
+            raise InputError(
+                f"shape {name!r} cannot move: expected the name of a mesh (obj, ply) in the scene"
+            )
         vertices[name] = np.array(parameters[key], dtype=np.float32).reshape(-1, 3)
     facets = None
     if scene.facets is not None:
-        # Objects may have moved before in Mitsuba's scene: as it is now, vertices and normals are of one place.
+        # Objects may have moved before in Mitsuba's scene: as it is now, vertices and
+        # normals are of one place.
         facets = read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
     numbers = _numbers(parameters, names, scene.geometry.shapes()) if facets is not None else {}
-    middles = {name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0)) for name, own in vertices.items()}
+    middles = {
+        name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0))
+        for name, own in vertices.items()
+    }
     replace_positions(parameters, vertices)
     return Objects(parameters, vertices, middles, numbers, facets)
 
 
 def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
-    """Return which of the shapes have the vertices of these names: Mitsuba makes names for shapes without one."""
+    """Return which of the shapes have the vertices of these names: Mitsuba makes
+    names for shapes without one.
+    """
     numbers = {}
     for number, shape in enumerate(shapes):
         own = mi.traverse(shape)
@@ -157,12 +180,15 @@ def replace_positions(parameters, positions: Mapping[str, NDArray[Any]]) -> None
 
 
 def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
-    """Return the scene with each of the objects turned about the middle of its bounding box, from where it stood.
+    """Return the scene with each of the objects turned about the middle of its bounding
+    box, from where it stood.
 
     `turn` is a rotation matrix, (3, 3). The scene's Mitsuba scene is changed.
     """
     positions = {
-        name: ((vertices - objects.middles[name]) @ turn.T + objects.middles[name]).astype(np.float32)
+        name: ((vertices - objects.middles[name]) @ turn.T + objects.middles[name]).astype(
+            np.float32
+        )
         for name, vertices in objects.vertices.items()
     }
     replace_positions(objects.parameters, positions)
@@ -173,7 +199,9 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 
 
 def closed_shapes(occluders: Occluders) -> tuple[str, ...]:
-    """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
+    """Return the names of the shapes all of whose components are closed:
+    things, not floors and walls.
+    """
     component_shape = occluders.component_shape
     open_shapes = component_shape[~occluders.closed]
     closed = np.setdiff1d(component_shape, open_shapes)

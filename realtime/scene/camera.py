@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pinhole camera: pixel to ray.
 
-Mitsuba's perspective sensor looks along +z of its own frame, with +x to the left of the image and +y up. With the pixel
-(i, j) counted from the upper left corner of a W x H image, and a plane before the pinhole on which pixels are squares
-of size 1,
+Mitsuba's perspective sensor looks along +z of its own frame, with +x to the left of the image and
++y up. With the pixel (i, j) counted from the upper left corner of a W x H image, and a plane before
+the pinhole on which pixels are squares of size 1,
 
     direction ~ forward + ((W - 1)/2 - i) left + ((H - 1)/2 - j) up,   |left| = |up| = 2 tan(fov_x/2) / W,  |forward| =
     1.
 
 Rays start at the pinhole; the near clip plane does not cut the medium away (DESIGN section 6.3).
 
-A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m away, which is 1e-4
-of the height of a ray that passes it at half a pixel, and of the airlight there. The camera's vectors and the aim of a
-ray therefore have float64, in which `realtime.rays` computes once where the ray passes a light; all else has the
-scene's precision.
+A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m
+away, which is 1e-4 of the height of a ray that passes it at half a pixel, and of the airlight
+there. The camera's vectors and the aim of a ray therefore have float64, in which `realtime.rays`
+computes once where the ray passes a light; all else has the scene's precision.
 """
 
 import math
@@ -68,9 +68,11 @@ class Camera:
         return type(self.origin)(self.axes[2])
 
     def project(self, away) -> tuple[Any, Any, Any]:
-        """Return how many pixels left of and above the middle of the image vectors from the pinhole point, and how far.
+        """Return how many pixels left of and above the middle of the image vectors from the
+        pinhole point, and how far.
 
-        The third is their part along `forward`, in the unit of `away`; where it is not above 0 the others mean nothing.
+        The third is their part along `forward`, in the unit of `away`; where it is not above 0
+        the others mean nothing.
         """
         forward, left, up = (type(away)(axis) for axis in self.axes)
         depth = dr.dot(away, forward)
@@ -113,13 +115,21 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
         raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = sensors[0]
     if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(f"the scene's sensor is a {sensor.class_name()}; expected a sensor of type 'perspective'")
+        raise InputError(
+            f"the scene's sensor is a {sensor.class_name()}; expected a sensor of type "
+            "'perspective'"
+        )
     parameters = mi.traverse(sensor)
     width, height = (int(n) for n in parameters["film.size"])
     if list(parameters["film.crop_size"]) != [width, height]:
-        raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
+        raise InputError(
+            "the camera's film is cropped; remove crop_width, crop_height and crop_offset from the "
+            "film"
+        )
     if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
-        raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
+        raise InputError(
+            "the camera has a principal point offset; remove principal_point_offset_x and _y"
+        )
     matrix = host_matrix(sensor.world_transform())
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
     pixel = 2 * tangent / width
@@ -131,10 +141,12 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
 
 
 def row_and_column(camera: Camera, pixel):
-    """Return the rows and columns of pixels, given their numbers, row times width plus column, below 2^31.
+    """Return the rows and columns of pixels, given their numbers, row times width
+    plus column, below 2^31.
 
-    A division of whole numbers by one that the compiler does not know takes as long as ten products. They are
-    therefore multiplied in float64: the rounding of (p + 1/2)/W is below the distance 1/(2 W) to the next whole number.
+    A division of whole numbers by one that the compiler does not know takes as long as ten
+    products. They are therefore multiplied in float64: the rounding of (p + 1/2)/W is below the
+    distance 1/(2 W) to the next whole number.
     """
     row = mi.UInt32((mi.Float64(pixel) + 0.5) * camera.grid.inverse)
     return row, pixel - row * camera.grid.columns
@@ -148,8 +160,8 @@ def read_camera(camera: Camera) -> HostCamera:
 def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
     """Return a camera whose rays pass beside the centres of the pixels.
 
-    Only `forward` changes, by (W - 1)/2 - (i + right) and likewise for rows, so it is of unit length and upright on the
-    image to first order in the size of a pixel only: for pictures.
+    Only `forward` changes, by (W - 1)/2 - (i + right) and likewise for rows, so it is of unit
+    length and upright on the image to first order in the size of a pixel only: for pictures.
 
     `camera`: the camera; `right`, `down`: how far beside [pixels].
     """
@@ -167,14 +179,17 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     forward, left, up = camera.axes
     left, up = left * (camera.width / width), up * (camera.height / height)
     dr.make_opaque(left, up)
-    return replace(camera, width=width, height=height, axes=(forward, left, up), grid=pixel_grid(width, height))
+    return replace(
+        camera, width=width, height=height, axes=(forward, left, up), grid=pixel_grid(width, height)
+    )
 
 
 def tiled_pixels(width: int, height: int):
-    """Return the pixel numbers (row times width + column) in square tiles, (width times height,), uint32.
+    """Return the pixel numbers (row times width + column) in square tiles,
+    (width times height,), uint32.
 
-    A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16 packets cover 16 x 16
-    pixels, and 16 of those 64 x 64.
+    A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16
+    packets cover 16 x 16 pixels, and 16 of those 64 x 64.
     """
     row, column = np.divmod(np.arange(width * height, dtype=np.uint32), width)
     keys: list[np.ndarray] = [column, row]
@@ -184,7 +199,8 @@ def tiled_pixels(width: int, height: int):
 
 
 def ray_directions(camera: Camera, pixel):
-    """Return the unit directions through the centres of pixels, and the same of about unit length in float64.
+    """Return the unit directions through the centres of pixels, and the same of
+    about unit length in float64.
 
     `pixel` are numbers, row times width plus column, an unsigned Dr.Jit array.
     """

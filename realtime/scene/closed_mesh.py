@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Closed meshes of any shape, and which points lie inside.
 
-A mesh is closed if every edge is met by two triangles, once each way. The winding number of a mesh about a point is the
-sum of the solid angles of its triangles over 4 pi (Van Oosterom and Strackee 1983, eq. 8): with the corners a, b, c
-seen from the point,
+A mesh is closed if every edge is met by two triangles, once each way. The winding number of a mesh
+about a point is the sum of the solid angles of its triangles over 4 pi (Van Oosterom and Strackee
+1983, eq. 8): with the corners a, b, c seen from the point,
 
     tan(angle/2) = a . (b x c) / (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|).
 
-**Convex bounds of media:** the half spaces of a closed convex mesh, or a sphere, read from Mitsuba's shapes.
+**Convex bounds of media:** the half spaces of a closed convex mesh, or a sphere,
+read from Mitsuba's shapes.
 
-A mesh is convex if its surface is the one of its convex hull. The depth below the hull, the least distance to any of
-its planes, is concave along a triangle: with the depth d at the centroid and none below 0 it is at most 3 d anywhere.
-The centroids alone therefore decide, to 2e-5 of the size of the body. The volume below the hull does not: a box of 2 m
-at 31 m from the origin, its faces divided into 40 x 40, lacks 8e-7 of it by the rounding of float32, and a ball of
-81 920 facets 6e-7 by a dent of 1 % of its radius (29 November 2026).
+A mesh is convex if its surface is the one of its convex hull. The depth below the hull, the least
+distance to any of its planes, is concave along a triangle: with the depth d at the centroid and
+none below 0 it is at most 3 d anywhere. The centroids alone therefore decide, to 2e-5 of the size
+of the body. The volume below the hull does not: a box of 2 m at 31 m from the origin, its faces
+divided into 40 x 40, lacks 8e-7 of it by the rounding of float32, and a ball of 81 920 facets 6e-7
+by a dent of 1 % of its radius (29 November 2026).
 
-Facets that lie in one plane to the rounding of float32 vertices are one half space: a cube has 6, however finely it is
-divided. The hull merges them (Barber, Dobkin, Huhdanpaa 1996, *The quickhull algorithm for convex hulls*, ACM
-Transactions on Mathematical Software 22(4)).
+Facets that lie in one plane to the rounding of float32 vertices are one half space: a cube has 6,
+however finely it is divided. The hull merges them (Barber, Dobkin, Huhdanpaa 1996, *The quickhull
+algorithm for convex hulls*, ACM Transactions on Mathematical Software 22(4)).
 """
 
 from dataclasses import dataclass, field
@@ -41,7 +43,8 @@ class ClosedMesh:
 
     name: str
     vertices: Array  #: (vertices, 3) [m]
-    faces: NDArray[np.int64]  #: numbers of vertices, counter-clockwise seen from outside, (faces, 3)
+    #: numbers of vertices, counter-clockwise seen from outside, (faces, 3)
+    faces: NDArray[np.int64]
     own: NDArray[np.int64]  #: the numbers of the vertices in the user's mesh, (vertices,)
 
     @property
@@ -50,7 +53,9 @@ class ClosedMesh:
         return self.vertices[self.faces]
 
     def edge_words(self, tail: int, head: int) -> str:
-        """Return the name of an edge in messages: the user's numbers of its vertices, and its middle."""
+        """Return the name of an edge in messages: the user's numbers of its
+        vertices, and its middle.
+        """
         place = 0.5 * (self.vertices[tail] + self.vertices[head])
         return f"edge {self.own[tail]}-{self.own[head]} at ({', '.join(f'{x:.6g}' for x in place)})"
 
@@ -93,19 +98,25 @@ def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
 
 def _open(mesh: ClosedMesh, tail: int, head: int, why: str) -> InputError:
     return InputError(
-        f"shape '{mesh.name}' bounds a medium and is not a closed surface: {mesh.edge_words(tail, head)}, {why}; "
-        "expected a closed mesh in which two triangles meet at every edge, and run along it in opposite ways"
+        f"shape '{mesh.name}' bounds a medium and is not a closed surface: "
+        f"{mesh.edge_words(tail, head)}, {why}; "
+        "expected a closed mesh in which two triangles meet at every edge, and run along it in "
+        "opposite ways"
     )
 
 
 def winding_number(corners: Array, point: Array) -> float:
-    """Return how often triangles with `corners` (triangles, 3, 3) [m] wind around a `point` [m]; 1 is inside."""
+    """Return how often triangles with `corners` (triangles, 3, 3) [m] wind around a
+    `point` [m]; 1 is inside.
+    """
     a, b, c = np.moveaxis(corners - point, 1, 0)
     lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))
     products = [np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))]
     turned = products[0] * lengths[2] + products[1] * lengths[0] + products[2] * lengths[1]
-    return float(np.sum(np.arctan2(volume, lengths[0] * lengths[1] * lengths[2] + turned)) / (2 * np.pi))
+    return float(
+        np.sum(np.arctan2(volume, lengths[0] * lengths[1] * lengths[2] + turned)) / (2 * np.pi)
+    )
 
 
 def encloses(mesh: ClosedMesh, point: Array) -> bool:
@@ -123,14 +134,17 @@ def shape_number(shape: Any) -> int:
 _OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
 FLAT = 1e-5  #: how far a surface may lie from a convex one, relative to the size of the body
 CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
-_ROUNDING = 2.0**-22  # of the largest coordinate: four times the rounding of a float32, as three of them add up
+# of the largest coordinate: four times the rounding of a float32, as three of them add up
+_ROUNDING = 2.0**-22
 _CHUNK = 1 << 22  # distances of points from planes that are in memory at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """A convex body: what lies in all half spaces normal . x <= offset, or in the sphere where there are none."""
+    """A convex body: what lies in all half spaces normal . x <= offset, or in the
+    sphere where there are none.
+    """
 
     name: str
     normals: Array  #: unit vectors that point outwards, (planes, 3)
@@ -165,13 +179,16 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     Raises
     ------
     InputError
-        For a shape that is neither a sphere nor a closed mesh with its normals outwards, with its name.
+        For a shape that is neither a sphere nor a closed mesh with its normals
+        outwards, with its name.
     """
     name = shape.id()
     if shape.class_name() == "Sphere":
         return _read_sphere(shape), None
     if not shape.is_mesh() or shape.class_name() == "Rectangle":
-        raise _refusal(name, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh")
+        raise _refusal(
+            name, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh"
+        )
     vertices, faces = mesh_triangles(shape)
     faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
     mesh = closed_mesh(name, vertices, faces)
@@ -180,14 +197,26 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
 
 def _read_sphere(shape) -> Bounds:
     box = shape.bbox()
-    low, high = np.array(box.min, dtype=np.float64).ravel(), np.array(box.max, dtype=np.float64).ravel()
+    low, high = (
+        np.array(box.min, dtype=np.float64).ravel(),
+        np.array(box.max, dtype=np.float64).ravel(),
+    )
     size = high - low
     if np.ptp(size) > FLAT * size.max():
-        raise _refusal(shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh")
+        raise _refusal(
+            shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh"
+        )
     if shape.has_flipped_normals():
-        raise _refusal(shape.id(), "is inside out", f"normals that point outwards: {turned_outwards(shape)}")
+        raise _refusal(
+            shape.id(), "is inside out", f"normals that point outwards: {turned_outwards(shape)}"
+        )
     return Bounds(
-        shape.id(), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), 0.5 * (low + high), float(size.mean() / 2)
+        shape.id(),
+        np.zeros((0, 3)),
+        np.zeros(0),
+        np.zeros((0, 3, 3)),
+        0.5 * (low + high),
+        float(size.mean() / 2),
     )
 
 
@@ -213,15 +242,16 @@ def mesh_bounds(mesh: ClosedMesh) -> Bounds | None:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
         raise _refusal(mesh.name, flaw, _OUTWARDS)
 
-    # The hull is made around the centre, so that it adds no rounding. Qhull repeats the plane of each facet for all
-    # triangles that it divides the facet into.
+    # The hull is made around the centre, so that it adds no rounding. Qhull repeats the plane of
+    # each facet for all triangles that it divides the facet into.
     rounding = _ROUNDING * float(np.abs(mesh.vertices).max())
     hull = ConvexHull(mesh.vertices - centre, qhull_options=f"Qt C{rounding:g}")
     planes, plane = np.unique(hull.equations, axis=0, return_inverse=True)
     if not _on_surface(mesh, hull.simplices, planes, centre, max(FLAT * size, rounding)):
         return None
 
-    # Triangles of the hull that share an edge and lie in different planes make these planes neighbours.
+    # Triangles of the hull that share an edge and lie in different planes make
+    # these planes neighbours.
     plane = plane.reshape(-1)
     beside = plane[hull.neighbors]
     pairs = np.unique((plane[:, None] * len(planes) + beside)[beside != plane[:, None]])
@@ -237,14 +267,21 @@ def mesh_bounds(mesh: ClosedMesh) -> Bounds | None:
     )
 
 
-def _on_surface(mesh: ClosedMesh, simplices: NDArray[Any], planes: Array, centre: Array, depth: float) -> bool:
-    """Return whether the triangles of a mesh lie on its convex hull, no deeper than 2 `depth` [m] (see the module).
+def _on_surface(
+    mesh: ClosedMesh, simplices: NDArray[Any], planes: Array, centre: Array, depth: float
+) -> bool:
+    """Return whether the triangles of a mesh lie on its convex hull, no deeper than 2
+    `depth` [m] (see the module).
 
-    `simplices`: numbers of the vertices of the hull's triangles; `planes`: rows (normal, -offset) about the `centre`.
+    `simplices`: numbers of the vertices of the hull's triangles; `planes`: rows (normal,
+    -offset) about the `centre`.
     """
     # Most triangles of smooth bodies are triangles of the hull.
     count = len(mesh.vertices)
-    own, of_hull = (np.sort(part, axis=1) @ [count**2, count, 1] for part in (mesh.faces, simplices.astype(np.int64)))
+    own, of_hull = (
+        np.sort(part, axis=1) @ [count**2, count, 1]
+        for part in (mesh.faces, simplices.astype(np.int64))
+    )
     others = np.flatnonzero(~np.isin(own, of_hull))
     rows = max(1, _CHUNK // len(planes))
     for first in range(0, len(others), rows):
@@ -260,7 +297,9 @@ def _refusal(name: str, flaw: str, wanted: str) -> InputError:
 
 
 def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
-    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any)."""
+    """Return by plane the planes that share an edge with it, filled up with its own
+    number, (planes, most of any).
+    """
     plane, neighbour = bounds.neighbours.T
     counts = np.bincount(plane, minlength=len(bounds.offsets))
     table = np.repeat(np.arange(len(counts), dtype=np.uint32)[:, None], counts.max(), axis=1)
@@ -269,7 +308,9 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
 
 
 def radial_planes(bounds: Bounds) -> NDArray[np.uint32]:
-    """Return by cell of directions from the centre a plane that is met there; cells are `CELLS` along each axis."""
+    """Return by cell of directions from the centre a plane that is met there; cells are
+    `CELLS` along each axis.
+    """
     places = (np.arange(CELLS) + 0.5) * (2 / CELLS) - 1
     distance = bounds.offsets - bounds.normals @ bounds.centre
     x, y, z = bounds.normals.T
@@ -302,10 +343,11 @@ def touches(bounds: Bounds, point: Array) -> bool:
 def mean_distance(bounds: Bounds) -> float:
     """Return R, the average distance between a point of the boundary and a point of the body [m].
 
-    Both are uniform, by area and by volume, and independent: one reading of "the average distance between a point
-    located in the boundary and a point in the medium". In a sphere the mean over the boundary is a + d^2/(3 a) for a
-    point at the distance d from the centre, so R = 6 a/5. In a mesh it is the mean over 65 536 pairs drawn once for all
-    from a fixed seed, with a standard error of about 0.2 %.
+    Both are uniform, by area and by volume, and independent: one reading of "the average distance
+    between a point located in the boundary and a point in the medium". In a sphere the mean over
+    the boundary is a + d^2/(3 a) for a point at the distance d from the centre, so R = 6 a/5. In a
+    mesh it is the mean over 65 536 pairs drawn once for all from a fixed seed, with a standard
+    error of about 0.2 %.
 
     Biri, Arques, Michelin 2006, section 4.2.
     """
@@ -318,7 +360,9 @@ def mean_distance(bounds: Bounds) -> float:
     volume = np.sum((corner[:, 0] - middle) * area, axis=1)
     boundary = _on_triangles(corner, np.linalg.norm(area, axis=1), random)
     # The body is the tetrahedra from its middle to its triangles.
-    inside = middle + np.cbrt(random.random((_SAMPLES, 1))) * (_on_triangles(corner, volume, random) - middle)
+    inside = middle + np.cbrt(random.random((_SAMPLES, 1))) * (
+        _on_triangles(corner, volume, random) - middle
+    )
     return float(np.mean(np.linalg.norm(boundary - inside, axis=1)))
 
 

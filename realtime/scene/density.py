@@ -5,15 +5,16 @@ A grid of values of which the largest is rho_max gives the extinction
 
     sigma_t(p) = scale rho_max rho(p),        rho = values / rho_max  in [0, 1],
 
-linear between the centres of voxels (at (i + 1/2)/n of the grid's box, as Mitsuba has it) and constant beyond the
-outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: a bound for code that knows extinctions
-alone. `Clouds.density` holds rho.
+linear between the centres of voxels (at (i + 1/2)/n of the grid's box, as Mitsuba has it) and
+constant beyond the outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: a
+bound for code that knows extinctions alone. `Clouds.density` holds rho.
 
-Mitsuba tells Python a volume's values and its box, and not its transform. The transform is measured: the middle of the
-box is that of the grid, and a grid of two voxels a side, 0 at one end of an axis and 1 at the other, has the coordinate
-along this axis as its value. Such a grid takes the place of the volume's own for each axis in turn, while it is read at
-places around the middle. The densities are then compared with Mitsuba's own at some points, so nothing else can be
-taken for a grid that is linear between voxels.
+Mitsuba tells Python a volume's values and its box, and not its transform. The transform is
+measured: the middle of the box is that of the grid, and a grid of two voxels a side, 0 at one end
+of an axis and 1 at the other, has the coordinate along this axis as its value. Such a grid takes
+the place of the volume's own for each axis in turn, while it is read at places around the middle.
+The densities are then compared with Mitsuba's own at some points, so nothing else can be taken for
+a grid that is linear between voxels.
 """
 
 import math
@@ -27,14 +28,22 @@ from numpy.typing import NDArray
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.memory import check_memory
-from airlight.realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, bytes_of, four_numbers
+from airlight.realtime.numerics.array_types import (
+    ArrayTypes,
+    PerRay,
+    aligned_array,
+    bytes_of,
+    four_numbers,
+)
 from airlight.realtime.scene.closed_mesh import ClosedMesh
 
 Array = NDArray[np.float64]
 
 _POINTS = 512  # at which a grid is compared with Mitsuba's
-_DIFFERENCE = 2e-3  # from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
-_TURNED = 1e-5  # of the grid, by which float32 leaves its sides beside the axes; more far from the origin
+# from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
+_DIFFERENCE = 2e-3
+# of the grid, by which float32 leaves its sides beside the axes; more far from the origin
+_TURNED = 1e-5
 _HALVINGS = 20  # of steps from the middle of a grid: sides of one to a million
 _BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a fraction of that
 
@@ -56,15 +65,19 @@ class DensityGrid:
 
 @dataclass(frozen=True)
 class Density:
-    """The density of all clouds of a scene, on the device; one without a grid has the density 1 everywhere."""
+    """The density of all clouds of a scene, on the device; one without a grid has
+    the density 1 everywhere.
+    """
 
-    #: four numbers a voxel: rho there, at its neighbour in x, in y, and in both. One read of them replaces four: with a
-    #: number a voxel `ray-march` took 2.2 times as long in `smoke` (28 November 2026, two cores, 160 x 120), and with
-    #: Dr.Jit's `Texture3f`, which holds one grid alone, 2.0 times (5.5 for 2.7 CPU s, 29 November 2026)
+    #: four numbers a voxel: rho there, at its neighbour in x, in y, and in both. One read of them
+    #: replaces four: with a number a voxel `ray-march` took 2.2 times as long in `smoke` (28
+    #: November 2026, two cores, 160 x 120), and with Dr.Jit's `Texture3f`, which holds one grid
+    #: alone, 2.0 times (5.5 for 2.7 CPU s, 29 November 2026)
     table: Any
     first: Any  #: by cloud, the number of its first voxel
     counts: tuple[Any, Any, Any]  #: by cloud, voxels along x, y, z
-    rows: tuple[Any, ...]  #: by cloud, twelve numbers: from places [m] to voxels, whole numbers at their centres
+    #: by cloud, twelve numbers: from places [m] to voxels, whole numbers at their centres
+    rows: tuple[Any, ...]
     voxel: Any  #: by cloud, the width of a voxel, infinite where there is no grid [m]
 
     def at(self, point, cloud: PerRay, active: Any = True) -> PerRay:
@@ -73,7 +86,9 @@ class Density:
         Four = four_numbers(Float)
         x, y, z = self.rows_at(point, cloud, active)
         nx, ny, nz = (dr.gather(mi.UInt32, count, cloud, active) for count in self.counts)
-        (i, u), (j, v), (k, w) = (_cell(place, count) for place, count in ((x, nx), (y, ny), (z, nz)))
+        (i, u), (j, v), (k, w) = (
+            _cell(place, count) for place, count in ((x, nx), (y, ny), (z, nz))
+        )
         voxel = dr.gather(mi.UInt32, self.first, cloud, active) + (k * ny + j) * nx + i
         near = dr.gather(Four, self.table, voxel, active)
         far = dr.gather(Four, self.table, voxel + dr.select(k + 1 < nz, nx * ny, 0), active)
@@ -85,13 +100,19 @@ class Density:
         Float = type(point.x)
         row = [dr.gather(Float, number, cloud, active) for number in self.rows]
         x, y, z = (
-            dr.fma(row[n], point.x, dr.fma(row[n + 1], point.y, dr.fma(row[n + 2], point.z, row[n + 3])))
+            dr.fma(
+                row[n],
+                point.x,
+                dr.fma(row[n + 1], point.y, dr.fma(row[n + 2], point.z, row[n + 3])),
+            )
             for n in (0, 4, 8)
         )
         return x, y, z
 
     def mean_above(self, cloud: int, threshold: float) -> float:
-        """Return the mean of rho over the voxels of a cloud in which it is above a threshold, 1 without any."""
+        """Return the mean of rho over the voxels of a cloud in which it is above a
+        threshold, 1 without any.
+        """
         count = int(np.prod([int(count[cloud]) for count in self.counts]))
         voxel = dr.arange(mi.UInt32, count) + int(self.first[cloud])
         rho = dr.gather(type(self.table), self.table, 4 * voxel)
@@ -110,7 +131,9 @@ def _cell(place, count) -> tuple[Any, Any]:
 
 
 def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
-    """Return the grid of a Mitsuba medium within a mesh, which it must cover; see `read_density`."""
+    """Return the grid of a Mitsuba medium within a mesh, which it must
+    cover; see `read_density`.
+    """
     name = f"the heterogeneous medium of shape '{mesh.name}'"
     grid = read_density(medium, name)
     reach = grid.to_grid[:, :3] @ mesh.vertices.T + grid.to_grid[:, 3:]
@@ -119,7 +142,8 @@ def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
         vertex = int(np.argmax(beyond.any(axis=0)))
         place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
         raise InputError(
-            f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at ({place}) lies beside it; "
+            f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at "
+            f"({place}) lies beside it; "
             "expected a to_world of the volume whose unit cube holds the shape"
         )
     return grid
@@ -138,37 +162,44 @@ def read_density(medium: Any, name: str) -> DensityGrid:
     Raises
     ------
     InputError
-        For an extinction that is no grid of one channel, linear between voxels, with finite values of 0 or more, and
-        for an albedo that differs from place to place.
+        For an extinction that is no grid of one channel, linear between voxels, with finite values
+        of 0 or more, and for an albedo that differs from place to place.
     """
     # The extinction is on a grid and nothing else is.
     parameters = mi.traverse(medium)
     if "sigma_t.data" not in parameters:
-        raise InputError(f"{name} has an extinction that is no grid; expected a 'gridvolume' as sigma_t")
+        raise InputError(
+            f"{name} has an extinction that is no grid; expected a 'gridvolume' as sigma_t"
+        )
     if "albedo.value.value" not in parameters:
         raise InputError(
-            f"{name} has an albedo that differs from place to place; expected one number or colour: a 'constvolume'"
+            f"{name} has an albedo that differs from place to place; expected one number or "
+            "colour: a 'constvolume'"
         )
 
     # One channel of finite values, of which one at least is above 0.
     values = np.array(parameters["sigma_t.data"], dtype=np.float32)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
-            f"{name} has an extinction of {values.shape[3]} channels on its grid; expected one channel: grey"
+            f"{name} has an extinction of {values.shape[3]} channels on its grid; expected one "
+            "channel: grey"
         )
     values = values.reshape(values.shape[:3])
     wrong = ~(np.isfinite(values) & (values >= 0))
     if wrong.any():
         z, y, x = (int(index) for index in np.argwhere(wrong)[0])
         raise InputError(
-            f"{name} has {values[z, y, x]:g} in voxel ({x}, {y}, {z}), and {int(wrong.sum())} such in all; expected "
+            f"{name} has {values[z, y, x]:g} in voxel ({x}, {y}, {z}), and {int(wrong.sum())} such "
+            "in all; expected "
             "finite densities of 0 or more"
         )
     scale, largest = float(np.array(parameters["scale"]).ravel()[0]), float(values.max())
     if not (scale >= 0 and np.isfinite(scale)):
         raise InputError(f"{name} has the scale {scale:g}; expected a finite number of 0 or more")
     if not largest * scale > 0:
-        raise InputError(f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere")
+        raise InputError(
+            f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere"
+        )
 
     # The largest value is that of the extinction; what is read has to be what Mitsuba reads.
     values /= np.float32(largest)
@@ -178,7 +209,8 @@ def read_density(medium: Any, name: str) -> DensityGrid:
 
 
 def along_the_axes(grid: DensityGrid, name: str) -> DensityGrid:
-    """Return a grid with its values in the order of the axes of coordinates; messages call its medium by `name`.
+    """Return a grid with its values in the order of the axes of coordinates; messages
+    call its medium by `name`.
 
     Raises InputError for a box whose sides are not along the axes.
     """
@@ -187,7 +219,8 @@ def along_the_axes(grid: DensityGrid, name: str) -> DensityGrid:
     along = sides[np.arange(3), axes]
     if np.abs(sides[:, axes] / along - np.eye(3)).max() > _TURNED:
         raise InputError(
-            f"{name} has a grid whose box is turned; expected a to_world that scales, moves and mirrors, and turns by "
+            f"{name} has a grid whose box is turned; expected a to_world that scales, moves and "
+            "mirrors, and turns by "
             "right angles alone"
         )
     # A mirrored axis of the grid, u, is read from its other end: 1 - u.
@@ -202,9 +235,13 @@ def _transform(medium: Any, name: str) -> Array:
     """Return the transform of the grid of a medium, (3, 4); messages call the medium by `name`."""
     parameters = mi.traverse(medium)
     volume = next(part for part in parameters.hierarchy if part.class_name() == "GridVolume")
-    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (volume.bbox().min, volume.bbox().max))
+    low, high = (
+        np.array(corner, dtype=np.float64).ravel()
+        for corner in (volume.bbox().min, volume.bbox().max)
+    )
     middle, size = 0.5 * (low + high), high - low
-    own = mi.TensorXf(parameters["sigma_t.data"])  # a copy: `parameters` writes into what it has returned
+    # a copy: `parameters` writes into what it has returned
+    own = mi.TensorXf(parameters["sigma_t.data"])
     try:
         matrix = _measured(parameters, volume, middle, size)
     finally:
@@ -212,10 +249,12 @@ def _transform(medium: Any, name: str) -> Array:
         parameters.update()
     if matrix is None:
         raise InputError(
-            f"{name} has a grid that is not linear between voxels; expected a 'gridvolume' with the filter_type "
+            f"{name} has a grid that is not linear between voxels; expected a 'gridvolume' with "
+            "the filter_type "
             "'trilinear'"
         )
-    # Mitsuba rounds a coordinate of the grid by so much, as it adds up products with places in float32.
+    # Mitsuba rounds a coordinate of the grid by so much, as it adds up
+    # products with places in float32.
     rounding = float(np.finfo(np.float32).eps) * np.abs(matrix) @ (np.abs(middle) + size)
     along = np.abs(matrix) * size > np.maximum(_TURNED, 4 * rounding)[:, None]
     if along.sum() == 3:  # Along the axes the sides of the box have all digits.
@@ -224,11 +263,13 @@ def _transform(medium: Any, name: str) -> Array:
 
 
 def _measured(parameters: Any, volume: Any, middle: Array, size: Array) -> Array | None:
-    """Return the derivatives of the coordinates of a grid by place, (3, 3) [1/m]; its values are lost.
+    """Return the derivatives of the coordinates of a grid by place, (3, 3)
+    [1/m]; its values are lost.
 
     None for a grid that is not linear between voxels.
     """
-    steps = 0.2 * size  # along the axes of coordinates; the values are linear for 0.25 of the grid from its middle
+    # along the axes of coordinates; the values are linear for 0.25 of the grid from its middle
+    steps = 0.2 * size
     for _ in range(_HALVINGS):
         offsets = np.concatenate([np.diag(steps), -np.diag(steps)])
         values = np.empty((3, 6))  # by axis of the grid, and by place
@@ -263,7 +304,8 @@ def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
     worst = float(np.abs(np.array(sigma_t)[0] - own).max()) / grid.largest
     if worst > _DIFFERENCE:
         raise InputError(
-            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its "
+            "largest value; expected a "
             "'gridvolume' with the filter_type 'trilinear'"
         )
 
@@ -313,9 +355,13 @@ def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Den
         # Each voxel has its neighbours beside it, itself in their place at the end of a row.
         corners = table[begin : begin + values.size].reshape(*shape, 4)
         for number, (down, along) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
-            y, x = (np.minimum(np.arange(n) + step, n - 1) for n, step in zip(shape[1:], (down, along), strict=True))
+            y, x = (
+                np.minimum(np.arange(n) + step, n - 1)
+                for n, step in zip(shape[1:], (down, along), strict=True)
+            )
             np.take(values[:, y], x, axis=2, out=corners[..., number])
-        # From places to voxels, whole numbers at their centres; a homogeneous cloud has one voxel, wherever one asks.
+        # From places to voxels, whole numbers at their centres; a homogeneous cloud has one
+        # voxel, wherever one asks.
         to_grid = np.zeros((3, 4)) if grid is None else grid.to_grid
         to_voxels = to_grid * np.array(count)[:, None]
         to_voxels[:, 3] -= 0.5

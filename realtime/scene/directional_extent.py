@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The extent of a directional light: the smallest rectangle across it through which all light of the media comes.
+"""The extent of a directional light: the smallest rectangle across it through which all
+light of the media comes.
 
-Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
-small numbers where depths may be large ones, so its middle stands for the place of the light.
+Light enters there before all shapes, and leaves through the same rectangle behind the media.
+Heights above that end are small numbers where depths may be large ones, so its middle stands for
+the place of the light.
 
-The media lie in the hull of some spheres: the corners of the hull of meshes, which are spheres of radius 0, and media
-that are spheres. Without media that end somewhere the spheres are those about the shapes. Seen along the light the
-rectangle about them is turned by the angle at which it has the least area.
+The media lie in the hull of some spheres: the corners of the hull of meshes, which are spheres of
+radius 0, and media that are spheres. Without media that end somewhere the spheres are those about
+the shapes. Seen along the light the rectangle about them is turned by the angle at which it has the
+least area.
 """
 
 from collections.abc import Sequence
@@ -32,8 +35,8 @@ _MARGIN = 1.001  # so that rounding leaves nothing outside
 def media_spheres(boundaries: Sequence[Any]) -> Array:
     """Return spheres whose hull holds media: middles and radii, (spheres, 4) [m].
 
-    Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in their last digits
-    must not move the rays of a map.
+    Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in
+    their last digits must not move the rays of a map.
 
     Parameters
     ----------
@@ -54,28 +57,38 @@ def media_spheres(boundaries: Sequence[Any]) -> Array:
 def shape_spheres(shapes) -> Array:
     """Return spheres about shapes, (spheres, 4) [m], for a medium without sides.
 
-    They are larger than the shapes by a twentieth of them all: at the border of a map nothing stands, so that what lies
-    beyond it is lit.
+    They are larger than the shapes by a twentieth of them all: at the border of a map nothing
+    stands, so that what lies beyond it is lit.
 
     Parameters
     ----------
     shapes
-        Mitsuba's opaque shapes; without any the rectangle is that of a sphere of 1 m about the origin.
+        Mitsuba's opaque shapes; without any the rectangle is that of a sphere
+        of 1 m about the origin.
     """
-    spheres = np.array([_sphere_about(shape) for shape in shapes] or [np.array([0.0, 0.0, 0.0, 1.0])])
+    spheres = np.array(
+        [_sphere_about(shape) for shape in shapes] or [np.array([0.0, 0.0, 0.0, 1.0])]
+    )
     size = np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()
     return _rounded(spheres + np.array([0, 0, 0, _BORDER * size]))
 
 
 def _sphere_about(shape: Any, *, touching: bool = False) -> Array:
-    """Return the sphere about the box of a shape, (4,) [m]; `touching`: the one inside, which is a sphere itself."""
-    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+    """Return the sphere about the box of a shape, (4,) [m]; `touching`: the one inside,
+    which is a sphere itself.
+    """
+    low, high = (
+        np.array(corner, dtype=np.float64).ravel()
+        for corner in (shape.bbox().min, shape.bbox().max)
+    )
     width = (high - low).max() if touching else np.linalg.norm(high - low)
     return np.append(0.5 * (low + high), 0.5 * width)
 
 
 def _rounded(spheres: Array) -> Array:
-    grain = 2.0 ** np.ceil(np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS)
+    grain = 2.0 ** np.ceil(
+        np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS
+    )
     return grain * (np.round(spheres / grain) + np.array([0, 0, 0, 2]))
 
 
@@ -97,10 +110,14 @@ def distance_before(spheres: Array, shapes) -> float:
     return float(np.float32(_MARGIN * reach.max()))
 
 
-def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
-    """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
+def directional_fields(
+    axis: Array, spheres: Array, back: float, types: ArrayTypes
+) -> dict[str, Any]:
+    """Return the fields of a directional `Light` that follow from where it comes
+    from and what it lights.
 
-    Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
+    Valid for any axis. All but the axis is rounded to float32 in any precision, so that
+    its map is the same in all.
 
     Parameters
     ----------
@@ -121,15 +138,23 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     position = made.pop("position")
     media = types.vector(*(aligned_array(types.scalar, column) for column in spheres[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
-    extent = DirectionalExtent(**made, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3]))
-    fields = {"position": position, "exact_axis": mi.Vector3d(*(float(c) for c in axis)), "extent": extent}
+    extent = DirectionalExtent(
+        **made, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3])
+    )
+    fields = {
+        "position": position,
+        "exact_axis": mi.Vector3d(*(float(c) for c in axis)),
+        "extent": extent,
+    }
     dr.make_opaque(*fields.values())
     return fields
 
 
 def extent_spheres(extent: DirectionalExtent) -> Array:
     """Return the spheres about the media that an extent was made for."""
-    return np.column_stack([np.array(extent.media, dtype=np.float64).T, np.array(extent.radii, dtype=np.float64)])
+    return np.column_stack(
+        [np.array(extent.media, dtype=np.float64).T, np.array(extent.radii, dtype=np.float64)]
+    )
 
 
 def _middle(spheres: Array) -> Array:
@@ -138,13 +163,16 @@ def _middle(spheres: Array) -> Array:
 
 
 def _least_rectangle(axis: Array, points: Array, radii: Array) -> tuple[Array, Array, Array]:
-    """Return half the sides of the rectangle of least area across an axis, and its middle; all (3,) [m]."""
+    """Return half the sides of the rectangle of least area across an axis, and
+    its middle; all (3,) [m].
+    """
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
 
-    # By angle the directions of one side, and behind them those of the other, a quarter of a turn ahead.
+    # By angle the directions of one side, and behind them those of the other, a
+    # quarter of a turn ahead.
     angle = np.linspace(0, 0.5 * np.pi, _ANGLES, endpoint=False)[:, None]
     cosine, sine = np.cos(angle), np.sin(angle)
     sides = np.concatenate([cosine * first + sine * second, cosine * second - sine * first])

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights of one structure as a table, a light a row, and the samples of area lights.
 
-A loop over lights in Python makes a kernel that grows with them. A table makes all of them one: its rows are gathered,
-and `LightTable.sum` is the one loop over lights.
+A loop over lights in Python makes a kernel that grows with them. A table makes all of them one: its
+rows are gathered, and `LightTable.sum` is the one loop over lights.
 
-The power of a light is its intensity times the solid angle that it shines into, and a table draws a light by the
-inverse of the sum of powers: the least number whose sum of powers is above a fraction of the total.
+The power of a light is its intensity times the solid angle that it shines into, and a table draws a
+light by the inverse of the sum of powers: the least number whose sum of powers is above a fraction
+of the total.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -17,7 +18,13 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.area_lights.points import PlacedPoints, place_points
-from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, aligned_numbers, host_numbers, types_of
+from airlight.realtime.numerics.array_types import (
+    ArrayTypes,
+    aligned_array,
+    aligned_numbers,
+    host_numbers,
+    types_of,
+)
 from airlight.realtime.numerics.functions import summed
 from airlight.realtime.scene.lights import Facing, Light
 from airlight.realtime.scene.read_scene import Scene
@@ -26,23 +33,35 @@ from airlight.realtime.scene.read_scene import Scene
 def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
     """Return the points of the area lights of a scene, light after light.
 
-    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightSamples`. Raises InputError for a
-    number or a pattern that there is not.
+    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightSamples`. Raises
+    InputError for a number or a pattern that there is not.
     """
     types = types_of(type(scene.camera.origin.x))
     placed = [place_points(light, points, pattern) for light in scene.area_lights]
-    return tuple(point for number, of_light in enumerate(placed) for point in _points_of(of_light, number, types))
+    return tuple(
+        point
+        for number, of_light in enumerate(placed)
+        for point in _points_of(of_light, number, types)
+    )
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
-    # Arrays that all points share are made once: a frame after a light moved makes all arrays again.
+    # Arrays that all points share are made once: a frame after a light
+    # moved makes all arrays again.
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
     alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))
     normals = placed.normals[:1] if alike else placed.normals
-    facings = [Facing(mi.Vector3d(*aligned_numbers(mi.Float64, normal)), lift, chord) for normal in normals]
+    facings = [
+        Facing(mi.Vector3d(*aligned_numbers(mi.Float64, normal)), lift, chord) for normal in normals
+    ]
     return [
-        Light(_vector(position, types), intensity, facing=facings[0 if alike else number], source=source)
+        Light(
+            _vector(position, types),
+            intensity,
+            facing=facings[0 if alike else number],
+            source=source,
+        )
         for number, position in enumerate(placed.positions)
     ]
 
@@ -63,7 +82,8 @@ class LightTable:
         return self.rows if self.count == 1 else _gathered(self.rows, number)
 
     def sum(self, term: Callable[[Light, Any], Any], zero: Any) -> Any:
-        """Return the sum over the lights of `term(light, number)`, in one loop; `zero` is the sum of none.
+        """Return the sum over the lights of `term(light, number)`, in one loop;
+        `zero` is the sum of none.
 
         The code of a kernel has the term once, however many lights there are.
         """
@@ -73,12 +93,16 @@ class LightTable:
 
 
 def structure(light: Light) -> Any:
-    """Return which fields a light has, and which area light it is a sample of: one table holds lights alike in both."""
+    """Return which fields a light has, and which area light it is a sample of: one table
+    holds lights alike in both.
+    """
     return light.source, tuple(value is None for value in vars(light).values())
 
 
 def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
-    """Return the tables of some lights, in the order of the first of each; one at infinity is a table by itself."""
+    """Return the tables of some lights, in the order of the first of each; one at
+    infinity is a table by itself.
+    """
     return tuple(map(_table, alike(lights)))
 
 
@@ -113,7 +137,9 @@ def _table(lights: tuple[Light, ...]) -> LightTable:
     columns = []
     for place, array in enumerate(arrays):
         scalar = type(array.x) if dr.depth_v(array) > 1 else type(array)
-        columns.append([aligned_array(scalar, column) for column in np.stack(read[place :: len(arrays)]).T])
+        columns.append(
+            [aligned_array(scalar, column) for column in np.stack(read[place :: len(arrays)]).T]
+        )
     stacked = (type(array)(*column) for array, column in zip(arrays, columns, strict=True))
     return LightTable(_with_arrays(lights[0], lambda _: next(stacked)), len(lights))
 
@@ -126,7 +152,9 @@ class LightChoice:
     fractions: Any  #: of each in the power of all
 
     def pick(self, fraction: Any) -> tuple[Any, Any]:
-        """Return a number for each fraction from 0 to 1, and the probability of that number if fractions are even."""
+        """Return a number for each fraction from 0 to 1, and the probability of that
+        number if fractions are even.
+        """
         number, count = dr.zeros(mi.UInt32, dr.width(fraction)), dr.width(self.sums)
         if count > 1:
             number = dr.binary_search(
@@ -138,7 +166,9 @@ class LightChoice:
 def light_choice(table: LightTable) -> LightChoice:
     """Return what draws the lights of a table by their powers; evenly where none has any."""
     light = table.rows
-    power = np.stack([np.array(channel) for channel in light.intensity]).mean(axis=0) * np.ones(table.count)
+    power = np.stack([np.array(channel) for channel in light.intensity]).mean(axis=0) * np.ones(
+        table.count
+    )
     if light.cone is not None:
         power = power * (1 - np.array(light.cone.cos))
     power = power if power.sum() > 0 else np.ones(table.count)
@@ -159,7 +189,10 @@ def _arrays(value: Any) -> Iterator[Any]:
 def _with_arrays(value: Any, made: Callable[[Any], Any]) -> Any:
     """Return a light with other arrays, each made of the old one, in the order of its fields."""
     if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{item.name: _with_arrays(getattr(value, item.name), made) for item in fields(value)})
+        return replace(
+            value,
+            **{item.name: _with_arrays(getattr(value, item.name), made) for item in fields(value)},
+        )
     return made(value) if dr.is_array_v(value) else value
 
 

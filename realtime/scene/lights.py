@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Point, spot and directional lights as Dr.Jit values.
 
-A light is a homogeneous position (l, w): a place l with w = 1, or with w = 0 the direction l towards a light at
-infinity. The vector from a point P towards it is l - w P, in metres for w = 1 and of unit length for w = 0. All that
-follows from it alone holds for both: the foot and the height of a ray (`realtime.rays`), the projection of
-its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow planes, epipolar slices.
+A light is a homogeneous position (l, w): a place l with w = 1, or with w = 0 the direction l
+towards a light at infinity. The vector from a point P towards it is l - w P, in metres for w = 1
+and of unit length for w = 0. All that follows from it alone holds for both: the foot and the height
+of a ray (`realtime.rays`), the projection of its shadow map (`realtime.shadow_maps.projection`),
+silhouettes and shadow planes, epipolar slices.
 
-A directional light lights media with bounds; its place is the middle of a rectangle across it where the media end
-(`realtime.scene.directional_extent`).
+A directional light lights media with bounds; its place is the middle of a rectangle across it where
+the media end (`realtime.scene.directional_extent`).
 
-A light sample stands for a part of an area light (`realtime.area_lights`). In the direction w it has the intensity
-I0 max(0, n . w), n its normal: it lights the half space before its plane.
+A light sample stands for a part of an area light (`realtime.area_lights`). In the direction w it
+has the intensity I0 max(0, n . w), n its normal: it lights the half space before its plane.
 """
 
 import math
@@ -53,28 +54,34 @@ class Facing:
 
     exact_normal: Any  #: unit normal of the shape, on the side that shines, in float64
     lift: Any  #: how far before the shape rays start, so that they do not meet it [m]
-    chord: Any  #: how long a ray is in the shape that goes along the normal, from behind: twice a sphere's radius [m]
+    #: how long a ray is in the shape that goes along the normal, from behind:
+    #: twice a sphere's radius [m]
+    chord: Any
 
 
 @dataclass(frozen=True)
 class Light:
     """A light. The arrays hold one entry and are opaque, so a light that moves recompiles nothing.
 
-    Which fields are there says what it can be asked: a `cone` clips rays, a `beam` within it makes the intensity vary
-    along them, `facing` does both, and a light with an `extent` is at infinity.
+    Which fields are there says what it can be asked: a `cone` clips rays, a `beam` within it makes
+    the intensity vary along them, `facing` does both, and a light with an `extent` is at infinity.
     """
 
     position: Any  #: three-vector; directional: the middle of `extent` [m]
-    intensity: Any  #: radiant intensity on the axis [W/sr], RGB; directional: irradiance of a plane across it [W/m^2]
+    #: radiant intensity on the axis [W/sr], RGB; directional: irradiance of
+    #: a plane across it [W/m^2]
+    intensity: Any
     exact_axis: Any = None  #: `axis` in float64
     cutoff: Any = None  #: spot: half angle beyond which there is no light [rad]
     cone: Any = None  #: spot: the `Cone` of the cut-off
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
-    extent: Any = None  #: directional: the `DirectionalExtent` through which all light of the media comes
+    #: directional: the `DirectionalExtent` through which all light of the media comes
+    extent: Any = None
     facing: Facing | None = None  #: light sample: how its shape faces
     source: int | None = None  #: light sample: the number of its light in `Scene.area_lights`
-    sky: Any = None  #: the radiance of a uniform sky, for which this light stands as a beam from above [W/(m^2 sr)]
+    #: the radiance of a uniform sky, for which this light stands as a beam from above [W/(m^2 sr)]
+    sky: Any = None
 
     @property
     def w(self) -> int:
@@ -83,14 +90,18 @@ class Light:
 
     @property
     def kind(self) -> str:
-        """Its name in messages and counts: 'point', 'spot', 'directional', or 'area' for a light sample."""
+        """Its name in messages and counts: 'point', 'spot', 'directional', or
+        'area' for a light sample.
+        """
         if self.facing is not None:
             return "area"
         return "spot" if self.cone is not None else "point" if self.w else "directional"
 
     @property
     def axis(self) -> Any:
-        """Spot: unit vector from the light along its axis; directional: in which the light travels; others: None."""
+        """Spot: unit vector from the light along its axis; directional: in which the
+        light travels; others: None.
+        """
         return None if self.exact_axis is None else type(self.position)(self.exact_axis)
 
     @property
@@ -100,7 +111,9 @@ class Light:
 
     @property
     def varies(self) -> bool:
-        """Whether the intensity varies along a ray, as in a soft spot; else it is constant on the lit part."""
+        """Whether the intensity varies along a ray, as in a soft spot; else it is
+        constant on the lit part.
+        """
         return self.beam is not None or self.facing is not None
 
     @property
@@ -109,16 +122,20 @@ class Light:
         return None if self.cone is None else type(self.position.x)(self.cone.cos)
 
     def toward(self, point) -> Any:
-        """Return l - w P: the vector from points to the light [m], or the unit direction to a light at infinity."""
+        """Return l - w P: the vector from points to the light [m], or the unit
+        direction to a light at infinity.
+        """
         return self.position - point if self.w else -self.axis
 
     def shadow_ray(self, point) -> Any:
-        """Return the Mitsuba ray that is blocked where the light does not reach a point; a surface there blocks none.
+        """Return the Mitsuba ray that is blocked where the light does not reach a point; a
+        surface there blocks none.
 
         `point`: points [m].
         """
         if not self.w:
-            # From the point on, where a ray is exact, though not from the surface that it may lie on.
+            # From the point on, where a ray is exact, though not from the
+            # surface that it may lie on.
             away = 2e-6 * self.extent.depth
             return mi.Ray3f(mi.Point3f(point - self.axis * away), mi.Vector3f(-self.axis))
         start = mi.Point3f(self.position)
@@ -126,17 +143,21 @@ class Light:
             start += mi.Vector3f(self.normal * self.facing.lift)
         direction = mi.Vector3f(point) - mi.Vector3f(start)
         length = dr.norm(direction)
-        # Twenty units in the last place before the point: on a surface the point itself must not block the light.
+        # Twenty units in the last place before the point: on a surface the point itself
+        # must not block the light.
         return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
 
     def shadow_ray_from(self, interaction) -> Any:
-        """Return the Mitsuba ray from a surface interaction that is blocked where the light does not reach it."""
+        """Return the Mitsuba ray from a surface interaction that is blocked where the
+        light does not reach it.
+        """
         if self.w:
             return interaction.spawn_ray_to(mi.Point3f(self.position))
         return interaction.spawn_ray(mi.Vector3f(-self.axis))
 
     def rays_from(self, unit) -> tuple[Any, Any]:
-        """Return where rays from a light that has a place start, and how far from it that is along them [m].
+        """Return where rays from a light that has a place start, and how far from
+        it that is along them [m].
 
         Those of a light sample start beyond the shape that it lies on, so that they do not meet it.
 
@@ -146,7 +167,9 @@ class Light:
             return self.position, 0
         cosine = dr.dot(unit, self.normal)
         skipped = dr.maximum(-self.facing.chord * cosine, 0)
-        return self.position + self.normal * dr.mulsign(self.facing.lift, cosine) + unit * skipped, skipped
+        return self.position + self.normal * dr.mulsign(
+            self.facing.lift, cosine
+        ) + unit * skipped, skipped
 
     def without_cone(self) -> "Light":
         """Return the light all around of which a spot shows a cone."""
@@ -154,7 +177,9 @@ class Light:
 
 
 def host_position(light: Light) -> Array:
-    """Return the homogeneous position of a light on the host: l [m for w = 1] and w, (4,), in float64."""
+    """Return the homogeneous position of a light on the host: l [m for w = 1]
+    and w, (4,), in float64.
+    """
     if light.w:
         return np.append(host_numbers(light.position)[0], 1.0)
     return np.append(-host_numbers(light.exact_axis)[0], 0.0)
@@ -168,8 +193,9 @@ def place_and_weight(position: Array) -> tuple[Array, int]:
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a `Light` that only a spot has.
 
-    `axis`: unit vector from the light along its axis, in float64; `cutoff`, `beam`: half angles beyond which there is
-    no light, and up to which the intensity is full [rad]; `types`: of the arrays.
+    `axis`: unit vector from the light along its axis, in float64; `cutoff`, `beam`: half angles
+    beyond which there is no light, and up to which the intensity is full [rad]; `types`: of the
+    arrays.
     """
     fields = {
         "exact_axis": mi.Vector3d(*(float(component) for component in axis)),

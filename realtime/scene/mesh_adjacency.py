@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Occluders: the triangles of a scene and how they hang together.
 
-Vertices of a shape that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. How
-triangles hang together is the signed incidence matrix of edges and triangles: with an edge e from its lower vertex
-number a to its higher one b, and a triangle t,
+Vertices of a shape that coincide exactly are one vertex: meshes come with seams where texture
+coordinates differ. How triangles hang together is the signed incidence matrix of edges and
+triangles: with an edge e from its lower vertex number a to its higher one b, and a triangle t,
 
     s_te = +1 if t runs along e from a to b, -1 if it runs from b to a, 0 if e is no edge of t.
 
-Its product with the layers of triangles gives silhouettes (`realtime.methods.shadow_planes.silhouettes`). Triangles are
-of one component if they share an edge. A component is closed if each of its edges is met as often one way as the other:
-if the sum of s_te over the triangles is 0.
+Its product with the layers of triangles gives silhouettes
+(`realtime.methods.shadow_planes.silhouettes`). Triangles are of one component if they share an
+edge. A component is closed if each of its edges is met as often one way as the other: if the sum of
+s_te over the triangles is 0.
 
-The matrix is made once; when a light moves only signs of triangles change, when an object moves only its vertices
-(`with_positions`).
+The matrix is made once; when a light moves only signs of triangles change, when an object moves
+only its vertices (`with_positions`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,11 +50,14 @@ class Occluders:
     edges: Index  #: vertex numbers, the lower one first, (edges, 2)
     incidence: "csr_array[np.int32]"  #: s_te, (edges, triangles)
     component: Index  #: connected component that each triangle belongs to
-    closed: NDArray[np.bool_]  #: by component: whether every edge is met as often one way as the other
-    boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
+    #: by component: whether every edge is met as often one way as the other
+    closed: NDArray[np.bool_]
+    #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
+    boxes: Array
     shapes: tuple[str, ...]  #: names
     vertex_shape: Index  #: by vertex: the number of its shape
-    vertex_source: Index  #: by vertex: its number among the vertices of its shape, the first of equal ones
+    #: by vertex: its number among the vertices of its shape, the first of equal ones
+    vertex_source: Index
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
 
     @property
@@ -108,7 +112,8 @@ def make_occluders(meshes: Sequence[tuple[str, Array, NDArray[Any]]]) -> Occlude
     names = tuple(name for name, _, _ in meshes)
     vertices, vertex_shape, vertex_source, triangles = _joined(meshes)
 
-    # A triangle that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    # A triangle that is a line stays: it closes the gap between a long edge and the two
+    # halves on its other side.
     triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     repeated = np.delete(vertex_shape[triangles[:, 0]], first)
@@ -154,8 +159,11 @@ def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occl
 
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
-    """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
-    # Ask for vertices one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+    """Return the vertices [m] and the triangles of a Mitsuba mesh,
+    (vertices, 3) and (triangles, 3).
+    """
+    # Ask for vertices one by one: `mi.traverse` shows the transform of a rectangle or
+    # a cube, not its vertices.
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
     dr.eval(position, face)
@@ -170,13 +178,17 @@ def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
     if shape.is_mesh():
         return mesh_triangles(shape)
     raise InputError(
-        f"shape '{shape.id()}' is a {shape.class_name().lower()}, which has no triangles and so no silhouette edges; "
-        "expected meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
+        f"shape '{shape.id()}' is a {shape.class_name().lower()}, which has no triangles and so no "
+        "silhouette edges; "
+        "expected meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method "
+        "ray-march"
     )
 
 
 def _joined(meshes) -> tuple[Array, Index, Index, Index]:
-    """Return the vertices of all meshes, equal ones of a mesh once, the shape and source of each, and the triangles."""
+    """Return the vertices of all meshes, equal ones of a mesh once, the shape and source of
+    each, and the triangles.
+    """
     places, triangles, count = [np.zeros((0, 4))], [np.zeros((0, 3), dtype=np.int64)], 0
     sources = [np.zeros(0, dtype=np.int64)]
     for number, (_, vertices, faces) in enumerate(meshes):
@@ -186,7 +198,9 @@ def _joined(meshes) -> tuple[Array, Index, Index, Index]:
         triangles.append(np.asarray(faces, dtype=np.int64).reshape(-1, 3) + count)
         count += len(vertices)
     # The number of the shape keeps vertices of different shapes apart.
-    joined, first, number_of = np.unique(np.concatenate(places), axis=0, return_index=True, return_inverse=True)
+    joined, first, number_of = np.unique(
+        np.concatenate(places), axis=0, return_index=True, return_inverse=True
+    )
     return (
         np.ascontiguousarray(joined[:, 1:]),
         joined[:, 0].astype(np.int32),
@@ -195,24 +209,35 @@ def _joined(meshes) -> tuple[Array, Index, Index, Index]:
     )
 
 
-def _hang_together(triangles: Index, vertices: int) -> tuple[Index, "csr_array[np.int32]", Index, NDArray[np.bool_]]:
-    """Return the edges of triangles, their incidence matrix, the component of each triangle, and which are closed."""
+def _hang_together(
+    triangles: Index, vertices: int
+) -> tuple[Index, "csr_array[np.int32]", Index, NDArray[np.bool_]]:
+    """Return the edges of triangles, their incidence matrix, the component of each
+    triangle, and which are closed.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     # Each triangle has three half-edges, and those between the same two vertices are one edge.
     tail, head = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel()
-    keys, edge = np.unique(np.minimum(tail, head) * vertices + np.maximum(tail, head), return_inverse=True)
+    keys, edge = np.unique(
+        np.minimum(tail, head) * vertices + np.maximum(tail, head), return_inverse=True
+    )
     edges = np.stack(np.divmod(keys, max(vertices, 1)), axis=1).astype(np.int32)
     triangle = np.repeat(np.arange(len(triangles)), 3)
     sign = np.where(tail < head, np.int32(1), np.int32(-1))
     shape = len(edges), len(triangles)
     incidence = coo_array((sign, (edge, triangle)), shape=shape).tocsr()
 
-    # A graph in which each triangle is linked to its three edges has the components of the triangles.
+    # A graph in which each triangle is linked to its three edges has the
+    # components of the triangles.
     nodes = sum(shape)
-    links = coo_array((np.ones(len(edge), dtype=np.int8), (triangle, edge + len(triangles))), shape=(nodes, nodes))
-    count, component = connected_components(links, directed=False) if nodes else (0, np.zeros(0, dtype=np.int32))
+    links = coo_array(
+        (np.ones(len(edge), dtype=np.int8), (triangle, edge + len(triangles))), shape=(nodes, nodes)
+    )
+    count, component = (
+        connected_components(links, directed=False) if nodes else (0, np.zeros(0, dtype=np.int32))
+    )
     component = component[: len(triangles)]
     closed = np.ones(count, dtype=bool)
     closed[component[triangle[incidence.sum(axis=1)[edge] != 0]]] = False
@@ -220,28 +245,36 @@ def _hang_together(triangles: Index, vertices: int) -> tuple[Index, "csr_array[n
 
 
 def _warnings(occluders: Occluders, repeated: Index) -> tuple[str, ...]:
-    """Return what is odd about the meshes; `repeated`: by triangle that was left out, the number of its shape."""
+    """Return what is odd about the meshes; `repeated`: by triangle that was left out,
+    the number of its shape.
+    """
     warnings = []
     meeting = abs(occluders.incidence).sum(axis=1)
-    edge_shape, component_shape = occluders.vertex_shape[occluders.edges[:, 0]], occluders.component_shape
+    edge_shape, component_shape = (
+        occluders.vertex_shape[occluders.edges[:, 0]],
+        occluders.component_shape,
+    )
     for number, name in enumerate(occluders.shapes):
         met = meeting[edge_shape == number]
         if copies := np.count_nonzero(repeated == number):
             warnings.append(f"shape '{name}' has {copies} repeated triangles: each is used once")
         if crowded := np.count_nonzero(met > 2):
             warnings.append(
-                f"shape '{name}' has {crowded} edges at which more than two triangles meet: right with "
+                f"shape '{name}' has {crowded} edges at which more than two triangles meet: right "
+                "with "
                 "order=exact; order=none and order=paper may count planes twice"
             )
         # With an odd number of triangles at an edge one of them ends there.
         if np.any(met % 2 == 1):
             warnings.append(
-                f"shape '{name}' is open: its border casts shadow planes too; right with order=exact; order=none and "
+                f"shape '{name}' is open: its border casts shadow planes too; right with "
+                "order=exact; order=none and "
                 "order=paper count its folds twice"
             )
         elif not np.all(occluders.closed[component_shape == number]):
             warnings.append(
-                f"shape '{name}' has triangles that run both ways round: each is turned to the light; right with "
+                f"shape '{name}' has triangles that run both ways round: each is turned to the "
+                "light; right with "
                 "order=exact; order=none and order=paper count its folds twice"
             )
     return tuple(warnings)
@@ -262,15 +295,21 @@ def _boxes(vertices: Array, triangles, component, components: int) -> Array:
     corners = vertices[triangles[order]]
     if not components:
         return np.zeros((0, 2, 3))
-    low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
+    low, high = (
+        np.minimum.reduceat(corners.min(axis=1), starts),
+        np.maximum.reduceat(corners.max(axis=1), starts),
+    )
     return np.stack([low, high], axis=1)
 
 
 def scene_of(shapes: Sequence[Any], others: dict[str, Any] | None = None) -> Any:
-    """Return a Mitsuba scene of shapes, all of which keep their names; `others` is what else is in its dictionary."""
+    """Return a Mitsuba scene of shapes, all of which keep their names; `others` is what
+    else is in its dictionary.
+    """
     names = [shape.id() for shape in shapes]
-    # A key of Mitsuba's dictionaries becomes the name of the shape, may hold no dots, and of two shapes with one key
-    # the last alone is left: so keys are numbers, and the shapes get their names back.
+    # A key of Mitsuba's dictionaries becomes the name of the shape, may hold no dots, and of two
+    # shapes with one key the last alone is left: so keys are numbers, and the shapes get their
+    # names back.
     parts = {f"shape-{number}": shape for number, shape in enumerate(shapes)}
     scene = mi.load_dict({"type": "scene"} | (others or {}) | parts)
     for shape, name in zip(shapes, names, strict=True):

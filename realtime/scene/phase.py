@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions in Dr.Jit, normalised so that their mean over the sphere is 1.
 
-`cos_scatter` is the cosine of the scattering angle, +1 forward. The lobes "hazy" and "murky" of Biri 2006 (annex, after
-Nishita 1987), 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2 and 83/33 and are divided by them.
+`cos_scatter` is the cosine of the scattering angle, +1 forward. The lobes "hazy" and "murky" of
+Biri 2006 (annex, after Nishita 1987), 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2
+and 83/33 and are divided by them.
 
-A phase function is a class: its code is the class, its parameters are data. Kernels ask it for what they need, its
-values, the widths of its lobe, its power series, and know none by name. A new one derives from `Phase` and says its
-name and its values. How far rules of few nodes reach is tried on these (`realtime.scene.rule_reach`); what it does not
-have (a polynomial, a series) the kernels that need it refuse.
+A phase function is a class: its code is the class, its parameters are data. Kernels ask it for what
+they need, its values, the widths of its lobe, its power series, and know none by name. A new one
+derives from `Phase` and says its name and its values. How far rules of few nodes reach is tried on
+these (`realtime.scene.rule_reach`); what it does not have (a polynomial, a series) the kernels that
+need it refuse.
 """
 
 import math
@@ -31,13 +33,17 @@ class Phase:
 
     name: ClassVar[str]
     constant: ClassVar[bool] = False  #: whether it is 1 everywhere, so that integrands leave it out
-    polynomial: ClassVar[tuple[float, ...] | None] = None  #: coefficients of ((1 + cos)/2)^0, ^1, ..., if it is one
-    scale: ClassVar[float] = 1.0  #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
+    #: coefficients of ((1 + cos)/2)^0, ^1, ..., if it is one
+    polynomial: ClassVar[tuple[float, ...] | None] = None
+    #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
+    scale: ClassVar[float] = 1.0
 
     def evaluate_half(self, down, up) -> Any:
-        """Return the value [1] from `down`, sin^2, and `up`, cos^2 of half the scattering angle, (1 -+ cos)/2.
+        """Return the value [1] from `down`, sin^2, and `up`, cos^2 of half the
+        scattering angle, (1 -+ cos)/2.
 
-        A lobe narrower than the rounding of the cosine, 1e-7, is a matter of `down` alone: with it nothing cancels.
+        A lobe narrower than the rounding of the cosine, 1e-7, is a matter of `down` alone:
+        with it nothing cancels.
         """
         raise NotImplementedError
 
@@ -47,14 +53,18 @@ class Phase:
         return self.evaluate_half(1 - up, up)
 
     def density(self, f, c, scale) -> Any:
-        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), as `realtime.kernels.exact` wants."""
+        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), as
+        `realtime.kernels.exact` wants.
+        """
         square = dr.square(scale * f)
         up = dr.rcp(square + 1)
         return c * up * self.evaluate_half(square * up, up)
 
     @property
     def reach(self) -> Reach:
-        """How far rules of few nodes reach; a function with arrays for parameters says it in another way."""
+        """How far rules of few nodes reach; a function with arrays for
+        parameters says it in another way.
+        """
         return _reach(self)
 
     def panel_width(self, Float) -> Any:
@@ -62,15 +72,21 @@ class Phase:
         return Float(self.reach.panel)
 
     def width(self, Float) -> Any:
-        """Return the widest panel in ln E (`realtime.scene.media.integrate`), for arrays of a type."""
+        """Return the widest panel in ln E
+        (`realtime.scene.media.integrate`), for arrays of a type.
+        """
         return Float(self.reach.width)
 
     def lobe_scales(self, Float) -> tuple[Any, Any]:
-        """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
+        """Return the E where a forward lobe ends, at most 1, and the E where a backward
+        lobe begins, at least 1.
+        """
         return Float(self.scale), 1.0
 
     def series(self, degree: int) -> list[Any] | None:
-        """Return the coefficients of p(-sin theta) in powers of theta, None where there are none."""
+        """Return the coefficients of p(-sin theta) in powers of theta,
+        None where there are none.
+        """
         return None
 
 
@@ -167,7 +183,9 @@ class HenyeyGreenstein(Phase):
     @staticmethod
     @lru_cache(maxsize=1)
     def reaches() -> tuple[Reach, Reach]:
-        """Return how far rules reach for all forward lobes, and for all backward ones: g may be another by lane."""
+        """Return how far rules reach for all forward lobes, and for all backward ones:
+        g may be another by lane.
+        """
         even = _reach(HenyeyGreenstein(0.0))
         forward, backward = (_reach(HenyeyGreenstein(g)) for g in (_SHARP, -_SHARP))
         return shortest(even, forward), shortest(even, backward)
@@ -186,24 +204,30 @@ class HenyeyGreenstein(Phase):
     def evaluate(self, cos_scatter) -> Any:
         """Return the value.
 
-        1 + g^2 - 2 g c cancels in the lobe of a sharp g; (1 - |g|)^2 + 2 |g| (1 -+ c) is the same without.
+        1 + g^2 - 2 g c cancels in the lobe of a sharp g; (1 - |g|)^2 + 2 |g| (1
+        -+ c) is the same without.
         """
         g = type(cos_scatter)(self.g)
         base = dr.fma(2 * dr.abs(g), 1 - dr.mulsign(cos_scatter, g), dr.square(1 - dr.abs(g)))
         return (1 - g) * (1 + g) / (base * dr.sqrt(base))
 
     def density(self, f, c, scale) -> Any:
-        """Return it by (1 - g)(1 + g)/b^(3/2) with b (1 + E^2) = (1 - g)^2 + (1 + g)^2 E^2, whatever the sign of g.
+        """Return it by (1 - g)(1 + g)/b^(3/2) with b (1 + E^2) = (1 - g)^2 + (1 + g)^2
+        E^2, whatever the sign of g.
 
         All that is left of it are a reciprocal and a square root.
         """
         square = dr.square(scale * f)
         g = type(f)(self.g)
         inverse = dr.rcp(dr.fma(square, dr.square((1 + g) / (1 - g)), 1))
-        return dr.sqrt(dr.fma(square, inverse, inverse)) * inverse * c * ((1 + g) / dr.square(1 - g))
+        return (
+            dr.sqrt(dr.fma(square, inverse, inverse)) * inverse * c * ((1 + g) / dr.square(1 - g))
+        )
 
     def panel_width(self, Float) -> Any:
-        """Return the widest panel in v by the sign of g: a backward lobe rises within the range of integration."""
+        """Return the widest panel in v by the sign of g: a backward lobe rises within
+        the range of integration.
+        """
         forward, backward = (Float(reach.panel) for reach in self.reaches())
         return dr.select(Float(self.g) >= 0, forward, backward)
 
@@ -213,12 +237,16 @@ class HenyeyGreenstein(Phase):
         return (1 - forward) / (1 + forward), (1 + backward) / (1 - backward)
 
     def series(self, degree: int) -> list[Any]:
-        """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta, from b y' = -(3/2) b' y."""
+        """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta,
+        from b y' = -(3/2) b' y.
+        """
         g = self.g
         b = [1 + g * g] + [2 * g * s for s in _sine(degree)[1:]]
         y = [(1 - g) * (1 + g) * dr.rsqrt(b[0]) / b[0]]
         for n in range(1, degree + 1):
-            y.append(sum((-1.5 * k - (n - k)) * b[k] * y[n - k] for k in range(1, n + 1)) / (n * b[0]))
+            y.append(
+                sum((-1.5 * k - (n - k)) * b[k] * y[n - k] for k in range(1, n + 1)) / (n * b[0])
+            )
         return y
 
 
@@ -254,7 +282,8 @@ class Tabulated(Phase):
 
 @dataclass(frozen=True)
 class HgDraine(Phase):
-    """(1 - w) of Henyey and Greenstein's function and w of Draine's, which Jendersie and d'Eon 2023 fitted to droplets.
+    """(1 - w) of Henyey and Greenstein's function and w of Draine's, which Jendersie and d'Eon
+    2023 fitted to droplets.
 
     Draine's is hg(g_D) (1 + alpha cos^2), divided by its mean 1 + alpha (1 + 2 g_D^2)/3.
     """
@@ -265,14 +294,21 @@ class HgDraine(Phase):
 
     def __post_init__(self):
         if not 5 <= self.diameter <= 50:
-            raise InputError(f"the diameter of 'hg-draine' is {self.diameter} um; expected 5 to 50 um")
+            raise InputError(
+                f"the diameter of 'hg-draine' is {self.diameter} um; expected 5 to 50 um"
+            )
 
     @property
     def lobes(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The fraction and the mean cosine of Henyey and Greenstein's function, then of Draine's."""
+        """The fraction and the mean cosine of Henyey and Greenstein's
+        function, then of Draine's.
+        """
         d = self.diameter
         fraction = math.exp(-0.665888 - 0.599085 / (d - 0.641583))
-        narrow, wide = math.exp(-0.0990567 / (d - 1.67154)), math.exp(-0.428934 - 2.20679 / (d + 3.91029))
+        narrow, wide = (
+            math.exp(-0.0990567 / (d - 1.67154)),
+            math.exp(-0.428934 - 2.20679 / (d + 3.91029)),
+        )
         return (1 - fraction, narrow), (fraction, wide)
 
     @property
@@ -302,8 +338,13 @@ class HgDraine(Phase):
         (fraction, narrow), (_, wide) = self.lobes
         constant, square = self.rise
         sine = _sine(degree)
-        rise = [constant * a + square * b for a, b in zip(_one(degree), series_product(sine, sine, degree))]
-        first, second = (HenyeyGreenstein(dr.opaque(mi.Float64, g)).series(degree) for g in (narrow, wide))
+        rise = [
+            constant * a + square * b
+            for a, b in zip(_one(degree), series_product(sine, sine, degree))
+        ]
+        first, second = (
+            HenyeyGreenstein(dr.opaque(mi.Float64, g)).series(degree) for g in (narrow, wide)
+        )
         return [fraction * a + b for a, b in zip(first, series_product(rise, second, degree))]
 
 
@@ -313,7 +354,8 @@ class Mie(Phase):
 
     entries: Any  #: values and slopes in turn
     lobe: float  #: E = tan(angle/2) at which the peak has fallen to half
-    reaches: Reach | None = None  #: as `named_phase` finds it: the finer the function ripples, the shorter
+    #: as `named_phase` finds it: the finer the function ripples, the shorter
+    reaches: Reach | None = None
 
     name = "mie"
 
@@ -342,7 +384,9 @@ class Mie(Phase):
 
 @dataclass(frozen=True)
 class ModifiedMie(Mie):
-    """The same without what is below five degrees, divided by what is left (Bouthors 2008, appendix)."""
+    """The same without what is below five degrees, divided by what is left
+    (Bouthors 2008, appendix).
+    """
 
     left: float = 1.0  #: fraction of the light beyond five degrees
 
@@ -350,7 +394,11 @@ class ModifiedMie(Mie):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
-        return dr.select(down < math.sin(math.radians(0.5 * CUT)) ** 2, 0, super().evaluate_half(down, up) / self.left)
+        return dr.select(
+            down < math.sin(math.radians(0.5 * CUT)) ** 2,
+            0,
+            super().evaluate_half(down, up) / self.left,
+        )
 
 
 #: Those of the toolkit.
@@ -376,10 +424,11 @@ _LEFT_TABLE, _LEFT_DROPLETS = 1e-3, 1e-5
 def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     """Return a phase function of the toolkit.
 
-    `words`: the name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
-    'mie-modified' the effective radius [um], gamma and the wavelength [um]; `g`: 'hg': mean cosine, in (-1, 1), where
-    the words do not say it; `values`: 'tabulated': values of mean 1 at regularly spaced cosines from -1 to 1; `Float`:
-    array type of the tables of droplets, that of the variant by default. Raises InputError for words that name no phase
+    `words`: the name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter
+    [um], for 'mie' and 'mie-modified' the effective radius [um], gamma and the wavelength [um];
+    `g`: 'hg': mean cosine, in (-1, 1), where the words do not say it; `values`: 'tabulated': values
+    of mean 1 at regularly spaced cosines from -1 to 1; `Float`: array type of the tables of
+    droplets, that of the variant by default. Raises InputError for words that name no phase
     function, a cell that is no number, or droplets out of range.
     """
     name, *cells = words.split(":")
@@ -389,8 +438,15 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
-        raise InputError(f"the phase function is '{words}'; expected numbers after '{name}:'") from None
-    if len(numbers) > {HenyeyGreenstein.name: 1, HgDraine.name: 1, Mie.name: 3, ModifiedMie.name: 3}.get(name, 0):
+        raise InputError(
+            f"the phase function is '{words}'; expected numbers after '{name}:'"
+        ) from None
+    if len(numbers) > {
+        HenyeyGreenstein.name: 1,
+        HgDraine.name: 1,
+        Mie.name: 3,
+        ModifiedMie.name: 3,
+    }.get(name, 0):
         raise InputError(f"the phase function is '{words}'; it has fewer numbers: leave some out")
     if name in (Mie.name, ModifiedMie.name):
         return _droplets(name, Float or mi.Float, *numbers)
@@ -398,7 +454,10 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
         return HgDraine(*numbers) if numbers else HgDraine(12.0)
     if name == HenyeyGreenstein.name:
         if numbers and not -1 < numbers[0] < 1:
-            raise InputError(f"the mean cosine of '{words}' is {numbers[0]:g}; expected more than -1, less than 1")
+            raise InputError(
+                f"the mean cosine of '{words}' is {numbers[0]:g}; expected more than -1, less than "
+                "1"
+            )
         return HenyeyGreenstein((Float or mi.Float)(numbers[0]) if numbers else g)
     if name == Tabulated.name:
         return Tabulated(values) if values is None else tabulated(values)
@@ -406,7 +465,9 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
 
 
 def tabulated(values) -> Tabulated:
-    """Return a table as it is read: `values` of mean 1 at regularly spaced cosines from -1 to 1, an array of Dr.Jit."""
+    """Return a table as it is read: `values` of mean 1 at regularly spaced cosines from -1
+    to 1, an array of Dr.Jit.
+    """
     host = np.array(values, dtype=np.float64)
     below = host < 0.5 * host[-1]
     cosine = np.linspace(-1.0, 1.0, len(host))[np.flatnonzero(below)[-1]] if below.any() else -1.0
@@ -415,7 +476,9 @@ def tabulated(values) -> Tabulated:
     return Tabulated(values, lobe, reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_TABLE))
 
 
-def _droplets(name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> Phase:
+def _droplets(
+    name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
+) -> Phase:
     table = droplet_table(radius, gamma, wavelength)
     eager, entries = Mie(ArrayXf64(table.entries), table.peak), Float(table.entries)
     modified = name == ModifiedMie.name
@@ -434,7 +497,9 @@ def _reach(phase: Phase) -> Reach:
 
 
 def series_product(left, right, degree: int) -> list[Any]:
-    """Return the coefficients of the product of two power series, `left` and `right`, up to a degree."""
+    """Return the coefficients of the product of two power series, `left` and
+    `right`, up to a degree.
+    """
     return [sum(left[n - k] * right[k] for k in range(n + 1)) for n in range(degree + 1)]
 
 
@@ -444,7 +509,9 @@ def _one(degree: int) -> list[float]:
 
 def _sine(degree: int) -> list[float]:
     """Return the coefficients of sin theta."""
-    return [0.0 if n % 2 == 0 else (-1.0) ** (n // 2) / math.factorial(n) for n in range(degree + 1)]
+    return [
+        0.0 if n % 2 == 0 else (-1.0) ** (n // 2) / math.factorial(n) for n in range(degree + 1)
+    ]
 
 
 def _power(base, doublings: int):

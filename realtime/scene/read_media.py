@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading the media of a Mitsuba scene: what surrounds the camera, and what shapes bound.
 
-A shape with the material `null` and an interior medium is the boundary of a medium: light passes, nothing is seen of
-it. All of them lie in one medium, the camera's own or, for a camera inside one of them, its exterior; none is a vacuum.
-In vacuum a boundary may be any closed mesh, a cloud, and its medium may have a density from place to place.
+A shape with the material `null` and an interior medium is the boundary of a medium: light passes,
+nothing is seen of it. All of them lie in one medium, the camera's own or, for a camera inside one
+of them, its exterior; none is a vacuum. In vacuum a boundary may be any closed mesh, a cloud, and
+its medium may have a density from place to place.
 """
 
 from collections.abc import Sequence
@@ -55,8 +56,8 @@ _PHASES = {
 def sort_shapes(scene):
     """Return the opaque shapes of a scene and those that bound a medium.
 
-    Raises InputError for a shape that is transparent or bounds a medium in a way that no method can render, with its
-    name.
+    Raises InputError for a shape that is transparent or bounds a medium in a way that no method
+    can render, with its name.
     """
     opaque, boundaries = [], []
     for shape in scene.shapes():
@@ -67,23 +68,33 @@ def sort_shapes(scene):
         if bsdf.class_name() != "Null":
             if bounds:
                 raise InputError(
-                    f"shape '{name}' bounds a medium and has a {bsdf.class_name()} material; expected the material "
+                    f"shape '{name}' bounds a medium and has a {bsdf.class_name()} material; "
+                    "expected the material "
                     "'null' on it, and no media on other shapes"
                 )
             if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
-                raise InputError(f"shape '{name}' is partly transparent; expected opaque surfaces or material 'null'")
+                raise InputError(
+                    f"shape '{name}' is partly transparent; expected opaque surfaces or material "
+                    "'null'"
+                )
             opaque.append(shape)
         elif shape.interior_medium() is not None:
             boundaries.append(shape)
         elif bounds:
-            raise InputError(f"shape '{name}' is a hole in a medium; expected media inside of closed bounds")
+            raise InputError(
+                f"shape '{name}' is a hole in a medium; expected media inside of closed bounds"
+            )
         else:
-            raise InputError(f"shape '{name}' is transparent and bounds no medium; expected opaque surfaces: remove it")
+            raise InputError(
+                f"shape '{name}' is transparent and bounds no medium; expected opaque surfaces: "
+                "remove it"
+            )
     return opaque, boundaries
 
 
 def opaque_scene(scene, opaque):
-    """Return the scene itself where all shapes are opaque and lights few, else one of opaque shapes, under their names.
+    """Return the scene itself where all shapes are opaque and lights few, else one of opaque
+    shapes, under their names.
 
     A call of a recorded function goes over all lights of the scene in it: 512 took 20 ms.
     """
@@ -95,8 +106,8 @@ def opaque_scene(scene, opaque):
 def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     """Return the medium of a scene with the bounded media in it.
 
-    It has `clouds` in vacuum, whatever the bounds, and `bounded_media` only where all bounds are convex and all media
-    homogeneous.
+    It has `clouds` in vacuum, whatever the bounds, and `bounded_media` only where all bounds are
+    convex and all media homogeneous.
 
     Parameters
     ----------
@@ -115,19 +126,23 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     if not boundaries:
         if sensor.get_medium() is None:
             raise InputError(
-                "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
+                "the camera references no medium: it would be in a vacuum; declare the medium with "
+                "an id and put "
                 '<ref name="medium" id="..."/> inside the sensor'
             )
         if _is_height_fog(sensor.get_medium()):
             return _height_fog(sensor.get_medium(), types)
-        if not sensor.get_medium().is_homogeneous() and "sigma_t.data" in mi.traverse(sensor.get_medium()):
+        if not sensor.get_medium().is_homogeneous() and "sigma_t.data" in mi.traverse(
+            sensor.get_medium()
+        ):
             return _grid_medium(sensor.get_medium(), types)
         return _homogeneous(sensor.get_medium(), types)
     for shape in boundaries:
         for own in (shape.interior_medium(), shape.exterior_medium()):
             if _is_height_fog(own):
                 raise InputError(
-                    f"shape '{shape.id()}' bounds a medium in height fog, or height fog; expected height fog alone, in "
+                    f"shape '{shape.id()}' bounds a medium in height fog, or height fog; expected "
+                    "height fog alone, in "
                     "the sensor: remove the medium of the shape"
                 )
     shapes = [read_bounds(shape) for shape in boundaries]
@@ -138,8 +153,10 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     around = _surrounding(sensor, boundaries, meshes or bounds)
     if around is not None and not all_convex:
         raise InputError(
-            f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not convex, or that "
-            "medium is not homogeneous; expected vacuum around it: remove the exterior medium, and the camera's"
+            f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not "
+            "convex, or that "
+            "medium is not homogeneous; expected vacuum around it: remove the exterior medium, and "
+            "the camera's"
         )
     grids = [
         read_cloud_density(shape.interior_medium(), meshes[number])
@@ -147,12 +164,18 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
         else None
         for number, shape in enumerate(boundaries)
     ]
-    media = [_filling(shape.interior_medium(), grid, types) for shape, grid in zip(boundaries, grids, strict=True)]
+    media = [
+        _filling(shape.interior_medium(), grid, types)
+        for shape, grid in zip(boundaries, grids, strict=True)
+    ]
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
     media = [_in_channels(medium, channels) for medium in media]
     bounded_media = (
-        tuple(make_bounded_medium(medium, own_bounds, types) for medium, own_bounds in zip(media, bounds))
+        tuple(
+            make_bounded_medium(medium, own_bounds, types)
+            for medium, own_bounds in zip(media, bounds)
+        )
         if all_convex
         else ()
     )
@@ -173,13 +196,16 @@ def _closed_meshes(
             cloud = _first_cloud(shapes, uneven)
             flaw = "bounds a heterogeneous medium" if cloud in uneven else "is not convex"
             raise InputError(
-                f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; expected meshes for all of them: "
+                f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; expected meshes "
+                "for all of them: "
                 "replace the sphere by a mesh"
             )
     return tuple(mesh for _, mesh in shapes if mesh is not None)
 
 
-def _first_cloud(shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], uneven: Sequence[str]) -> str:
+def _first_cloud(
+    shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], uneven: Sequence[str]
+) -> str:
     concave = (mesh.name for bounds, mesh in shapes if bounds is None and mesh is not None)
     return next(iter((*concave, *uneven)))
 
@@ -192,7 +218,9 @@ def _clouds(media: list[Homogeneous], boundaries, types: ArrayTypes) -> Clouds:
         types.scalar([float(medium.sigma_t[channel][0]) for medium in media])
         for channel in range(len(media[0].sigma_t))
     )
-    albedos = np.stack([np.array(medium.albedo, dtype=np.float64).ravel() for medium in media], axis=1)
+    albedos = np.stack(
+        [np.array(medium.albedo, dtype=np.float64).ravel() for medium in media], axis=1
+    )
     albedo = types.color(*(aligned_array(types.scalar, column) for column in albedos))
     number = mi.UInt32([distinct.index(key) for key in keys])
     dr.make_opaque(sigma_t, albedo, number)
@@ -203,30 +231,41 @@ def _phase_key(phase) -> tuple[Any, ...]:
     """Return a key that equal phase functions share."""
     parameters = mi.traverse(phase)
     names = sorted(parameters.keys())
-    return phase.class_name(), *(np.array(parameters[name], dtype=np.float64).tobytes() for name in names)
+    return phase.class_name(), *(
+        np.array(parameters[name], dtype=np.float64).tobytes() for name in names
+    )
 
 
 def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
-    """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or boundary that says otherwise."""
+    """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or
+    boundary that says otherwise.
+    """
     camera = host_matrix(sensor.world_transform())[:3, 3]
     around = sensor.get_medium()
     for shape, own_bounds in zip(boundaries, bounds):
         if isinstance(own_bounds, Bounds) and touches(own_bounds, camera):
             raise InputError(
-                f"the camera is in the surface of shape '{own_bounds.name}'; move it off, inside or outside"
+                f"the camera is in the surface of shape '{own_bounds.name}'; move it off, inside "
+                "or outside"
             )
-        inside = encloses(own_bounds, camera) if isinstance(own_bounds, ClosedMesh) else holds(own_bounds, camera)
+        inside = (
+            encloses(own_bounds, camera)
+            if isinstance(own_bounds, ClosedMesh)
+            else holds(own_bounds, camera)
+        )
         if inside:
             if sensor.get_medium() != shape.interior_medium():
                 raise InputError(
-                    f"the camera is inside of shape '{own_bounds.name}', but references another medium or none; "
+                    f"the camera is inside of shape '{own_bounds.name}', but references another "
+                    "medium or none; "
                     "reference that shape's interior medium in the sensor"
                 )
             around = shape.exterior_medium()
     for shape, own_bounds in zip(boundaries, bounds):
         if shape.exterior_medium() != around:
             raise InputError(
-                f"the exterior medium of shape '{own_bounds.name}' is not what surrounds the camera or the others; "
+                f"the exterior medium of shape '{own_bounds.name}' is not what surrounds the "
+                "camera or the others; "
                 "expected one medium around all bounded media, or none at all"
             )
     return around
@@ -235,7 +274,9 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
 def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:
     """Return a medium within bounds."""
     centre = types.vector(*(float(c) for c in bounds.centre))
-    radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
+    radius, distance = (
+        dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds))
+    )
     dr.make_opaque(centre)
     bounded_medium = BoundedMedium(medium, None, len(bounds.offsets), centre, radius, distance)
     if bounds.is_sphere:
@@ -248,7 +289,12 @@ def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) 
     planes, beside = (aligned_array(types.scalar, part.ravel()) for part in (rows, rows[table]))
     dr.eval(neighbours, planes, beside, starts)
     return replace(
-        bounded_medium, planes=planes, neighbours=neighbours, beside=beside, sides=table.shape[1], starts=starts
+        bounded_medium,
+        planes=planes,
+        neighbours=neighbours,
+        beside=beside,
+        sides=table.shape[1],
+        starts=starts,
     )
 
 
@@ -263,22 +309,30 @@ def _in_channels(medium: Homogeneous, channels: int) -> Homogeneous:
     if len(medium.sigma_t) == channels:
         return medium
     (grey,) = medium.sigma_t
-    # Each channel has its own array: a recorded frame tells arrays that are one from arrays that are equal.
-    return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
+    # Each channel has its own array: a recorded frame tells arrays that are one
+    # from arrays that are equal.
+    return replace(
+        medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels))
+    )
 
 
 def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Homogeneous:
     """Return the medium of a boundary, one with a grid by its largest extinction."""
     if grid is None:
         return _homogeneous(medium, types)
-    largest, phase = dr.opaque(types.scalar, grid.largest), _read_phase(medium.phase_function(), types)
+    largest, phase = (
+        dr.opaque(types.scalar, grid.largest),
+        _read_phase(medium.phase_function(), types),
+    )
     return Homogeneous((largest,), _constant_albedo(medium, types), phase)
 
 
 def _constant_albedo(medium, types: ArrayTypes):
     """Return the albedo of a medium, a colour that is the same everywhere."""
     _require_constant(medium, "albedo")
-    albedo = np.broadcast_to(np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1), 3)
+    albedo = np.broadcast_to(
+        np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1), 3
+    )
     _check_albedo(albedo)
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
@@ -286,23 +340,30 @@ def _constant_albedo(medium, types: ArrayTypes):
 
 
 def _require_constant(medium, *coefficients: str) -> None:
-    """Refuse coefficients that are not the same everywhere: Mitsuba calls a medium homogeneous by its extinction."""
+    """Refuse coefficients that are not the same everywhere: Mitsuba calls a medium
+    homogeneous by its extinction.
+    """
     for name in coefficients:
         if not any(key.startswith(f"{name}.value.") for key in mi.traverse(medium).keys()):  # noqa: SIM118 - of pairs
             raise InputError(
-                f"medium '{medium.id()}': its {name} differs from place to place; expected one number or one 'rgb'"
+                f"medium '{medium.id()}': its {name} differs from place to place; expected one "
+                "number or one 'rgb'"
             )
 
 
 def _check_albedo(albedo) -> None:
     if not np.all((albedo >= 0) & (albedo <= 1 + 1e-6)):
-        raise InputError(f"the medium's albedo is {np.round(albedo, 6).tolist()}; expected values from 0 to 1")
+        raise InputError(
+            f"the medium's albedo is {np.round(albedo, 6).tolist()}; expected values from 0 to 1"
+        )
 
 
 def _check_coefficient(name: str, values) -> None:
     if not np.all(np.isfinite(values) & (values >= 0)):
         given = np.asarray(values).tolist()
-        raise InputError(f"the medium's {name} is {given}; expected finite values of 0 or more [1/m]")
+        raise InputError(
+            f"the medium's {name} is {given}; expected finite values of 0 or more [1/m]"
+        )
 
 
 def _is_height_fog(medium) -> bool:
@@ -310,7 +371,9 @@ def _is_height_fog(medium) -> bool:
 
 
 def _height_fog(medium, types: ArrayTypes) -> HeightFog:
-    """Read a medium whose extinction is a volume of type `heightfog`, which answers for its numbers."""
+    """Read a medium whose extinction is a volume of type `heightfog`, which
+    answers for its numbers.
+    """
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
     for name in ("sigma_0", "sigma_1", "sigma_2"):
@@ -338,10 +401,14 @@ def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
     albedo, grid = _constant_albedo(medium, types), along_the_axes(read_density(medium, name), name)
     sides = np.diag(grid.to_grid)
     corner = -grid.to_grid[:, 3] / sides
-    low, high = (types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / sides))
+    low, high = (
+        types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / sides)
+    )
     dr.make_opaque(low, high)
     density, largest = density_on_device([grid], types), dr.opaque(types.scalar, grid.largest)
-    return GridMedium(density, largest, low, high, albedo, _read_phase(medium.phase_function(), types))
+    return GridMedium(
+        density, largest, low, high, albedo, _read_phase(medium.phase_function(), types)
+    )
 
 
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
@@ -357,7 +424,9 @@ def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
     _check_albedo(albedo)
     grey = extinction[0] == extinction[1] == extinction[2]
-    sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
+    sigma = tuple(
+        dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction)
+    )
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
     return Homogeneous(sigma, color, _read_phase(medium.phase_function(), types))
@@ -367,17 +436,21 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
     name = _PHASES.get(phase.class_name())
     if name is None:
         raise InputError(
-            f"the phase function is a {phase.class_name()}; expected one of isotropic, hg, rayleigh, tabphase"
+            f"the phase function is a {phase.class_name()}; expected one of isotropic, hg, "
+            "rayleigh, tabphase"
         )
     parameters = mi.traverse(phase)
     if name == "hg":
         g = float(parameters["g"][0])
         if not abs(g) < 1:
-            raise InputError(f"the phase function's g is {g:g}; expected a mean cosine between -1 and 1")
+            raise InputError(
+                f"the phase function's g is {g:g}; expected a mean cosine between -1 and 1"
+            )
         return HenyeyGreenstein(dr.opaque(types.scalar, g))
     if name == "tabulated":
         values = np.array(parameters["values"], dtype=np.float64)
-        # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
+        # The mean over the sphere is half the integral over the cosine: the trapezoidal rule
+        # is exact on linear pieces.
         mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
         return tabulated(aligned_array(types.scalar, values / mean))
     return named_phase(name)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a Mitsuba scene: the camera, the medium, the lights, and the features that need their own code.
+"""Reading a Mitsuba scene: the camera, the medium, the lights, and the features
+that need their own code.
 
-Any Mitsuba scene can be read; it needs no additions. Features that no method supports are refused by name. A frame runs
-only the code that the features of a scene need (DESIGN section 5).
+Any Mitsuba scene can be read; it needs no additions. Features that no method supports are refused
+by name. A frame runs only the code that the features of a scene need (DESIGN section 5).
 """
 
 import math
@@ -33,7 +34,8 @@ from airlight.realtime.scene.rounding import rounding_notes
 from airlight.realtime.scene.triangle_table import Facets, read_facets
 from airlight.realtime.transforms import beam_axis, host_matrix, spot_axis
 
-_UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that counts as upright in the image
+# cosine between a camera's left, or its up, and an axis that counts as upright in the image
+_UPRIGHT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -49,20 +51,27 @@ class SceneFeatures:
 class Scene:
     """A Mitsuba scene with what a real-time method reads from it."""
 
-    #: of all opaque shapes, for casting rays: an `mi.Scene`, whose shapes move in place (`realtime.scene.animate`)
+    #: of all opaque shapes, for casting rays: an `mi.Scene`, whose shapes move in place
+    #: (`realtime.scene.animate`)
     geometry: Any
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]  #: those without extent
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
-    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of shapes that moved, by name [m]
+    #: vertices of shapes that moved, by name [m]
+    positions: Mapping[str, Any] = field(default_factory=dict)
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
-    sky: Any = None  #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms of shading show its light
-    boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
+    #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms
+    #: of shading show its light
+    sky: Any = None
+    #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
+    boundaries: tuple[Any, ...] = ()
 
     def source_shape(self, light: Light) -> str | None:
-        """Return the name of the shape of a light sample that casts no shadow in it; None otherwise."""
+        """Return the name of the shape of a light sample that casts no
+        shadow in it; None otherwise.
+        """
         area = None if light.source is None else self.area_lights[light.source]
         return None if area is None or area.folded else area.name
 
@@ -89,7 +98,8 @@ def read_scene(scene, precision: str = "single") -> Scene:
 
 
 def read_again(known: Scene, scene) -> Scene:
-    """Return a scene that was read before with the present camera, medium and lights; the shapes stay.
+    """Return a scene that was read before with the present camera, medium and
+    lights; the shapes stay.
 
     Parameters
     ----------
@@ -114,7 +124,8 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     medium = read_medium(sensor, boundaries, types)
     if not scene.emitters():
         raise InputError(
-            "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+            "the scene has no light; expected at least one emitter of type 'point', 'spot', "
+            "'directional' or 'area'"
         )
     bodies = _Bodies(medium, boundaries, opaque)
     behind = backgrounds(scene, clouds=medium.clouds is not None)
@@ -128,7 +139,9 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         if emitter.class_name() != "AreaLight" and emitter not in behind
     )
     here = np.array(camera.origin, dtype=np.float64).ravel()
-    area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())
+    area_lights = tuple(
+        read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter()
+    )
     parts = {
         "camera": camera,
         "medium": medium,
@@ -160,16 +173,22 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     if kind is None:
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}
         raise InputError(
-            f"light '{emitter.id()}' of type '{word.get(emitter.class_name(), emitter.class_name())}' lights no fog; "
+            f"light '{emitter.id()}' of type "
+            f"'{word.get(emitter.class_name(), emitter.class_name())}' lights no fog; "
             "expected lights of type 'point', 'spot', 'directional' or 'area'"
         )
     parameters = mi.traverse(emitter)
-    if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
+    if "intensity.value" not in parameters or (
+        kind == "spot" and "texture.value" not in parameters
+    ):
         raise InputError(
-            f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; give one 'rgb' value"
+            f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; "
+            "give one 'rgb' value"
         )
     intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
-    place = parameters["position"] if kind == "point" else host_matrix(emitter.world_transform())[:3, 3]
+    place = (
+        parameters["position"] if kind == "point" else host_matrix(emitter.world_transform())[:3, 3]
+    )
     position = np.array(place, dtype=np.float64).reshape(-1)
     arrays: dict[str, Any] = {
         "position": types.vector(*(float(c) for c in position)),
@@ -187,8 +206,13 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     bodies.medium.check_beam(axis, emitter.id())
     parameters = mi.traverse(emitter)
     if "irradiance.value" not in parameters:
-        raise InputError("the directional light has a textured or spectral irradiance; expected a constant 'rgb' one")
-    irradiance = _read_colour(parameters["irradiance.value"], "the directional light's irradiance", "W/m^2")
+        raise InputError(
+            "the directional light has a textured or spectral irradiance; expected a constant "
+            "'rgb' one"
+        )
+    irradiance = _read_colour(
+        parameters["irradiance.value"], "the directional light's irradiance", "W/m^2"
+    )
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
     arrays |= bodies.beam(axis, types)
     dr.make_opaque(*arrays.values())
@@ -196,14 +220,20 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
 
 
 def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTypes) -> Light:
-    """Return the beam that stands for a uniform sky of radiance L: from above, of the irradiance pi L.
+    """Return the beam that stands for a uniform sky of radiance L: from
+    above, of the irradiance pi L.
 
     That is what the upper half of the sky sends through a horizontal plane.
     """
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
-        raise InputError("the constant emitter has a textured or spectral radiance; expected a constant 'rgb' one")
-    radiance = _read_colour(parameters["radiance.value"], "the constant emitter's radiance", "W/(m^2 sr)")
+        raise InputError(
+            "the constant emitter has a textured or spectral radiance; expected a constant 'rgb' "
+            "one"
+        )
+    radiance = _read_colour(
+        parameters["radiance.value"], "the constant emitter's radiance", "W/(m^2 sr)"
+    )
     arrays: dict[str, Any] = {
         "intensity": types.color(*(math.pi * float(c) for c in radiance)),
         "sky": types.color(*(float(c) for c in radiance)),
@@ -215,9 +245,15 @@ def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTyp
 
 def _sky_behind(behind: list[Any], types: ArrayTypes):
     """Return the radiance of a uniform sky that lights no clouds, 0 without one."""
-    skies = [mi.traverse(emitter) for emitter in behind if emitter.class_name() == "ConstantBackgroundEmitter"]
+    skies = [
+        mi.traverse(emitter)
+        for emitter in behind
+        if emitter.class_name() == "ConstantBackgroundEmitter"
+    ]
     given = skies[0]["radiance.value"] if skies and "radiance.value" in skies[0] else 0.0
-    radiance = types.color(*(float(c) for c in _read_colour(given, "the constant emitter's radiance", "W/(m^2 sr)")))
+    radiance = types.color(
+        *(float(c) for c in _read_colour(given, "the constant emitter's radiance", "W/(m^2 sr)"))
+    )
     dr.make_opaque(radiance)
     return radiance
 
@@ -225,8 +261,8 @@ def _sky_behind(behind: list[Any], types: ArrayTypes):
 def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
     """Return the axis of coordinates that is upright in the image, a unit vector (3,).
 
-    A camera that is not rolled has it across its left; of several such axes it is the one from which the suns shine
-    most, and without suns the nearest to the camera's up.
+    A camera that is not rolled has it across its left; of several such axes it is the one from
+    which the suns shine most, and without suns the nearest to the camera's up.
     """
     left, up = (np.array(vector, dtype=np.float64).ravel() for vector in (camera.left, camera.up))
     left, up = left / np.linalg.norm(left), up / np.linalg.norm(up)
@@ -246,7 +282,9 @@ def _read_colour(value, name: str, unit: str):
     colour = np.array(value, dtype=np.float64).reshape(-1)
     colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
     if not np.all(np.isfinite(colour)) or np.any(colour < 0):
-        raise InputError(f"{name} is {colour.tolist()}; expected finite values of 0 or more [{unit}]")
+        raise InputError(
+            f"{name} is {colour.tolist()}; expected finite values of 0 or more [{unit}]"
+        )
     return colour
 
 
@@ -256,7 +294,8 @@ def _read_angles(parameters) -> tuple[float, float]:
     beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
     if not 0 < cutoff < 0.5 * math.pi:
         raise InputError(
-            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; expected more than 0, less than 90"
+            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; expected more "
+            "than 0, less than 90"
         )
     return cutoff, beam
 
@@ -268,12 +307,19 @@ def _scene_features(
     notes = scene_notes(scene, clouds=bodies.medium.clouds is not None)
     for shape in opaque:
         flags = shape.bsdf().flags()
-        if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:
+        if (
+            flags
+            & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)
+            & 0x3FF
+        ):
             notes.append(
-                f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
+                f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, "
+                "airlight unaffected"
             )
     # A light by itself casts no shadow, unless parts of it stand in the light of others.
-    alone = not lights and len(area_lights) == 1 and area_lights[0].opaque and not area_lights[0].folded
+    alone = (
+        not lights and len(area_lights) == 1 and area_lights[0].opaque and not area_lights[0].folded
+    )
     return SceneFeatures(
         shadows=len(opaque) > (1 if alone else 0),
         surfaces=bool(opaque),
@@ -289,13 +335,17 @@ def _axis_name(light: Light) -> str:
 
 
 def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
-    """Return the backgrounds that a scene with lights shows: an environment, or a sky that is no light of clouds.
+    """Return the backgrounds that a scene with lights shows: an environment, or a sky
+    that is no light of clouds.
 
-    A constant emitter beside directional lights alone lights clouds (`_read_sky`), if there may be any.
+    A constant emitter beside directional lights alone lights clouds
+    (`_read_sky`), if there may be any.
     """
     around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
     lights = {emitter.class_name() for emitter in scene.emitters()} - around
-    around -= {"ConstantBackgroundEmitter"} if clouds and lights <= {"DirectionalEmitter"} else set()
+    around -= (
+        {"ConstantBackgroundEmitter"} if clouds and lights <= {"DirectionalEmitter"} else set()
+    )
     return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
 
 
@@ -303,26 +353,40 @@ def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     """Return notes on the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
     notes = rounding_notes(scene)
-    notes += [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+    notes += (
+        [f"the scene has {cameras} cameras: the first is used, the others are left out"]
+        if cameras > 1
+        else []
+    )
     notes += [
-        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
-        + " by methods: references and fog colours have it" * (emitter.class_name() == "ConstantBackgroundEmitter")
+        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered "
+        "is left out"
+        + " by methods: references and fog colours have it"
+        * (emitter.class_name() == "ConstantBackgroundEmitter")
         for emitter in backgrounds(scene, clouds=clouds)
     ]
     return notes
 
 
 def describe(scene: Scene) -> dict[str, str]:
-    """Return in words what a scene needs, one entry for each decision about the code that a frame runs."""
+    """Return in words what a scene needs, one entry for each decision about
+    the code that a frame runs.
+    """
     counts = Counter(light.kind for light in scene.lights if light.sky is None)
     lights = [f"{counts[kind]} {kind}" for kind in ("point", "spot", "directional") if counts[kind]]
     extents = Counter(light.kind for light in scene.area_lights)
     lights += [f"{count} {shape} with extent" for shape, count in extents.items()]
-    lights += [f"a sky, as a beam from {_axis_name(light)}" for light in scene.lights if light.sky is not None]
+    lights += [
+        f"a sky, as a beam from {_axis_name(light)}"
+        for light in scene.lights
+        if light.sky is not None
+    ]
     isotropic = all(phase.constant for phase in scene.medium.phases)
     soft = any(light.beam is not None for light in scene.lights)
     return {
-        "surfaces": "lit surfaces" if scene.features.surfaces else "none: no ray is cast for the camera",
+        "surfaces": "lit surfaces"
+        if scene.features.surfaces
+        else "none: no ray is cast for the camera",
         "shadows": "visibility tests" if scene.features.shadows else "none: nothing casts a shadow",
         "extinction": "one for all channels"
         if scene.medium.channels == 1
@@ -332,5 +396,7 @@ def describe(scene: Scene) -> dict[str, str]:
         else "anisotropic: split at the foot point",
         "medium": scene.medium.summary,
         "lights": " and ".join(lights),
-        "spot falloff": "inside the cone: integrand weighted" if soft else "none: rays are clipped to cones at most",
+        "spot falloff": "inside the cone: integrand weighted"
+        if soft
+        else "none: rays are clipped to cones at most",
     }

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of a scene's lengths float32 coordinates lose: a scene in map coordinates is another one once it is loaded.
+"""How much of a scene's lengths float32 coordinates lose: a scene in map coordinates is
+another one once it is loaded.
 
-Mitsuba holds positions as float32 numbers. A coordinate x is rounded by 2^-24 |x| at most, so either end of a
-length d moves by sqrt(3) 2^-24 |x|, and the length changes by
+Mitsuba holds positions as float32 numbers. A coordinate x is rounded by 2^-24 |x| at most, so
+either end of a length d moves by sqrt(3) 2^-24 |x|, and the length changes by
 
     2 sqrt(3) 2^-24 max |x|/d.
 
@@ -39,7 +40,8 @@ class Rounding:
 
     def __str__(self) -> str:
         return (
-            f"{self.what}, and coordinates there are up to {self.farthest:.6g} m, where float32 numbers "
+            f"{self.what}, and coordinates there are up to {self.farthest:.6g} m, where float32 "
+            "numbers "
             f"lie {np.spacing(np.float32(self.farthest)):.2g} m apart: the length is known to "
             f"{100 * self.relative:.1g} %"
         )
@@ -62,12 +64,15 @@ def check_rounding(scene: Any) -> None:
     if worst is not None and worst.relative > _LARGEST:
         middle = ", ".join(f"{value:.0f}" for value in _place(scene.sensors()[0]))
         raise InputError(
-            f"{worst}; expected {100 * _LARGEST:g} % at most: subtract an offset, such as ({middle}), everywhere"
+            f"{worst}; expected {100 * _LARGEST:g} % at most: subtract an offset, such as "
+            f"({middle}), everywhere"
         )
 
 
 def rounding_notes(scene: Any) -> list[str]:
-    """Return a note on the rounding of coordinates in an `mi.Scene`, none where it does not matter."""
+    """Return a note on the rounding of coordinates in an `mi.Scene`, none
+    where it does not matter.
+    """
     worst = _worst(scene)
     return [] if worst is None or worst.relative <= _NOTED else [str(worst)]
 
@@ -77,17 +82,25 @@ def _place(plugin: Any) -> Array:
 
 
 def _worst(scene: Any) -> Rounding | None:
-    """Return the length that the rounding changes most, None without any or without a camera, which readers refuse."""
+    """Return the length that the rounding changes most, None without any or without a
+    camera, which readers refuse.
+    """
     if not scene.sensors():
         return None
     camera = _place(scene.sensors()[0])
     lengths = [
-        _rounding(f"light '{name}' is {{:.3g}} m from the camera", camera, place) for name, place in _lights(scene)
+        _rounding(f"light '{name}' is {{:.3g}} m from the camera", camera, place)
+        for name, place in _lights(scene)
     ]
     shapes = [shape.bbox() for shape in scene.shapes()]
     if shapes:
-        ends = np.array([[np.ravel(box.min), np.ravel(box.max)] for box in shapes], dtype=np.float64)
-        low, high = np.minimum(ends[:, 0].min(axis=0), camera), np.maximum(ends[:, 1].max(axis=0), camera)
+        ends = np.array(
+            [[np.ravel(box.min), np.ravel(box.max)] for box in shapes], dtype=np.float64
+        )
+        low, high = (
+            np.minimum(ends[:, 0].min(axis=0), camera),
+            np.maximum(ends[:, 1].max(axis=0), camera),
+        )
         lengths.append(_rounding("the scene is {:.3g} m large", low, high))
     return max(lengths, key=lambda each: each.relative, default=None)
 

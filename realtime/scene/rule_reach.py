@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far rules of Gauss and Legendre with few nodes reach for a phase function, by the error of the rules themselves.
+"""How far rules of Gauss and Legendre with few nodes reach for a phase function, by the error
+of the rules themselves.
 
-Kernels integrate exp(-depth) p/r^2 by rules of fixed sizes, in one variable or another. How long a panel may be depends
-on the phase function: where it has its lobe, and how steeply the lobe rises. The rule is therefore tried on the phase
-function itself, once and in float64: a panel of some length, with any beginning, by the rule and by a rule of `_MANY`
-nodes. The longest panel is the one beyond which the two differ by more than `LEFT`. There are three kinds of panels:
+Kernels integrate exp(-depth) p/r^2 by rules of fixed sizes, in one variable or another. How long a
+panel may be depends on the phase function: where it has its lobe, and how steeply the lobe rises.
+The rule is therefore tried on the phase function itself, once and in float64: a panel of some
+length, with any beginning, by the rule and by a rule of `_MANY` nodes. The longest panel is the one
+beyond which the two differ by more than `LEFT`. There are three kinds of panels:
 
-- in v, of `realtime.kernels.exact`, where E = d sinh v: the integrand is p/(1 + E^2) d cosh v, E >= 0;
-- in x, of its short segments: p/r^2, with the length over the least distance r from the light; the height, which is 1
-  here, does not matter;
+- in v, of `realtime.kernels.exact`, where E = d sinh v: the integrand is
+  p/(1 + E^2) d cosh v, E >= 0;
+- in x, of its short segments: p/r^2, with the length over the least distance r from the light; the
+  height, which is 1 here, does not matter;
 - in ln E, of `realtime.scene.media.integrate`.
 
 Each rule is tried without extinction and up to the largest optical depth of a panel of its kind.
@@ -29,18 +32,20 @@ Array = NDArray[np.float64]
 
 LEFT = 1e-6  #: of the integral over any panel
 PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
-#: Short segments save a ninth of a frame of `hall`: 318 for 357 ms of shadow planes at 800 x 600, processor
-#: time in turns (29 November 2026).
+#: Short segments save a ninth of a frame of `hall`: 318 for 357 ms of shadow planes at 800 x 600,
+#: processor time in turns (29 November 2026).
 FEW_NODES, FEW_DEPTH = 4, 2.0
 
-#: Nodes of panels of any medium, and how much depths and the logarithm of an extinction change together. Eight nodes
-#: and 6.0 took a tenth longer in `three-media` and as long in `street` (processor time of shadow planes, 320 x 240).
+#: Nodes of panels of any medium, and how much depths and the logarithm of an extinction change
+#: together. Eight nodes and 6.0 took a tenth longer in `three-media` and as long in `street`
+#: (processor time of shadow planes, 320 x 240).
 NODES, CHANGE = 6, 4.0
 
 _MANY = 24
 _ENOUGH = 20.0  # depths, behind which kernels end
 _LEAST_PANEL = 0.11  # 160 panels reach up to E = 1e7: more a coarse table would not be worth
-_SHORTEST, _LONGEST = 1e-3, 2 * WIDEST  # between which a length is looked for; `sinh_bounded` serves half a panel
+# between which a length is looked for; `sinh_bounded` serves half a panel
+_SHORTEST, _LONGEST = 1e-3, 2 * WIDEST
 _HALVINGS = 9  # to 1.6 %
 
 
@@ -58,11 +63,13 @@ def shortest(*reaches: Reach) -> Reach:
     return Reach(*map(min, *map(astuple, reaches)))
 
 
-def reach_of(half: Callable[[Any, Any], Any], ends: tuple[float, float], left: float = LEFT) -> Reach:
+def reach_of(
+    half: Callable[[Any, Any], Any], ends: tuple[float, float], left: float = LEFT
+) -> Reach:
     """Return how far the rules reach for a phase function.
 
-    `half`: its value from sin^2 and cos^2 of half the scattering angle, of eager arrays; `ends`: the E at which its
-    forward lobe ends and its backward one begins; `left`: what a rule may leave.
+    `half`: its value from sin^2 and cos^2 of half the scattering angle, of eager arrays; `ends`:
+    the E at which its forward lobe ends and its backward one begins; `left`: what a rule may leave.
     """
 
     def value(e: Array) -> Array:
@@ -86,7 +93,9 @@ def _longest(error: Callable[[float], float], left: float) -> float:
 
 
 def _error(integrand: Callable[[Array], Array], nodes: int) -> float:
-    """Return the largest error of a rule for integrals from 0 to 1; the integrand takes a column of places."""
+    """Return the largest error of a rule for integrals from 0 to 1; the integrand
+    takes a column of places.
+    """
     few, many = (np.array(unit_nodes(count)).T for count in (nodes, _MANY))
     values = integrand(np.concatenate([few[0], many[0]])[:, None])
     return float(np.max(np.abs(few[1] @ values[:nodes] / (many[1] @ values[nodes:]) - 1)))
@@ -99,7 +108,9 @@ def _starts(ends: tuple[float, float]) -> Array:
 
 
 def _panel_error(value, ends, width: float) -> float:
-    v0, depth = (grid.ravel() for grid in np.meshgrid(_starts(ends), PANEL_DEPTH * np.array([0, 0.3, 1])))
+    v0, depth = (
+        grid.ravel() for grid in np.meshgrid(_starts(ends), PANEL_DEPTH * np.array([0, 0.3, 1]))
+    )
     rate = np.minimum(depth / (width * np.cosh(v0)), _ENOUGH / (np.sinh(v0 + width) - np.sinh(v0)))
 
     def integrand(t):
@@ -147,7 +158,11 @@ def _width_error(value, ends, width: float) -> float:
 
         def integrand(t, n0=n0, n1=n1, d0=d0, d1=d1, rate=rate, scale=scale):
             n, d = n0 + t * (n1 - n0), d0 + t * (d1 - d0)
-            return value(n / d) / (n * n + d * d) * np.exp(-rate * t * scale * (n * n0 + d * d0) / (n * d))
+            return (
+                value(n / d)
+                / (n * n + d * d)
+                * np.exp(-rate * t * scale * (n * n0 + d * d0) / (n * d))
+            )
 
         worst = max(worst, _error(integrand, NODES))
     return worst

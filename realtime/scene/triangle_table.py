@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shading data of every triangle of a scene, in two tables.
 
-Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and materials; where all of them
-are uniformly diffuse meshes, the number of the triangle is enough, and reading a table costs a quarter of the calls. A
-scene with anything else is shaded by Mitsuba's interaction.
+Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and
+materials; where all of them are uniformly diffuse meshes, the number of the triangle is enough, and
+reading a table costs a quarter of the calls. A scene with anything else is shaded by Mitsuba's
+interaction.
 """
 
 from collections.abc import Collection
@@ -19,7 +20,8 @@ from numpy.typing import NDArray
 from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers, types_of
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
-_FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room
+# length of the difference between the normals of a corner and of the triangle: float32, with room
+_FLAT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -27,13 +29,18 @@ class Facets:
     """The triangles of all shapes, shape after shape."""
 
     first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
-    normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
-    albedos: Any  #: four numbers each: the diffuse reflectance, and the number of its shape in the scene
+    #: four numbers each, or each of its corners: the unit normal, and 1 if
+    #: it is lit from both sides
+    normals: Any
+    #: four numbers each: the diffuse reflectance, and the number of its shape in the scene
+    albedos: Any
     smooth: bool  #: whether normals are those of corners, to be interpolated
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
-    """Return the triangles of a Mitsuba scene; None where a shape is no mesh of one diffuse colour."""
+    """Return the triangles of a Mitsuba scene; None where a shape is no
+    mesh of one diffuse colour.
+    """
     shapes = scene.shapes()
     if not shapes or not all(_is_plain(shape) for shape in shapes):
         return None
@@ -56,7 +63,9 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
 
 
 def turned_facets(facets: Facets, numbers: Collection[int], turn: NDArray[np.float64]) -> Facets:
-    """Return the triangles with the normals of the shapes of some numbers turned by a matrix (3, 3)."""
+    """Return the triangles with the normals of the shapes of some numbers
+    turned by a matrix (3, 3).
+    """
     Float = type(facets.normals)
     Four = four_numbers(Float)
     rotation, moved = aligned_array(Float, turn.ravel()), np.zeros(max(numbers, default=0) + 1)
@@ -77,7 +86,8 @@ def facet_number(facets: Facets, hit, active):
 
 
 def facet_at(facets: Facets, number, uv, active):
-    """Return the unit normal, whether it is lit from both sides, and the albedo of triangles by their numbers.
+    """Return the unit normal, whether it is lit from both sides, and the albedo of
+    triangles by their numbers.
 
     `uv`, barycentric coordinates, is only read where normals are interpolated.
     """
@@ -98,7 +108,7 @@ def _is_plain(shape) -> bool:
     if not shape.is_mesh() or shape.face_count() == 0:
         return False
     # A texture, a normal map or another kind of surface has parameters of other names.
-    names = [name.rsplit(".", 2)[-2:] for name in mi.traverse(shape.bsdf()).keys()]  # noqa: SIM118 (no mapping)
+    names = [name.rsplit(("."), 2)[-2:] for name in mi.traverse(shape.bsdf()).keys()]  # noqa: SIM118 (no mapping)
     return names == [["reflectance", "value"]]
 
 
@@ -115,22 +125,32 @@ def _is_smooth(shape) -> bool:
 
 
 def _of_shape(shape, smooth: bool, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return normals and albedos of the triangles of a shape, as Mitsuba has them, in rows of four numbers.
+    """Return normals and albedos of the triangles of a shape, as Mitsuba has them,
+    in rows of four numbers.
 
-    Rows are put together in NumPy: a kernel would hold the place of its shape in the table, and each shape its kernel.
+    Rows are put together in NumPy: a kernel would hold the place of its shape in the table,
+    and each shape its kernel.
     """
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
     middle.wi = mi.Vector3f(0, 0, 1)
     albedo = shape.bsdf().eval_diffuse_reflectance(middle)
-    normals = [_interaction(shape, u, v).sh_frame.n for u, v in _CORNERS] if smooth else [middle.sh_frame.n]
+    normals = (
+        [_interaction(shape, u, v).sh_frame.n for u, v in _CORNERS]
+        if smooth
+        else [middle.sh_frame.n]
+    )
     dr.eval(albedo, normals)
-    of_corners = np.stack([_rows(normal, two_sided, shape.face_count()) for normal in normals], axis=1)
+    of_corners = np.stack(
+        [_rows(normal, two_sided, shape.face_count()) for normal in normals], axis=1
+    )
     return of_corners.reshape(-1, 4), _rows(albedo, number, shape.face_count())
 
 
 def _rows(three, fourth: float, count: int) -> NDArray[np.float64]:
-    """Return three numbers of each triangle, or those that all share, and a fourth, (triangles, 4)."""
+    """Return three numbers of each triangle, or those that all share, and
+    a fourth, (triangles, 4).
+    """
     rows = np.empty((count, 4))
     for column, part in zip(rows.T, (*three, fourth)):
         column[:] = part
@@ -138,10 +158,14 @@ def _rows(three, fourth: float, count: int) -> NDArray[np.float64]:
 
 
 def _interaction(shape, u: float, v: float):
-    """Return Mitsuba's interactions with all triangles of a shape, at their barycentric coordinates u, v."""
+    """Return Mitsuba's interactions with all triangles of a shape, at their
+    barycentric coordinates u, v.
+    """
     count = shape.face_count()
     hit = dr.zeros(mi.PreliminaryIntersection3f, count)
     hit.t = dr.full(mi.Float, 1, count)
     hit.prim_uv = mi.Point2f(u, v)
     hit.prim_index = dr.arange(mi.UInt32, count)
-    return shape.compute_surface_interaction(mi.Ray3f(mi.Point3f(0), mi.Vector3f(0, 0, 1)), hit, mi.RayFlags.All)
+    return shape.compute_surface_interaction(
+        mi.Ray3f(mi.Point3f(0), mi.Vector3f(0, 0, 1)), hit, mi.RayFlags.All
+    )

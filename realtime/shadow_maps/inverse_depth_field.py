@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The light volume as a height field: the inverse of the planar depth over the texels of a shadow map.
+"""The light volume as a height field: the inverse of the planar depth over
+the texels of a shadow map.
 
-Billeter, Sintorn, Assarsson 2010, section 4, displace a grid by the depths of a shadow map; what lies between the light
-and the displaced grid is lit. A point has the projective coordinates (u, v, s) of `realtime.shadow_maps.projection`:
-planes stay planes and lines stay lines. The triangles of the displaced grid are therefore triangles over the texels of
-the map, linear in s; a camera ray is a straight line; and a point is lit where its s is above the height field. Where
-nothing is hit s = 0: a vertex at infinity, or for parallel rays the end of the media.
+Billeter, Sintorn, Assarsson 2010, section 4, displace a grid by the depths of a shadow map; what
+lies between the light and the displaced grid is lit. A point has the projective coordinates (u, v,
+s) of `realtime.shadow_maps.projection`: planes stay planes and lines stay lines. The triangles of
+the displaced grid are therefore triangles over the texels of the map, linear in s; a camera ray is
+a straight line; and a point is lit where its s is above the height field. Where nothing is hit s =
+0: a vertex at infinity, or for parallel rays the end of the media.
 
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
 
     s00 + x (s10 - s00) + y (s11 - s10)   where x >= y,
     s00 + y (s01 - s00) + x (s11 - s01)   where y >= x.
 
-The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, the last level the texels.
-Its nodes stand level by level, row by row; 1 + 4 + ... + 4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come
-before level d.
+The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, the last
+level the texels. Its nodes stand level by level, row by row; 1 + 4 + ... + 4^(d - 1) = (4^d - 1) /
+3 of them, in binary 0101...01, come before level d.
 """
 
 from dataclasses import dataclass, replace
@@ -30,13 +32,16 @@ from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
 @dataclass(frozen=True)
 class InverseDepthField:
-    """Inverse planar depths over the faces of a shadow map, or heights for parallel rays, with their bounds."""
+    """Inverse planar depths over the faces of a shadow map, or heights for parallel
+    rays, with their bounds.
+    """
 
     size: int  #: texels on a side
     projection: Projection  #: of its faces
     texels: Any  #: the heights s00, s10, s01, s11 of every texel, face by face, row by row [1/m]
     bounds: Any  #: least and largest height of every node of the pyramid, face by face [1/m]
-    walls: Any = None  #: by texel, where on its sides upright walls stand, see `jump_search`; None for none
+    #: by texel, where on its sides upright walls stand, see `jump_search`; None for none
+    walls: Any = None
 
     @property
     def faces(self) -> int:
@@ -79,7 +84,11 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
     for corner_height in four[1:]:
         low, high = dr.minimum(low, corner_height), dr.maximum(high, corner_height)
     face, within = index // size**2, index % size**2
-    dr.scatter(bounds, two_numbers(Float)(low, high), face * field.nodes + level_start(field.finest) + within)
+    dr.scatter(
+        bounds,
+        two_numbers(Float)(low, high),
+        face * field.nodes + level_start(field.finest) + within,
+    )
     dr.eval(bounds)
     for level in reversed(range(field.finest)):
         _write_level(field, bounds, level)
@@ -88,7 +97,9 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
 
 
 def node_bounds(heights: InverseDepthField, face, level, i, j):
-    """Return the least and largest height over the node in column `i` and row `j` of a level of a face [1/m]."""
+    """Return the least and largest height over the node in column `i` and row `j` of
+    a level of a face [1/m].
+    """
     node = face * heights.nodes + _before(level) + (j << level) + i
     pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node)
     return pair.x, pair.y
@@ -100,7 +111,9 @@ def _before(level):
 
 
 def texel_heights(heights: InverseDepthField, face, i, j, active=True):
-    """Return the heights s00, s10, s01 and s11 of the texel in column `i` and row `j` of a face [1/m]."""
+    """Return the heights s00, s10, s01 and s11 of the texel in column `i` and
+    row `j` of a face [1/m].
+    """
     texel = (face * heights.size + j) * heights.size + i
     return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
 
@@ -112,7 +125,8 @@ def texel_walls(heights: InverseDepthField, face, i, j, active=True):
 
 def _write_level(heights: InverseDepthField, bounds, level: int) -> None:
     """Write the bounds of the nodes of a level, from those of the next one."""
-    step = dr.opaque(mi.UInt32, level)  # one kernel for all levels: to compile it takes longer than all its runs
+    # one kernel for all levels: to compile it takes longer than all its runs
+    step = dr.opaque(mi.UInt32, level)
     index = dr.arange(mi.UInt32, heights.faces << (2 * level))
     row = index >> step
     face = row >> step

@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The projection of a shadow map: perspective for a light with a place, orthographic for one at infinity.
+"""The projection of a shadow map: perspective for a light with a place,
+orthographic for one at infinity.
 
-A face has a basis of two vectors across the light and an axis, and (u, v) in [-1, 1]^2. With the light at (l, w) both
-projections are one homogeneous map from (u, v, s) to the point (P, 1),
+A face has a basis of two vectors across the light and an axis, and (u, v) in [-1, 1]^2. With the
+light at (l, w) both projections are one homogeneous map from (u, v, s) to the point (P, 1),
 
     (P, 1) ~ u (across, 0) + v (up, 0) + s (l, w) + (m, 1 - w).
 
-* w = 1: m is the axis, and P = l + (axis + u across + v up) / s. Hence s is the inverse of the planar depth [1/m].
-* w = 0: l = -axis, m is the middle of the rectangle behind which there are no media, and P = m + u across + v up - s
-  axis. Hence s is the height above that rectangle [m].
+* w = 1: m is the axis, and P = l + (axis + u across + v up) / s. Hence s is the inverse
+  of the planar depth [1/m].
+* w = 0: l = -axis, m is the middle of the rectangle behind which there are no media, and P = m + u
+  across + v up - s axis. Hence s is the height above that rectangle [m].
 
-It is linear in homogeneous coordinates, so planes stay planes and lines stay lines; the light itself is s = infinity,
-and a point is lit where its s is above that of the first surface. Where nothing is hit s = 0: at infinity, or at the
-end of the media. Back from a point, with d its vector from l (w = 1) or m (w = 0) and d = a across + b up + c axis,
+It is linear in homogeneous coordinates, so planes stay planes and lines stay lines; the light
+itself is s = infinity, and a point is lit where its s is above that of the first surface. Where
+nothing is hit s = 0: at infinity, or at the end of the media. Back from a point, with d its vector
+from l (w = 1) or m (w = 0) and d = a across + b up + c axis,
 
     (u, v, s, 1) ~ (a, b, 1, c)  for w = 1,        (a, b, -c, 1)  for w = 0.
 
-A cube face has |across| = |up| = 1, the face of a spot tan(cutoff), so that its cone just fits; for a directional light
-they are half the sides of the rectangle [m].
+A cube face has |across| = |up| = 1, the face of a spot tan(cutoff), so that its cone just fits; for
+a directional light they are half the sides of the rectangle [m].
 """
 
 from dataclasses import dataclass
@@ -33,12 +36,16 @@ from airlight.realtime.scene.lights import Light
 class Projection:
     """The projection of the faces of a shadow map."""
 
-    basis: tuple[Any, Any, Any] | None  #: across, up and axis of the one face; None for the six of a cube
-    depth: Any = None  #: w = 0: distance along the axis from where rays of the map start to where the media end [m]
+    #: across, up and axis of the one face; None for the six of a cube
+    basis: tuple[Any, Any, Any] | None
+    #: w = 0: distance along the axis from where rays of the map start to where the media end [m]
+    depth: Any = None
 
     @property
     def w(self) -> int:
-        """The last coordinate of the light's homogeneous position: 1 perspective, 0 orthographic."""
+        """The last coordinate of the light's homogeneous position: 1
+        perspective, 0 orthographic.
+        """
         return 1 if self.depth is None else 0
 
     @property
@@ -57,15 +64,18 @@ class Projection:
             return tuple(dr.dot(vector, basis_vector) for basis_vector in self.basis)
         x, y, z = vector.x, vector.y, vector.z
         axis = face >> 1
-        a, b, c = (dr.select(axis == 0, p, dr.select(axis == 1, q, r)) for p, q, r in ((y, z, x), (z, x, y), (x, y, z)))
+        a, b, c = (
+            dr.select(axis == 0, p, dr.select(axis == 1, q, r))
+            for p, q, r in ((y, z, x), (z, x, y), (x, y, z))
+        )
         return a, b, dr.select((face & 1) == 0, c, -c)
 
     def homogeneous(self, face, vector, weight: int) -> tuple[Any, Any, Any, Any]:
         """Return a multiple of (u, v, s, 1) on a face.
 
-        `face`: number of the face; `vector`: of points, less the position of the light [m]; or directions; `weight`: 1
-        for points, 0 for directions: their last homogeneous coordinate. Returns `a`, `b`, `s`, `c`: linear in (vector,
-        weight).
+        `face`: number of the face; `vector`: of points, less the position of the light [m]; or
+        directions; `weight`: 1 for points, 0 for directions: their last homogeneous coordinate.
+        Returns `a`, `b`, `s`, `c`: linear in (vector, weight).
         """
         a, b, c = self.products(face, vector)
         if self.basis:
@@ -75,7 +85,8 @@ class Projection:
         return (a, b, last, c) if self.w else (a, b, -c, last)
 
     def inverse_depth(self, place, distance):
-        """Return the s of points that rays of the map meet: inverse planar depth [1/m], or height for w = 0 [m].
+        """Return the s of points that rays of the map meet: inverse planar depth [1/m],
+        or height for w = 0 [m].
 
         `place`: (u, v) on a face; `distance`: along the rays, infinite where nothing is met [m].
         """
@@ -94,12 +105,16 @@ def light_projection(light: Light) -> Projection:
 
 
 def light_faces(light: Light) -> int:
-    """Return how many faces the shadow map of a light has: one for a cone or parallel rays, six for all directions."""
+    """Return how many faces the shadow map of a light has: one for a cone or parallel
+    rays, six for all directions.
+    """
     return 1 if light.axis is not None else 6
 
 
 def light_basis(light: Light) -> tuple[Any, Any, Any] | None:
-    """Return two vectors across a light's axis and the axis, in float64; None for a light without one."""
+    """Return two vectors across a light's axis and the axis, in float64; None
+    for a light without one.
+    """
     if light.axis is None:
         return None
     axis = light.exact_axis
@@ -114,7 +129,9 @@ def light_basis(light: Light) -> tuple[Any, Any, Any] | None:
 
 
 def map_ray(light: Light, face, u, v) -> tuple[Any, Any]:
-    """Return start and unit direction, in float64, of the ray of a light's map through (u, v) of a face."""
+    """Return start and unit direction, in float64, of the ray of a light's map
+    through (u, v) of a face.
+    """
     basis = light_basis(light)
     if basis is None:
         # In this order the sum does not depend on which coordinate is which.
@@ -134,11 +151,15 @@ def cube_direction(Vector, face, u, v):
     """
     sign = dr.select((face & 1) == 0, type(u)(1), type(u)(-1))
     axis = face >> 1
-    return dr.select(axis == 0, Vector(sign, u, v), dr.select(axis == 1, Vector(v, sign, u), Vector(u, v, sign)))
+    return dr.select(
+        axis == 0, Vector(sign, u, v), dr.select(axis == 1, Vector(v, sign, u), Vector(u, v, sign))
+    )
 
 
 def cube_coordinates(d):
-    """Return the face of a cube that a direction `d` of any length goes through, and u and v there, from -1 to 1."""
+    """Return the face of a cube that a direction `d` of any length goes through, and u
+    and v there, from -1 to 1.
+    """
     size = dr.abs(d)
     x_major = (size.x >= size.y) & (size.x >= size.z)
     y_major = ~x_major & (size.y >= size.z)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow maps by ray casting into plain arrays: one face for a spot or a directional light, six for a point light.
+"""Shadow maps by ray casting into plain arrays: one face for a spot or a directional
+light, six for a point light.
 
-A face is cut into size^2 texels over (u, v) in [-1, 1]^2 (`realtime.shadow_maps.projection`); a map holds at each of
-their (size + 1)^2 *corners* the distance *along the ray* from the light to the first surface [m], infinite where there
-is none. The outermost values therefore lie on the edges of the face, where faces of a cube meet with equal values.
+A face is cut into size^2 texels over (u, v) in [-1, 1]^2 (`realtime.shadow_maps.projection`); a map
+holds at each of their (size + 1)^2 *corners* the distance *along the ray* from the light to the
+first surface [m], infinite where there is none. The outermost values therefore lie on the edges of
+the face, where faces of a cube meet with equal values.
 
-The face of a directional light is a rectangle across it that just covers the media. It lies where the media end; the
-ray of (u, v) starts at position + u across + v up - depth axis, before all shapes, and goes along the axis. Surfaces
-beside that rectangle are in no map: rays find their shadows.
+The face of a directional light is a rectangle across it that just covers the media. It lies where
+the media end; the ray of (u, v) starts at position + u across + v up - depth axis, before all
+shapes, and goes along the axis. Surfaces beside that rectangle are in no map: rays find their
+shadows.
 
-Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray that passes an edge
-closely meets the same surface whatever the precision of the method, and one map can stand for both.
+Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray
+that passes an edge closely meets the same surface whatever the precision of the method, and one map
+can stand for both.
 """
 
 from collections.abc import Sequence
@@ -87,7 +91,9 @@ def map_memory(light: Light, size: int) -> int:
 
 
 def check_maps(lights: Sequence[Light], size: int, needed: int | None = None) -> None:
-    """Refuse maps of some lights that need more memory than the machine has; `needed` bytes, or what distances take."""
+    """Refuse maps of some lights that need more memory than the machine has; `needed`
+    bytes, or what distances take.
+    """
     needed = sum(map_memory(light, size) for light in lights) if needed is None else needed
     check_memory(f"map: {size} texels for {len(lights)} light(s)", needed, "use a smaller map")
 
@@ -100,8 +106,8 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
 def cast_shadow_maps(scene, table: LightTable, size: int) -> ShadowMaps:
     """Cast the shadow maps of all lights of a table at once.
 
-    `scene`: the Mitsuba scene that holds the occluders; `table`: the lights; `size`: texels on a side, a power of two.
-    Raises InputError if `size` is not a power of two from 4 to 8192.
+    `scene`: the Mitsuba scene that holds the occluders; `table`: the lights; `size`: texels on a
+    side, a power of two. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Double = mi.Float64
@@ -109,18 +115,22 @@ def cast_shadow_maps(scene, table: LightTable, size: int) -> ShadowMaps:
     face, row, column = tiled_corners(table.count * faces, side)
     there = (row < side) & (column < side)
     number = face // faces
-    # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
+    # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays
+    # along their common edge.
     u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
     cast = cast_map_rays(scene, table[number], (face - number * faces, u, v), there)
     distance = dr.empty(type(cast), table.count * faces * side * side)
     dr.scatter(distance, cast, (face * side + row) * side + column, there)
     projection = light_projection(table.rows) if table.count == 1 else None
-    dr.eval(distance, projection)  # Evaluate it once: every kernel that reads it would cast the rays again.
+    # Evaluate it once: every kernel that reads it would cast the rays again.
+    dr.eval(distance, projection)
     return ShadowMaps(size, distance, projection)
 
 
 def inverse_depth(shadow_map: ShadowMap):
-    """Return the inverse planar depth [1/m], or the height for parallel rays [m], at every corner of the texels."""
+    """Return the inverse planar depth [1/m], or the height for parallel rays [m], at
+    every corner of the texels.
+    """
     size, distance = shadow_map.size, shadow_map.distance
     Float = type(distance)
     index = dr.arange(mi.UInt32, dr.width(distance))
@@ -131,7 +141,8 @@ def inverse_depth(shadow_map: ShadowMap):
 
 
 def tiled_corners(faces: int, side: int):
-    """Return face, row and column of corners in squares of 4 x 4, so that rays side by side in a packet stay close.
+    """Return face, row and column of corners in squares of 4 x 4, so that rays side by
+    side in a packet stay close.
 
     The last squares reach beyond the face.
     """
@@ -144,10 +155,12 @@ def tiled_corners(faces: int, side: int):
 
 
 def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
-    """Return the rays of a directional light through the middles of the texels of its map, in squares of 4 x 4.
+    """Return the rays of a directional light through the middles of the texels of its
+    map, in squares of 4 x 4.
 
-    `light`: a directional area light; `size`: texels on a side, a multiple of 4. Returns where the rays start
-    [m] and their unit direction, in float64, and the numbers of their texels, row by row.
+    `light`: a directional area light; `size`: texels on a side, a multiple of 4. Returns where the
+    rays start [m] and their unit direction, in float64, and the numbers of their texels, row by
+    row.
     """
     _, row, column = tiled_corners(1, size)
     u, v = (dr.fma(mi.Float64(texel), 2.0 / size, 1.0 / size - 1) for texel in (column, row))
@@ -155,10 +168,11 @@ def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
 
 
 def cast_map_rays(scene, light: Light, place, active=True):
-    """Return the distances to the first surface along rays of a light's map, infinite where there is none [m].
+    """Return the distances to the first surface along rays of a light's map, infinite
+    where there is none [m].
 
-    `scene`: the Mitsuba scene that holds the occluders; `light`: the light; `place`: the face and u and v there, in
-    float64; `active`: lanes to cast rays in.
+    `scene`: the Mitsuba scene that holds the occluders; `light`: the light; `place`: the face and u
+    and v there, in float64; `active`: lanes to cast rays in.
     """
     Float = type(light.position.x)
     start, unit = map_ray(light, *place)
@@ -167,7 +181,9 @@ def cast_map_rays(scene, light: Light, place, active=True):
         start, skipped = light.rays_from(unit)
     ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-    return dr.select(hit.is_valid(), Float(hit.t + skipped) if light.facing is not None else Float(hit.t), dr.inf)
+    return dr.select(
+        hit.is_valid(), Float(hit.t + skipped) if light.facing is not None else Float(hit.t), dr.inf
+    )
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
@@ -192,7 +208,8 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
 def _nearest(place, last: int):
     """Return the whole number below a place, from 0 to `last`, whatever the place is.
 
-    Where a ray passes through the light itself, (u, v) is NaN. `dr.clip` lets NaN through, and as a whole number it is
-    2^32 - 1: a load from there ends the process. The upper bound is therefore one of whole numbers.
+    Where a ray passes through the light itself, (u, v) is NaN. `dr.clip` lets NaN through, and as a
+    whole number it is 2^32 - 1: a load from there ends the process. The upper bound is therefore
+    one of whole numbers.
     """
     return dr.minimum(mi.UInt32(dr.maximum(place, 0)), last)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference by random samples: what both Monte Carlo estimators of images need to count, their folders, and a walk.
+"""The reference by random samples: what both Monte Carlo estimators of images need to count,
+their folders, and a walk.
 
 Read in this order:
 

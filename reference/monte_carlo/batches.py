@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Batches of a Monte Carlo estimator: their means, the spread between them, and where their samples go, in float64.
+"""Batches of a Monte Carlo estimator: their means, the spread between them, and where
+their samples go, in float64.
 
-An estimator traces one batch at a time, each with its own seed. The standard error of the mean follows from the
-spread of the batch means, so nothing needs to be known of the law of a single sample.
+An estimator traces one batch at a time, each with its own seed. The standard error of the mean
+follows from the spread of the batch means, so nothing needs to be known of the law of a single
+sample.
 
-**Where the samples of a path tracer go:** more to the pixels whose radiance spreads more. A pooled bias compares sums
-over all pixels. With n_p samples of standard deviation s_p in pixel p its variance is
+**Where the samples of a path tracer go:** more to the pixels whose radiance spreads more. A pooled
+bias compares sums over all pixels. With n_p samples of standard deviation s_p in pixel p its
+variance is
 
     sum_p s_p^2 / n_p,    for a given sum of n_p least where n_p is proportional to s_p:    (sum_p s_p)^2 / sum_p n_p
 
-(Neyman 1934; Cochran 1977, *Sampling Techniques*, eq. 5.26). In fog a few pixels hold nearly all of the variance, those
-that look at or past what is next to a light: equal numbers would spend most samples on the others.
+(Neyman 1934; Cochran 1977, *Sampling Techniques*, eq. 5.26). In fog a few pixels hold nearly all of
+the variance, those that look at or past what is next to a light: equal numbers would spend most
+samples on the others.
 
-The s_p come from a pilot run of which nothing else is used. Samples that decide where more of them go must not be
-counted themselves: pixels that came out dark by chance would get few more, and the mean would be too small. A quarter
-of the samples is shared out equally, so that a pixel whose pilot met nothing at all has at most four times the variance
-that it would have had.
+The s_p come from a pilot run of which nothing else is used. Samples that decide where more of them
+go must not be counted themselves: pixels that came out dark by chance would get few more, and the
+mean would be too small. A quarter of the samples is shared out equally, so that a pixel whose pilot
+met nothing at all has at most four times the variance that it would have had.
 """
 
 from collections.abc import Iterable
@@ -61,18 +65,22 @@ def check_samples(samples: int) -> None:
         raise ValueError(f"samples: got {samples}, expected 1 to {LARGEST_BATCH}")
 
 
-def single_batch(seed: int, samples: int, mean: Array, *, layers: tuple[str, ...] = LAYERS) -> Batches:
+def single_batch(
+    seed: int, samples: int, mean: Array, *, layers: tuple[str, ...] = LAYERS
+) -> Batches:
     """Return one batch, given its radiance of every pixel, (layers, pixels, 3).
 
-    `seed`: of the batch; `samples`: samples a pixel in it; `mean`: its radiance of every pixel, (layers, pixels, 3)
-    [W/(m^2 sr)]; `layers`: their names. Raises InputError for radiance that is not finite: no mean and no standard
-    error would follow from it.
+    `seed`: of the batch; `samples`: samples a pixel in it; `mean`: its radiance of every pixel,
+    (layers, pixels, 3) [W/(m^2 sr)]; `layers`: their names. Raises InputError for radiance that is
+    not finite: no mean and no standard error would follow from it.
     """
     wrong = ~np.isfinite(mean).all(axis=(0, 2))
     if wrong.any():
         raise InputError(
-            f"the samples of {int(wrong.sum())} of {wrong.size} pixels are not finite, first of pixel "
-            f"{int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number of the scene be too large "
+            f"the samples of {int(wrong.sum())} of {wrong.size} pixels are not finite, first of "
+            "pixel "
+            f"{int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number of the "
+            "scene be too large "
             "for float32: move the light, or use other units"
         )
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None], layers)
@@ -86,7 +94,8 @@ def merged(first: Batches, second: Batches) -> Batches:
     if first.samples != second.samples or set(first.seeds) & set(second.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
     mean, squares = combined_moments(
-        (len(first.seeds), first.mean, first.squares), (len(second.seeds), second.mean, second.squares)
+        (len(first.seeds), first.mean, first.squares),
+        (len(second.seeds), second.mean, second.squares),
     )
     return Batches(
         first.seeds + second.seeds,
@@ -98,18 +107,24 @@ def merged(first: Batches, second: Batches) -> Batches:
     )
 
 
-def combined_moments(first: tuple[int, Array, Array], second: tuple[int, Array, Array]) -> tuple[Array, Array]:
+def combined_moments(
+    first: tuple[int, Array, Array], second: tuple[int, Array, Array]
+) -> tuple[Array, Array]:
     """Return mean and sum of squared deviations of two sets of numbers together.
 
-    The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).
+    The squares are those within each set and those between their means (Chan, Golub
+    and LeVeque 1983, eq. 2.1).
 
-    `first`, `second`: of each set: how many numbers there are, their mean, and the sum of their squared deviations from
-    it. The arrays have one shape; the mean is in any unit, here [W/(m^2 sr)], the squares in its square. Returns
-    `mean`, `squares`: of all numbers, in the same shape and units.
+    `first`, `second`: of each set: how many numbers there are, their mean, and the sum of their
+    squared deviations from it. The arrays have one shape; the mean is in any unit, here [W/(m^2
+    sr)], the squares in its square. Returns `mean`, `squares`: of all numbers, in the same shape
+    and units.
     """
     (n, mean, squares), (m, other_mean, other_squares) = first, second
     difference = other_mean - mean
-    return mean + difference * (m / (n + m)), squares + other_squares + difference**2 * (n * m / (n + m))
+    return mean + difference * (m / (n + m)), squares + other_squares + difference**2 * (
+        n * m / (n + m)
+    )
 
 
 def seed_ranges(seeds: Iterable[int]) -> str:
@@ -145,10 +160,10 @@ def allocated(
 ) -> NDArray[np.uint32]:
     """Return how many samples each pixel gets.
 
-    `pilot`: batches of the same estimator with other seeds, two at least; `samples`: samples a pixel, on the average;
-    `shape`: height and width of the image; `masks`: by layer the pixels that are compared, (height, width); the others
-    get the equal share alone. Returns samples of every pixel [1], (layers, pixels), at least 1; their mean is `samples`
-    up to rounding.
+    `pilot`: batches of the same estimator with other seeds, two at least; `samples`: samples a
+    pixel, on the average; `shape`: height and width of the image; `masks`: by layer the pixels that
+    are compared, (height, width); the others get the equal share alone. Returns samples of every
+    pixel [1], (layers, pixels), at least 1; their mean is `samples` up to rounding.
     """
     counts = []
     for number, layer in enumerate(LAYERS):
@@ -161,8 +176,14 @@ def allocated(
 
 
 def _neighbourhood(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean over 3 x 3 pixels: the spread of a few batches is noisy, and neighbours are alike."""
+    """Return the mean over 3 x 3 pixels: the spread of a few batches is noisy,
+    and neighbours are alike.
+    """
     padded = np.pad(values, 1, mode="edge")
     height, width = values.shape
-    shifted = [padded[row : row + height, column : column + width] for row in range(3) for column in range(3)]
+    shifted = [
+        padded[row : row + height, column : column + width]
+        for row in range(3)
+        for column in range(3)
+    ]
     return np.mean(shifted, axis=0)

@@ -1,31 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Mitsuba's volumetric path tracer as the check by code that nobody here wrote.
 
-`volpath` with ``max_depth = 2`` is exactly one scattering, on a surface or in the medium (DESIGN section 6.4). It is
-run along the pixel-centre rays from the pinhole itself, so neither the reconstruction filter, nor the film's float32
-sums, nor the near clip plane come into play; what remains of Mitsuba's biases is the shadow-ray epsilon
-(`reference.scene.shadow_epsilon`).
+`volpath` with ``max_depth = 2`` is exactly one scattering, on a surface or in the medium (DESIGN
+section 6.4). It is run along the pixel-centre rays from the pinhole itself, so neither the
+reconstruction filter, nor the film's float32 sums, nor the near clip plane come into play; what
+remains of Mitsuba's biases is the shadow-ray epsilon (`reference.scene.shadow_epsilon`).
 
-Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with albedo 0 only surfaces
-do. Where the extinction depends on the channel, each channel has its own run in grey media, since a path that
-picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
-paths go through them without counting an edge, and they stay as they are when surfaces turn black.
+Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with
+albedo 0 only surfaces do. Where the extinction depends on the channel, each channel has its own run
+in grey media, since a path that picks its channel at random may have infinite variance (DESIGN
+section 6.7). Boundaries of media are of type 'null': paths go through them without counting an
+edge, and they stay as they are when surfaces turn black.
 
-Area lights: light seen directly belongs to neither layer. With `hide_emitters` Mitsuba 3.9.1's `volpath` leaves
-it out, and what the light's own shape does stays: a black one ends camera rays, one of type 'null' lets them pass (its
-integrator `direct` looks through both). Part of such light comes by rays that the phase function or a surface sends on,
-with a weight; these are not shortened, so the shadow-ray epsilon counts in part. The fluence of such a light is at most
-2 pi times its radiance, and so the variance is bounded. Past the boundary of a medium, a shadow ray starts further on
-than the epsilon of a short segment and meets a black light itself: within about 0.3 m of bounds, black lights are too
-dim.
+Area lights: light seen directly belongs to neither layer. With `hide_emitters` Mitsuba 3.9.1's
+`volpath` leaves it out, and what the light's own shape does stays: a black one ends camera rays,
+one of type 'null' lets them pass (its integrator `direct` looks through both). Part of such light
+comes by rays that the phase function or a surface sends on, with a weight; these are not shortened,
+so the shadow-ray epsilon counts in part. The fluence of such a light is at most 2 pi times its
+radiance, and so the variance is bounded. Past the boundary of a medium, a shadow ray starts further
+on than the epsilon of a short segment and meets a black light itself: within about 0.3 m of bounds,
+black lights are too dim.
 
-Clouds come by order of scattering: one more edge of the paths is one more order. Runs with `max_depth` n + 1 and n, of
-equal seeds, share their paths up to order n - 1, and their difference is order n alone, to rounding. Surfaces are black
-in these runs; all light with their own materials, less all without, is what met a surface. `hide_emitters` is not used
-there: the sky behind the clouds is in every run and cancels.
+Clouds come by order of scattering: one more edge of the paths is one more order. Runs with
+`max_depth` n + 1 and n, of equal seeds, share their paths up to order n - 1, and their difference
+is order n alone, to rounding. Surfaces are black in these runs; all light with their own materials,
+less all without, is what met a surface. `hide_emitters` is not used there: the sky behind the
+clouds is in every run and cancels.
 
-Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
-`reference.monte_carlo.batches`. Sums, means and standard errors are taken in float64.
+Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may
+differ, see `reference.monte_carlo.batches`. Sums, means and standard errors are taken in float64.
 """
 
 import math
@@ -50,35 +53,50 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
 
 _PATHS = 1 << 22  # paths traced at once
-_VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numbers among a medium's parameters
+# what decides the numbers among a medium's parameters
+_VALUES = ("sigma_t.value.value", "albedo.value.value")
 
 
 def volpath_batch(
-    reference: ReferenceScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
+    reference: ReferenceScene,
+    seed: int,
+    samples: int,
+    *,
+    max_depth: int = 2,
+    counts: Counts | None = None,
 ) -> Batches:
     """Trace one batch.
 
-    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at
-    most 256; `max_depth`: most edges of a path: 2 is one scattering. With more, `airlight` is the light that was
-    scattered by the medium alone, any number of times up to max_depth - 1, and `surface` all other light: what met a
-    surface at least once. `counts`: samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by
-    default. Raises InputError for a scene of which Mitsuba does not know how large it is, under a directional light.
-    Raises ValueError if `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
+    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
+    samples a pixel, at most 256; `max_depth`: most edges of a path: 2 is one scattering. With more,
+    `airlight` is the light that was scattered by the medium alone, any number of times up to
+    max_depth - 1, and `surface` all other light: what met a surface at least once. `counts`:
+    samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
+    Raises InputError for a scene of which Mitsuba does not know how large it is, under a
+    directional light. Raises ValueError if `samples` or `max_depth` is out of range, or `counts`
+    come with another `max_depth` than 2.
 
-    Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
-    difference of the two has less spread than either.
+    Batches of one seed but another `max_depth` are not independent: their airlight paths begin
+    alike, so that the difference of the two has less spread than either.
     """
     check_samples(samples)
     if max_depth < 2:
         raise ValueError(f"max_depth: got {max_depth}, expected at least 2, one scattering")
     if counts is not None and max_depth != 2:
-        raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
-    in_air, on_surface = np.full((2, reference.width * reference.height), samples) if counts is None else counts
+        raise ValueError(
+            "counts: got some with multiple scattering, whose layers are traced along the same "
+            "paths"
+        )
+    in_air, on_surface = (
+        np.full((2, reference.width * reference.height), samples) if counts is None else counts
+    )
     if reference.directional or reference.sky is not None:
         _check_far(reference)
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
     reference = replace(reference, scene=whole_scene(reference))
-    integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
+    integrator = mi.load_dict(
+        {"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden
+    )
     with black_surfaces(reference.occluders):
         airlight = trace(reference, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
@@ -91,13 +109,17 @@ def volpath_batch(
 
 
 def _check_far(reference: ReferenceScene) -> None:
-    """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the radius of all shapes long.
+    """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the
+    radius of all shapes long.
 
-    Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog, and lower ones that
-    are cut miss its thin upper part.
+    Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog,
+    and lower ones that are cut miss its thin upper part.
     """
     if not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
-        raise InputError("volpath: the scene's bounding box is not valid, so lights from infinity start within it")
+        raise InputError(
+            "volpath: the scene's bounding box is not valid, so lights from infinity start within "
+            "it"
+        )
     medium, radius = reference.medium, float(reference.scene.bbox().bounding_sphere().radius)
     needed = 0.0
     if isinstance(medium, HeightMedium):
@@ -109,8 +131,10 @@ def _check_far(reference: ReferenceScene) -> None:
         needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
     if radius < needed:
         raise InputError(
-            f"volpath: the light paths of a sun or a sky end within the fog, since the shapes of the scene have a "
-            f"radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or lower the cap of height fog"
+            "volpath: the light paths of a sun or a sky end within the fog, since the shapes of "
+            "the scene have a "
+            f"radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or lower the cap of "
+            "height fog"
         )
 
 
@@ -128,24 +152,28 @@ def black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def trace(reference: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+def trace(
+    reference: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True
+) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
 
-    `reference`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of each pixel,
-    (pixels,); `scattering`: whether media scatter.
+    `reference`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of
+    each pixel, (pixels,); `scattering`: whether media scatter.
     """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)
-    extinctions = np.stack([medium.largest for medium in (reference.medium, *reference.media)], axis=1)
+    extinctions = np.stack(
+        [medium.largest for medium in (reference.medium, *reference.media)], axis=1
+    )
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.all(extinctions == sigma_t, axis=1)
         with _grey_media(reference, int(np.argmax(channels)), scattering) as medium:
             for place, part in enumerate(parts):
                 # Streams differ by seed; the part and the channel get their own seeds.
                 stream = (seed * 3 + number) * len(parts) + place
-                image[part, channels] = _trace_pixels(reference, integrator, medium, part, stream, counts[part])[
-                    :, channels
-                ]
+                image[part, channels] = _trace_pixels(
+                    reference, integrator, medium, part, stream, counts[part]
+                )[:, channels]
     return image
 
 
@@ -156,7 +184,9 @@ def _parts(counts: Counts) -> list[slice]:
     return [slice(int(start), int(end)) for start, end in pairwise(edges)]
 
 
-def _trace_pixels(reference: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
+def _trace_pixels(
+    reference: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts
+) -> Array:
     # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
     direction = dr.normalize(mi.Vector3f(reference.direction[pixels].T))
     dr.eval(direction)
@@ -177,7 +207,9 @@ def _trace_pixels(reference: ReferenceScene, integrator, medium, pixels: slice, 
 
 @contextmanager
 def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
-    """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
+    """Give all media the extinction of one channel for a while; yield the medium in
+    which camera rays begin.
+    """
     own: list[tuple[Any, dict[str, Any]]] = []
     try:
         for medium in (reference.medium, *reference.media):
@@ -186,7 +218,9 @@ def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> It
                 parameters = mi.traverse(medium.plugin)
                 # The extinction of a grid is grey already.
                 known = (key for key in _VALUES if key in parameters)
-                own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known}))
+                own.append(
+                    (medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known})
+                )
                 sigma_t = float(medium.largest[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
         yield reference.scene.sensors()[0].get_medium()
@@ -206,7 +240,9 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
             continue
         kind = type(parameters[key])
         # A grey number of Mitsuba is one value, a colour three.
-        parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
+        parameters[key] = (
+            kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
+        )
     parameters.update()
 
 
@@ -215,8 +251,9 @@ def volpath_orders_batch(
 ) -> Batches:
     """Trace one batch of the layers `airlight`, `surface` and those of sets of orders.
 
-    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
-    256; `sets`: names of sets of orders with their first and last order, the last `math.inf` for one without end.
+    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
+    samples a pixel, at most 256; `sets`: names of sets of orders with their first and last order,
+    the last `math.inf` for one without end.
     """
     check_samples(samples)
     reference = ReferenceScene(
@@ -241,7 +278,9 @@ def volpath_orders_batch(
     with black_surfaces(clouds.occluders):
         sums = {order: up_to(order) for order in sorted(wanted)}
     airlight = sums[math.inf] - sums[0]
-    surface = up_to(math.inf) - sums[math.inf] if clouds.occluders.shapes() else np.zeros_like(airlight)
+    surface = (
+        up_to(math.inf) - sums[math.inf] if clouds.occluders.shapes() else np.zeros_like(airlight)
+    )
     by_set = [sums[last] - sums[first - 1] for _, (first, last) in sets]
     names = ("airlight", "surface", *("airlight_" + name.replace("-", "_") for name, _ in sets))
     return single_batch(seed, samples, np.stack([airlight, surface, *by_set]), layers=names)

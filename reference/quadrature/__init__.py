@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference by quadrature: airlight integrals over lit intervals, added up in float64, with a bound for each pixel.
+"""The reference by quadrature: airlight integrals over lit intervals, added up in float64,
+with a bound for each pixel.
 
 Read in this order:
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sum of smooth pieces of rays for any medium: panels are halved until each ray meets a tolerance.
+"""The sum of smooth pieces of rays for any medium: panels are halved until
+each ray meets a tolerance.
 
-Panels and their rules are those of `analytic.panels`, and so is the variable near a place; under a direction it is the
-distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and albedo sigma_t int exp(-tau) dx [1] of a
-directional light. A medium states its integrand (`Integrand`); lights, tolerances and uncertain edges are known here.
+Panels and their rules are those of `analytic.panels`, and so is the variable near a place; under a
+direction it is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
+albedo sigma_t int exp(-tau) dx [1] of a directional light. A medium states its integrand
+(`Integrand`); lights, tolerances and uncertain edges are known here.
 """
 
 from dataclasses import dataclass, field
@@ -25,7 +27,8 @@ RTOL = 1e-10  #: relative tolerance of the sum of a ray and a light
 AT_LIGHT = 1e-290  #: height [m] below which a ray meets the light
 _PANEL = 2.4  # width in v of the first panels, as in `analytic.panels`
 _THICK = 0.2  # optical depth over which a panel in x is as wide as one of this width in v times ten
-_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
+# height over distance below which a light beside a piece may as well be at this height
+_NEAR_ZERO = 1e-15
 _PANELS = 8192  # panels at once
 _EPS = float(np.finfo(float).eps)
 
@@ -35,7 +38,9 @@ class Integrand(Protocol):
 
     @property
     def factor(self) -> Array:
-        """The factor of the values, such as albedo sigma_t where that is constant, (pieces, 3) [1/m]."""
+        """The factor of the values, such as albedo sigma_t where that is
+        constant, (pieces, 3) [1/m].
+        """
 
     @property
     def extinction(self) -> Array:
@@ -45,12 +50,14 @@ class Integrand(Protocol):
     def same(self) -> Index:
         """Which column of the values each channel has, (3,)."""
 
-    def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
+    def __call__(
+        self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
+    ) -> tuple[Array, Array]:
         """Return values and optical depths of nodes, (m, nodes, columns) each.
 
-        `rows`: the pieces, (m,); `x`, `inside`: distances from the camera, and from where the pieces begin, (m, nodes)
-        [m]; `r`: distances to the lights, infinite for directions, (m, nodes) [m]; `scatter`: cosines of the scattering
-        angle, (m, nodes).
+        `rows`: the pieces, (m,); `x`, `inside`: distances from the camera, and from where the
+        pieces begin, (m, nodes) [m]; `r`: distances to the lights, infinite for directions, (m,
+        nodes) [m]; `scatter`: cosines of the scattering angle, (m, nodes).
         """
 
 
@@ -61,11 +68,13 @@ def sum_pieces(
     block: slice,
     terms: Terms,
 ) -> tuple[Array, Array]:
-    """Integrate smooth pieces of a block of rays and add up those of each ray, for lights of strength 1.
+    """Integrate smooth pieces of a block of rays and add up those of each ray,
+    for lights of strength 1.
 
-    `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the block; `integrand`: what
-    the medium scatters along the pieces; `block`: of rays; `terms`: with `RTOL` by default. Returns the value and a
-    bound of its error, (rays of the block, 3) each; infinite where a ray meets a light in a medium that scatters.
+    `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the
+    block; `integrand`: what the medium scatters along the pieces; `block`: of rays; `terms`: with
+    `RTOL` by default. Returns the value and a bound of its error, (rays of the block, 3) each;
+    infinite where a ray meets a light in a medium that scatters.
     """
     work = _Sum(rays, pieces, integrand, terms.profile)
     edge = np.broadcast_to(terms.edge, len(rays.foot))
@@ -79,7 +88,9 @@ def sum_pieces(
 
 @dataclass
 class _Sum:
-    """The sums of one block of rays, in v = asinh((x - foot)/height) for places and in x for directions."""
+    """The sums of one block of rays, in v = asinh((x - foot)/height) for places
+    and in x for directions.
+    """
 
     rays: Rays
     pieces: Pieces
@@ -111,15 +122,23 @@ class _Sum:
         return near & (self.pieces.x0 <= self.own.foot) & (self.own.foot <= self.pieces.x1)
 
     def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
-        """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
+        """Integrate panels by both rules, a block at a time so that the
+        arrays stay in the cache.
+        """
         both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
         size = width if self.rays.w else width * self.integrand.extinction[piece] / (10 * _THICK)
         for pair, block in blocks_by_rule(size, _PANELS):
-            both[:, block], noise[block] = self.evaluate_block(pair, piece[block], start[block], width[block])
+            both[:, block], noise[block] = self.evaluate_block(
+                pair, piece[block], start[block], width[block]
+            )
         return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
 
-    def evaluate_block(self, pair: Pair, rows: Index, start: Array, width: Array) -> tuple[Array, Array]:
-        """Return the integrals of panels by both rules, (2, m, 3), and the rounding errors of the first, (m, 3)."""
+    def evaluate_block(
+        self, pair: Pair, rows: Index, start: Array, width: Array
+    ) -> tuple[Array, Array]:
+        """Return the integrals of panels by both rules, (2, m, 3), and the rounding
+        errors of the first, (m, 3).
+        """
         half, same = 0.5 * width, self.integrand.same
         f, depth = self.at(rows, start[:, None] + half[:, None] * (1 + pair.nodes))
         scale = half[:, None] * self.integrand.factor[rows]
@@ -127,7 +146,9 @@ class _Sum:
         return both, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(both[0])
 
     def at(self, rows: Index, v: Array) -> tuple[Array, Array]:
-        """Return the integrand, times dx/r^2 or dx by dv and the profile, and tau, at v, (m, nodes)."""
+        """Return the integrand, times dx/r^2 or dx by dv and the profile,
+        and tau, at v, (m, nodes).
+        """
         own, begin = self.own, self.pieces.x0[rows, None]
         if self.rays.w:
             height, foot = self.height[rows, None], own.foot[rows, None]
@@ -139,14 +160,19 @@ class _Sum:
             x, inside = foot + s, np.maximum(s + (foot - begin), 0.0)
         else:
             x, inside, r = v, v - begin, np.full_like(v, np.inf)
-            scatter, rate = np.broadcast_to(np.clip(own.foot[rows, None], -1, 1), v.shape), np.ones_like(v)
+            scatter, rate = (
+                np.broadcast_to(np.clip(own.foot[rows, None], -1, 1), v.shape),
+                np.ones_like(v),
+            )
         f, depth = self.integrand(rows, x, inside, r, scatter)
         if self.profile is not None:
             rate = rate * self.profile(x, self.pieces.ray[rows])
         return f * rate[:, :, None], depth
 
     def edge_error(self, edge: Array, rounding: Array) -> Array:
-        """Return the effect of uncertain places of shadow edges and kinks: integrand times uncertainty."""
+        """Return the effect of uncertain places of shadow edges and kinks:
+        integrand times uncertainty.
+        """
         pieces, every = self.pieces, np.arange(len(self.width))
         ends = np.stack([self.start, self.start + self.width], axis=1)
         f = self.at(every, ends)[0][..., self.integrand.same] * self.integrand.factor[:, None]

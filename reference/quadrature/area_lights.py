@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of area lights and the surfaces that they light: sums over samples, each with exact lit intervals.
+r"""The airlight of area lights and the surfaces that they light: sums over samples, each
+with exact lit intervals.
 
 With the points y on the surface of a light of radiance Le the radiance along a camera ray is
 
     L = albedo sigma_t Le / (4 pi)  int_A int  V p exp(-sigma_t (x + r)) cos_l / r^2  dx dA,
     cos_l = n . (o + x w - y) / r.
 
-The inner integral is that of a point light with a cosine for its profile, cut where the ray passes the plane of y and
-n. It is continuous in y where the visibility from a surface is not, so that few samples suffice. Surfaces at the end of
-a ray receive, from their own samples,
+The inner integral is that of a point light with a cosine for its profile, cut where the ray passes
+the plane of y and n. It is continuous in y where the visibility from a surface is not, so that few
+samples suffice. Surfaces at the end of a ray receive, from their own samples,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
-f cos_s by Mitsuba's `BSDF.eval`. V is exact along sections, and samples are drawn where V is 1. A few fixed sections
-first find the points that see only a part of a light that is no mesh: these get sections in pairs.
-`reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
-gets: eight independent scramblings each give a mean, and their spread the standard error.
+f cos_s by Mitsuba's `BSDF.eval`. V is exact along sections, and samples are drawn where V is 1. A
+few fixed sections first find the points that see only a part of a light that is no mesh: these get
+sections in pairs. `reference.quadrature.light_samples` draws both kinds of samples,
+`reference.quadrature.replicates` says how many a ray gets: eight independent scramblings each give
+a mean, and their spread the standard error.
 """
 
 import itertools
@@ -55,14 +57,22 @@ from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.shapes import distance_to
 from airlight.reference.visibility.candidates import Ball
 from airlight.reference.visibility.certificate import LitIntervals, RandomChecks
-from airlight.reference.visibility.lit_intervals import IN_PLANE, Obstacles, before_light, lit_intervals, obstacles
+from airlight.reference.visibility.lit_intervals import (
+    IN_PLANE,
+    Obstacles,
+    before_light,
+    lit_intervals,
+    obstacles,
+)
 from airlight.reference.visibility.planes import Rays, before, rays_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Fraction = Callable[[float], None]
 
-_RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too large: far below the error of a mean
+# of the integral of one sample, whose estimate is many digits too large: far
+# below the error of a mean
+_RTOL = 1e-6
 _PAIRS = 1 << 16  # rays and samples at once
 _RAYS = 1 << 12  # rays of a part of the work that is kept
 _EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
@@ -77,7 +87,9 @@ class AreaAirlight:
     """The airlight of all area lights, by replicate."""
 
     replicates: Array  #: (rays, 3, replicates) [W/(m^2 sr)]
-    bound: Array  #: of the error of the lit intervals and their integrals, not of the samples, (rays, 3) [W/(m^2 sr)]
+    #: of the error of the lit intervals and their integrals, not of the
+    #: samples, (rays, 3) [W/(m^2 sr)]
+    bound: Array
     random_checks: RandomChecks
 
 
@@ -92,7 +104,9 @@ class Beam:
 
 
 def beams_of(reference: ReferenceScene, distance: Array) -> list[Beam]:
-    """Return the area lights of a scene, and what can stand between them and its rays up to distances [m]."""
+    """Return the area lights of a scene, and what can stand between them and its
+    rays up to distances [m].
+    """
     beams = []
     for light in reference.area:
         scene, shapes = before_light(reference, light)
@@ -113,10 +127,11 @@ def area_airlight(
 ) -> AreaAirlight:
     """Compute the airlight of all area lights along every ray.
 
-    `reference`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all other lights, to which
-    errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`: how many samples; `shadow_scale`: see
-    `reference.quadrature.image.quadrature_image`; `tell`: called with the fraction of the work that is done; `keep`:
-    called with the name of each part of the work and a function that does it; may return what it did before.
+    `reference`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all
+    other lights, to which errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`: how many
+    samples; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `tell`: called with
+    the fraction of the work that is done; `keep`: called with the name of each part of the work and
+    a function that does it; may return what it did before.
     """
     count = len(reference.direction)
     bound, checks = np.zeros((count, 3)), list[RandomChecks]()
@@ -144,7 +159,9 @@ def _by_replicate(
     keep: Keep,
     add: Callable[[Index, Kept], None] = lambda active, got: None,
 ) -> Sums:
-    """Return the sums of a layer for `replicate_means`: work(number of the light, rays, points of all replicates)."""
+    """Return the sums of a layer for `replicate_means`: work(number of the light, rays,
+    points of all replicates).
+    """
     rounds, done = 2 * plan.rounds * lights, 0.0
 
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
@@ -155,7 +172,11 @@ def _by_replicate(
             points = partial(RayPoints.of, chosen, number, len(active[rows]), part=first)
             one = partial(work, number, active[rows], points)
             got = keep(f"{layer}-{part}{number}-{chosen.most}-{first}", one)
-            total[rows] += _controlled(got["radiance"], got["fraction"]) if "fraction" in got else got["radiance"]
+            total[rows] += (
+                _controlled(got["radiance"], got["fraction"])
+                if "fraction" in got
+                else got["radiance"]
+            )
             if part != PILOT:
                 add(active[rows], got)
             done += len(active[rows]) / len(active)
@@ -166,28 +187,40 @@ def _by_replicate(
 
 
 def _controlled(found: Array, fractions: Array) -> Array:
-    """Correct sums of replicates, (rays, 3, replicates), by the known solid angle as a control variate.
+    """Correct sums of replicates, (rays, 3, replicates), by the known solid
+    angle as a control variate.
 
-    A replicate whose sections have the fraction s of the light's solid angle, of mean 1, gets (1 - s) c more. c is the
-    sum for the whole solid angle by the other replicates, which are independent of s: the mean does not change.
+    A replicate whose sections have the fraction s of the light's solid angle, of mean 1, gets (1 -
+    s) c more. c is the sum for the whole solid angle by the other replicates, which are independent
+    of s: the mean does not change.
     """
     others = fractions.sum(axis=1, keepdims=True) - fractions
-    worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[:, None]
+    worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[
+        :, None
+    ]
     return found + (1 - fractions)[:, None] * worth
 
 
 def turn_of_sections(plan: PointPlan, number: int) -> float:
-    """Return by what angle the sections of a light are turned, about half a right angle: edges often follow lights.
+    """Return by what angle the sections of a light are turned, about half a right angle:
+    edges often follow lights.
 
-    All replicates have one: were the variance of each another, Student's intervals would hold too often.
+    All replicates have one: were the variance of each another, Student's
+    intervals would hold too often.
     """
     return 0.25 * np.pi * (0.5 + np.random.default_rng((plan.seed, number)).random())
 
 
 def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float) -> Kept:
-    """Return sums over samples: radiances, (rays, 3, replicates), bounds of their errors, and counts of the checks."""
+    """Return sums over samples: radiances, (rays, 3, replicates), bounds of their errors,
+    and counts of the checks.
+    """
     reference, light, count, each = beam.scene, beam.light, len(active), len(points)
-    radiance, bound, checks = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3)), [RandomChecks()]
+    radiance, bound, checks = (
+        np.zeros((count, 3, REPLICATES)),
+        np.zeros((count, 3)),
+        [RandomChecks()],
+    )
     step = max(1, _PAIRS // each)
 
     def lit_pairs() -> Iterator[tuple[slice, Rays, Array, Array, LitIntervals]]:
@@ -201,17 +234,22 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
             ends = np.maximum(low, 0.0), np.minimum(high, np.repeat(distance, each))
             ends = ends[0], np.maximum(*ends)
             of = np.repeat(active[rows], each)
-            lit = lit_intervals(rays, ends, beam.known(), of=of, checks=1, every=_EVERY, normal=normal)
+            lit = lit_intervals(
+                rays, ends, beam.known(), of=of, checks=1, every=_EVERY, normal=normal
+            )
             yield rows, rays, normal, weight, lit
 
-    def summed(work: tuple[slice, Rays, Array, Array, LitIntervals]) -> tuple[slice, RandomChecks, Array, Array]:
+    def summed(
+        work: tuple[slice, Rays, Array, Array, LitIntervals],
+    ) -> tuple[slice, RandomChecks, Array, Array]:
         rows, rays, normal, weight, lit = work
         terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=_RTOL)
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
         parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
         value, error = (
-            (part * weight[:, None]).reshape(-1, REPLICATES, each // REPLICATES, 3).sum(axis=2) * light.radiance
+            (part * weight[:, None]).reshape(-1, REPLICATES, each // REPLICATES, 3).sum(axis=2)
+            * light.radiance
             for part in parts
         )
         return rows, lit.random_checks, np.moveaxis(value, 1, 2), error.sum(axis=1)
@@ -220,8 +258,8 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         radiance[rows], bound[rows] = value, error
         checks.append(found)
 
-    # NumPy, which sums, works on one processor and releases Python's lock meanwhile. Dr.Jit, which finds the intervals,
-    # has threads of its own.
+    # NumPy, which sums, works on one processor and releases Python's lock meanwhile. Dr.Jit, which
+    # finds the intervals, has threads of its own.
     with ThreadPoolExecutor(dr.thread_count()) as pool:
         waiting: deque[Future] = deque()
         for pairs in lit_pairs():
@@ -246,11 +284,12 @@ def area_surface(
     tell: Fraction = lambda fraction: None,
     keep: Keep = lambda name, work: work(),
 ) -> Array:
-    """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
+    """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3,
+    replicates) [W/(m^2 sr)].
 
-    `reference`, `hits`, `beams`: the scene, what its rays hit, and its lights from `beams_of`; `known`: the radiance
-    that all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`, `shadow_scale`,
-    `tell`, `keep`: as in `area_airlight`.
+    `reference`, `hits`, `beams`: the scene, what its rays hit, and its lights from `beams_of`;
+    `known`: the radiance that all other lights give, to which errors are relative too, (rays, 3)
+    [W/(m^2 sr)]; `plan`, `shadow_scale`, `tell`, `keep`: as in `area_airlight`.
     """
     result = np.zeros((len(hits.distance), 3, REPLICATES))
     rows = np.flatnonzero(np.isfinite(hits.distance))
@@ -258,20 +297,29 @@ def area_surface(
         return result
     reflection = Reflection(hits.interaction)
     depth = optical_depth(
-        reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), hits.distance[rows]
+        reference,
+        reference.origin,
+        reference.direction[rows],
+        np.zeros(len(rows)),
+        hits.distance[rows],
     )
 
     turns = [turn_of_sections(plan, number) for number in range(len(beams))]
     hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
     def work(number: int, active: Index, points: Callable[[str], RayPoints]) -> Kept:
-        radiance, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
+        radiance, fraction = (
+            np.zeros((len(active), 3, REPLICATES)),
+            np.ones((len(active), REPLICATES)),
+        )
         beam = beams[number]
         for pairs, kind in ((False, beam.light.kind), (True, "pairs")):
             chosen = np.flatnonzero(hidden[number][active] == pairs)
             if len(chosen):
                 pixels, view = rows[active[chosen]], _View(beam, points(kind), turns[number], pairs)
-                radiance[chosen], fraction[chosen] = _reflected(view, pixels, shadow_scale, reflection)
+                radiance[chosen], fraction[chosen] = _reflected(
+                    view, pixels, shadow_scale, reflection
+                )
         return {"radiance": radiance * np.exp(-depth[active])[..., None], "fraction": fraction}
 
     sums = _by_replicate("surface", len(beams), plan, work, tell=tell, keep=keep)
@@ -288,9 +336,12 @@ class _View:
     turn: float  # [rad]
     even: bool  # see `sections_for_points`
 
-    def seen(self, active: Index) -> Iterator[tuple[Index, Array, tuple[Index, Array, Array], Array]]:
-        """Yield which of the surface points of some rays see the light, these points, what `seen_samples` says of their
-        sections in the order of points and of the square, and the mean of the weights of all sections of a point.
+    def seen(
+        self, active: Index
+    ) -> Iterator[tuple[Index, Array, tuple[Index, Array, Array], Array]]:
+        """Yield which of the surface points of some rays see the light, these points, what
+        `seen_samples` says of their sections in the order of points and of the square, and the mean
+        of the weights of all sections of a point.
         """
         reference, light, each = self.beam.scene, self.beam.light, len(self.points)
         end = self.beam.distance[active]
@@ -312,20 +363,29 @@ class _View:
             rows = seeing[first : first + step]
             square = self.points[rows]
             sections = sections_for_points(light, point[rows], square, self.turn, self.even)
-            # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
-            eye = reference.origin + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
+            # Looked at from a little before the surface, where the camera sees it: what
+            # hides there is not its own.
+            eye = (
+                reference.origin
+                + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
+            )
             eye = np.repeat(eye, each, axis=0)
-            seen = seen_samples(sections, eye, around, np.repeat(active[rows], each), square[..., 1].ravel())
+            seen = seen_samples(
+                sections, eye, around, np.repeat(active[rows], each), square[..., 1].ravel()
+            )
             yield rows, point[rows], seen, sections.weight.reshape(-1, each)
 
 
 def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
     """Return from which surface points a light is not seen as a whole, as a few sections say.
 
-    None of a mesh, and of a sphere into which a shape reaches: these have no sections but short ones.
+    None of a mesh, and of a sphere into which a shape reaches: these have no
+    sections but short ones.
     """
     hidden, light = np.zeros(len(active), bool), beam.light
-    whole_sphere = light.kind == "sphere" and distance_to(beam.known().shapes, light.centre) >= light.radius
+    whole_sphere = (
+        light.kind == "sphere" and distance_to(beam.known().shapes, light.centre) >= light.radius
+    )
     if light.kind in ("rectangle", "disk") or whole_sphere:
         square = np.stack([(np.arange(_PROBES) + 0.5) / _PROBES, np.full(_PROBES, 0.5)], axis=1)
         points = RayPoints(square, np.zeros((len(active), REPLICATES, 2)), "")
@@ -335,11 +395,14 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
     return hidden
 
 
-def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Reflection) -> tuple[Array, Array]:
-    """Return sums over samples of what surface points reflect, before what is between them and the camera.
+def _reflected(
+    view: _View, active: Index, shadow_scale: float, reflection: Reflection
+) -> tuple[Array, Array]:
+    """Return sums over samples of what surface points reflect, before what is
+    between them and the camera.
 
-    They are by replicate, (rays, 3, replicates). The second array says which fraction of the light's solid angle the
-    sections of a point have, (rays, replicates) [1].
+    They are by replicate, (rays, 3, replicates). The second array says which fraction of the
+    light's solid angle the sections of a point have, (rays, replicates) [1].
     """
     light, reference, each = view.beam.light, view.beam.scene, len(view.points)
     total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
@@ -366,14 +429,17 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
 def seen_samples(
     sections: Sections, eye: Array, known: Obstacles, of: Index, uniform: Array
 ) -> tuple[Index, Array, Array]:
-    """Return which sections are seen, a sample of what is seen of each, and its solid angle; see `Sections.drawn`.
+    """Return which sections are seen, a sample of what is seen of each, and its solid
+    angle; see `Sections.drawn`.
 
-    `sections`: the sections; `eye`: where each is looked at from, in front of the surface point, (n, 3) [m]; `known`,
-    `of`: what can stand between, and the number of the ray to the surface point in it, (n,); `uniform`: numbers from 0
-    to 1, (n,).
+    `sections`: the sections; `eye`: where each is looked at from, in front of the surface point,
+    (n, 3) [m]; `known`, `of`: what can stand between, and the number of the ray to the surface
+    point in it, (n,); `uniform`: numbers from 0 to 1, (n,).
     """
     length = np.linalg.norm(sections.way, axis=1)
-    rays = rays_at(sections.start, sections.way / np.maximum(length, np.finfo(float).tiny)[:, None], eye)
+    rays = rays_at(
+        sections.start, sections.way / np.maximum(length, np.finfo(float).tiny)[:, None], eye
+    )
     lit = lit_intervals(rays, (0 * length, length), known, of=of, checks=0)
     of_length = length[lit.ray]
     return sections.drawn(replace(lit, low=lit.low / of_length, high=lit.high / of_length), uniform)

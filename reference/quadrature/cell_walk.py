@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Optical depths through a grid by a walk from cell to cell, in kernels of float64.
 
-A cell lies between eight centres of voxels. With the place in it (u, v, w), each linear in the distance x, the
-extinction
+A cell lies between eight centres of voxels. With the place in it (u, v, w), each linear in the
+distance x, the extinction
 
     sum over corners c of  sigma_c  u_c v_c w_c,      u_c = u or 1 - u, ...
 
@@ -10,7 +10,8 @@ is a cubic in x, and Gauss's two nodes integrate it exactly:
 
     int_a^b sigma_t dx = (b - a)/2 (sigma_t(m - d) + sigma_t(m + d)),      m = (a + b)/2, d = (b - a)/(2 sqrt 3).
 
-The walk keeps the number of the next plane of each axis and goes to the nearest, so that rounding cannot hold it up.
+The walk keeps the number of the next plane of each axis and goes to the nearest, so that
+rounding cannot hold it up.
 """
 
 from collections.abc import Callable
@@ -29,7 +30,9 @@ _GAUSS = 12.0**-0.5  # half of the distance of the two nodes over the width
 
 @dataclass(frozen=True)
 class CellWalk:
-    """A grid on the device. Places are in voxels; distances are what directions, in voxels, are multiplied by."""
+    """A grid on the device. Places are in voxels; distances are what directions, in
+    voxels, are multiplied by.
+    """
 
     table: Any  #: by voxel, extinction there, at its neighbour in x, in y, and in both [1/m]
     counts: tuple[int, int, int]  #: voxels along x, y, z
@@ -61,22 +64,34 @@ class CellWalk:
         def walk(x, px, py, pz, total):
             planes = px, py, pz
             ends = [
-                dr.select(direction[axis] == 0, dr.inf, (planes[axis] - origin[axis]) * inverse[axis])
+                dr.select(
+                    direction[axis] == 0, dr.inf, (planes[axis] - origin[axis]) * inverse[axis]
+                )
                 for axis in range(3)
             ]
             end = dr.minimum(dr.minimum(ends[0], ends[1]), dr.minimum(ends[2], x1))
-            moved = [dr.select(ends[axis] <= end, planes[axis] + signs[axis], planes[axis]) for axis in range(3)]
+            moved = [
+                dr.select(ends[axis] <= end, planes[axis] + signs[axis], planes[axis])
+                for axis in range(3)
+            ]
             end = dr.maximum(x, end)
             return end, *moved, total + self.within(origin, direction, x, end)
 
         zero = dr.zeros(mi.Float64, dr.width(direction, x0, x1))
-        *_, total = dr.while_loop((zero + x0, *planes, zero), lambda x, *_: x < x1, walk, label="cells")
+        *_, total = dr.while_loop(
+            (zero + x0, *planes, zero), lambda x, *_: x < x1, walk, label="cells"
+        )
         return total
 
     def _in_cell(self, place) -> Callable[[Any], Any]:
-        """Return the extinction as a function of places in voxels, trilinear as it is around one of them."""
+        """Return the extinction as a function of places in voxels, trilinear as
+        it is around one of them.
+        """
         nx, ny, nz = self.counts
-        cell = [dr.clip(dr.floor(at), 0, max(count - 2, 0)) for at, count in zip(place, self.counts, strict=True)]
+        cell = [
+            dr.clip(dr.floor(at), 0, max(count - 2, 0))
+            for at, count in zip(place, self.counts, strict=True)
+        ]
         i, j, k = (mi.Int32(each) for each in cell)
         voxel = mi.UInt32((k * ny + j) * nx + i)
         near = dr.gather(mi.Vector4d, self.table, voxel)
@@ -94,7 +109,9 @@ def cell_walk(medium: GridMedium) -> CellWalk:
     """Put a grid on the device."""
     values = medium.values
     beside = np.concatenate([values[:, :, 1:], values[:, :, -1:]], axis=2)
-    behind, both = (np.concatenate([each[:, 1:], each[:, -1:]], axis=1) for each in (values, beside))
+    behind, both = (
+        np.concatenate([each[:, 1:], each[:, -1:]], axis=1) for each in (values, beside)
+    )
     table = np.stack([values, beside, behind, both], axis=-1)
     nz, ny, nx = values.shape
     return CellWalk(on_device(mi.Float64, table.ravel()), (nx, ny, nz))

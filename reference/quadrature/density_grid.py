@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of lit stretches in a density grid: exact optical depths by cells, nodes between the faces of cells.
+"""The airlight of lit stretches in a density grid: exact optical depths by cells, nodes
+between the faces of cells.
 
-Along a camera ray the extinction has kinks at the faces of cells, so stretches are cut there. The depth of the path to
-the light is smooth in the distance, except where that path sweeps over an edge of the grid: its second derivative jumps
-there. A pixel therefore has an estimate of its error, the difference of the two rules, and no bound.
+Along a camera ray the extinction has kinks at the faces of cells, so stretches are cut there. The
+depth of the path to the light is smooth in the distance, except where that path sweeps over an edge
+of the grid: its second derivative jumps there. A pixel therefore has an estimate of its error, the
+difference of the two rules, and no bound.
 """
 
 from dataclasses import dataclass, field, replace
@@ -43,7 +45,9 @@ class GridField:
 
     @property
     def bound_kind(self) -> BoundKind:
-        """The kind of the errors: second derivatives jump within pieces, where two rules may both be wrong."""
+        """The kind of the errors: second derivatives jump within pieces, where two
+        rules may both be wrong.
+        """
         return "estimated"
 
     @property
@@ -59,18 +63,29 @@ class GridField:
         rows = np.flatnonzero(ends[1] > ends[0])
         depth = np.zeros(len(direction))
         if len(rows):
-            start, way = self.medium.voxels(origin[rows]), direction[rows] * self.medium.voxels_per_metre
+            start, way = (
+                self.medium.voxels(origin[rows]),
+                direction[rows] * self.medium.voxels_per_metre,
+            )
             x0, x1 = (on_device(mi.Float64, end[rows]) for end in ends)
-            depth[rows] = np.array(self.walk.depth(vectors(mi.Vector3d, start), vectors(mi.Vector3d, way), x0, x1))
+            depth[rows] = np.array(
+                self.walk.depth(vectors(mi.Vector3d, start), vectors(mi.Vector3d, way), x0, x1)
+            )
         return np.repeat(depth[:, None], 3, axis=1)
 
     def leave(self, origin: Array, direction: Array) -> Array:
         """Return the distance at which rays leave the box, (n,) [m]: 0 where they miss it."""
         return self.medium.crossed(np.broadcast_to(origin, direction.shape), direction)[1]
 
-    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray from its lit stretches, and an estimate of its error, (rays, 3) each."""
-        near, far = self.medium.crossed(np.broadcast_to(rays.origin, rays.direction.shape), rays.direction)
+    def sums(
+        self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and an estimate of
+        its error, (rays, 3) each.
+        """
+        near, far = self.medium.crossed(
+            np.broadcast_to(rays.origin, rays.direction.shape), rays.direction
+        )
         ray, low, high = stretches
         low, high = np.maximum(low, near[ray]), np.minimum(high, far[ray])
         terms = replace(terms, rtol=terms.rtol or RTOL)
@@ -79,7 +94,10 @@ class GridField:
             block = slice(first, min(first + _RAYS, len(rays.foot)))
             chosen = (ray >= block.start) & (ray < block.stop) & (high > low)
             if chosen.any():
-                pieces = cut(whole((ray[chosen], low[chosen], high[chosen])), self._faces(rays, ray[chosen], near, far))
+                pieces = cut(
+                    whole((ray[chosen], low[chosen], high[chosen])),
+                    self._faces(rays, ray[chosen], near, far),
+                )
                 value[block], error[block] = sum_pieces(
                     rays, pieces, self._integrand(rays, pieces, terms), block, terms
                 )
@@ -94,7 +112,9 @@ class GridField:
             rate = rays.direction[ray, axis] * self.medium.voxels_per_metre[axis]
             ends = np.sort(origin[:, axis] + np.stack([near[ray], far[ray]]) * rate, axis=0)
             first = np.clip(np.ceil(ends[0]), 0, count).astype(np.int64)
-            many = np.maximum(np.clip(np.floor(ends[1]), -1, count - 1).astype(np.int64) - first + 1, 0)
+            many = np.maximum(
+                np.clip(np.floor(ends[1]), -1, count - 1).astype(np.int64) - first + 1, 0
+            )
             many[rate == 0] = 0
             own = np.repeat(np.arange(len(ray)), many)
             plane = first[own] + np.arange(len(own)) - np.repeat(np.cumsum(many) - many, many)
@@ -104,8 +124,13 @@ class GridField:
 
     def _integrand(self, rays: Rays, pieces: Pieces, terms: Terms) -> "_Integrand":
         count = len(pieces.ray)
-        before = self.optical_depth(rays.origin, rays.direction[pieces.ray], np.zeros(count), pieces.x0)[:, 0]
-        factor, extinction = np.ones((count, 3)) * self.medium.albedo, np.full(count, self.medium.largest[0])
+        before = self.optical_depth(
+            rays.origin, rays.direction[pieces.ray], np.zeros(count), pieces.x0
+        )[:, 0]
+        factor, extinction = (
+            np.ones((count, 3)) * self.medium.albedo,
+            np.full(count, self.medium.largest[0]),
+        )
         return _Integrand(self, rays, pieces, terms.shadow_scale, before, factor, extinction)
 
 
@@ -122,7 +147,9 @@ class _Integrand:
     extinction: Array
     same: Index = field(default_factory=lambda: np.zeros(3, np.int64))
 
-    def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
+    def __call__(
+        self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
+    ) -> tuple[Array, Array]:
         rays, medium, walk, ray = self.rays, self.grid.medium, self.grid.walk, self.pieces.ray[rows]
         row = dr.arange(mi.UInt32, x.size) // dr.opaque(mi.UInt32, x.shape[1])
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Area lights, and the background, as the camera sees them: their own radiance through the medium, a layer."""
+"""Area lights, and the background, as the camera sees them: their own radiance
+through the medium, a layer.
+"""
 
 from collections.abc import Iterator
 
@@ -22,25 +24,42 @@ _FAR = 1e30  # beyond all bounds of media [m]
 
 
 def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
-    """Return the radiance of area lights before the visible surface, and of the background where there is none.
+    """Return the radiance of area lights before the visible surface, and of the
+    background where there is none.
 
     In W/(m^2 sr), (rays, 3).
 
-    `reference`: the scene; `distance`: to the visible surface, (rays,), infinite where there is none [m].
+    `reference`: the scene; `distance`: to the visible surface, (rays,), infinite
+    where there is none [m].
 
-    Valid for the side that emits; a light of material `null` is seen with what is behind it, a black one ends the ray.
+    Valid for the side that emits; a light of material `null` is seen with what is behind it,
+    a black one ends the ray.
     """
     total = np.zeros((len(distance), 3))
     for light in reference.area:
-        places = _mesh_distances(light, reference) if light.kind == "mesh" else [_distance(light, reference)]
+        places = (
+            _mesh_distances(light, reference)
+            if light.kind == "mesh"
+            else [_distance(light, reference)]
+        )
         for at in places:
             rows = np.flatnonzero(at <= distance * (1 + _OWN))
-            depth = optical_depth(reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), at[rows])
+            depth = optical_depth(
+                reference,
+                reference.origin,
+                reference.direction[rows],
+                np.zeros(len(rows)),
+                at[rows],
+            )
             total[rows] += light.radiance * np.exp(-depth)
     if reference.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
         depth = optical_depth(
-            reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR)
+            reference,
+            reference.origin,
+            reference.direction[rows],
+            np.zeros(len(rows)),
+            np.full(len(rows), _FAR),
         )
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
         interaction.wi = vectors(mi.Vector3f, -reference.direction[rows])
@@ -49,12 +68,16 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
 
 
 def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
-    """Yield where rays meet a mesh from the side that emits, crossing after crossing, (rays,) [m]; else NaN."""
+    """Yield where rays meet a mesh from the side that emits, crossing after
+    crossing, (rays,) [m]; else NaN.
+    """
     mesh = scene_from([light.shape])
     start, walking = np.zeros(len(reference.direction)), np.ones(len(reference.direction), bool)
     while walking.any():
         place = reference.origin + start[:, None] * reference.direction
-        hit = mesh.ray_intersect(mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, reference.direction)))
+        hit = mesh.ray_intersect(
+            mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, reference.direction))
+        )
         at = start + np.array(hit.t, dtype=np.float64)
         walking &= np.isfinite(at)
         yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
@@ -76,5 +99,7 @@ def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
         at = (away @ light.normal) / rate
         x, y = ((at[:, None] * direction - away) @ light.frame[:2].T).T
     a, b = light.half
-    inside = (np.abs(x) <= a) & (np.abs(y) <= b) if light.kind == "rectangle" else x * x + y * y <= a * a
+    inside = (
+        (np.abs(x) <= a) & (np.abs(y) <= b) if light.kind == "rectangle" else x * x + y * y <= a * a
+    )
     return np.where((rate < 0) & (at > 0) & inside, at, np.nan)

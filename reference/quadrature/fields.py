@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Media in the quadrature: the one interface, `Field`.
 
-All other code uses a field: the sums over lit intervals, surfaces, lights that the camera sees, and bounds. A new
-medium is a class with the four members of `Field` in its own file, and a line in `field_of`. Where its integrals have
-no closed form, `sums` cuts the stretches into smooth pieces (`whole` and `cut` of `reference.quadrature.pieces`),
-states its integrand, and gives both to `sum_pieces` of `reference.quadrature.adaptive_panels`, which treats lights,
-tolerances and edges. `reference.quadrature.density_grid` does so.
+All other code uses a field: the sums over lit intervals, surfaces, lights that the camera sees, and
+bounds. A new medium is a class with the four members of `Field` in its own file, and a line in
+`field_of`. Where its integrals have no closed form, `sums` cuts the stretches into smooth pieces
+(`whole` and `cut` of `reference.quadrature.pieces`), states its integrand, and gives both to
+`sum_pieces` of `reference.quadrature.adaptive_panels`, which treats lights, tolerances and edges.
+`reference.quadrature.density_grid` does so.
 """
 
 from typing import Protocol
@@ -38,19 +39,25 @@ class Field(Protocol):
     def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
         """Return the optical depth of parts of straight lines, (n, 3) [1], 0 where high <= low.
 
-        `origin` is (n, 3), or (3,) for all; `direction` has unit vectors, (n, 3); distances are (n,) [m], and may be
-        as large as floats are.
+        `origin` is (n, 3), or (3,) for all; `direction` has unit vectors, (n, 3); distances are
+        (n,) [m], and may be as large as floats are.
         """
 
     def leave(self, origin: Array, direction: Array) -> Array:
-        """Return the distance behind which rays meet nothing that scatters, (n,) [m]; may be infinite."""
+        """Return the distance behind which rays meet nothing that scatters,
+        (n,) [m]; may be infinite.
+        """
 
-    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray from its lit stretches, and its error by `bound_kind`, (rays, 3) each.
+    def sums(
+        self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and its error by
+        `bound_kind`, (rays, 3) each.
 
-        `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr];
-        `stretches`: rays, and distances of both ends; the second may be infinite [m]; `distance`: of each ray to the
-        visible surface [m]; `terms`: how the lights shine, and what is uncertain.
+        `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else
+        directions [1/sr]; `stretches`: rays, and distances of both ends; the second may be infinite
+        [m]; `distance`: of each ray to the visible surface [m]; `terms`: how the lights shine, and
+        what is uncertain.
         """
 
 
@@ -63,6 +70,8 @@ def field_of(reference: ReferenceScene) -> Field:
     return HomogeneousField(reference)
 
 
-def optical_depth(reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def optical_depth(
+    reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array
+) -> Array:
     """Return the optical depth of parts of straight lines in a scene; see `Field.optical_depth`."""
     return field_of(reference).optical_depth(origin, direction, low, high)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of lit stretches in height fog, with a bound of its error: `analytic.height_fog` in the rays' planes."""
+"""The airlight of lit stretches in height fog, with a bound of its error:
+`analytic.height_fog` in the rays' planes.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,8 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest, sums_of
+from airlight.analytic.height_fog import (
+    HeightFog,
+    HeightRays,
+    Layer,
+    height_fog_segments,
+    height_fog_sun,
+)
+from airlight.reference.quadrature.stretches import (
+    TERMS,
+    BoundKind,
+    Stretches,
+    Terms,
+    strongest,
+    sums_of,
+)
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.planes import Rays
 
@@ -32,7 +47,9 @@ class HeightField:
 
     @property
     def bound_kind(self) -> BoundKind:
-        """The kind of the errors: the integrand is analytic on a piece, and the worse rule bounds the better one."""
+        """The kind of the errors: the integrand is analytic on a piece, and the worse
+        rule bounds the better one.
+        """
         return "proven"
 
     @property
@@ -44,29 +61,43 @@ class HeightField:
         """Return the optical depth of parts of straight lines, (n, 3) [1]."""
         start, rise = np.asarray(origin) @ self.medium.up, direction @ self.medium.up
         length = np.maximum(high - low, 0.0)
-        depth = fog_of(self.medium).optical_depth(start + low * rise, start + low * rise + length * rise, length)
+        depth = fog_of(self.medium).optical_depth(
+            start + low * rise, start + low * rise + length * rise, length
+        )
         return np.repeat(depth[:, None], 3, axis=1)
 
     def leave(self, origin: Array, direction: Array) -> Array:
-        """Return the distance at which rays leave the fog for good, (n,) [m]: infinite on a level in it."""
+        """Return the distance at which rays leave the fog for good, (n,) [m]:
+        infinite on a level in it.
+        """
         start, rise = origin @ self.medium.up, direction @ self.medium.up
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack([(z - start) / rise for z in (self.medium.floor, self.medium.cap)])
         level = np.where((start >= self.medium.floor) & (start <= self.medium.cap), np.inf, 0.0)
         return np.where(rise == 0, level, np.maximum(ends.max(axis=0), 0.0))
 
-    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
+    def sums(
+        self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and a bound of
+        its error, (rays, 3) each.
+        """
         if rays.w:
             value, error = _of_places(self.medium, rays, stretches, terms)
         else:
-            value, error = _of_suns(self.medium, rays, stretches, np.broadcast_to(terms.edge, len(rays.foot)))
+            value, error = _of_suns(
+                self.medium, rays, stretches, np.broadcast_to(terms.edge, len(rays.foot))
+            )
         factor, ray = self.medium.albedo / (4 * np.pi), stretches[0]
-        value, error = (sums_of(ray, part[:, None] * factor, len(rays.foot)) for part in (value, error))
+        value, error = (
+            sums_of(ray, part[:, None] * factor, len(rays.foot)) for part in (value, error)
+        )
         return value, error
 
 
-def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Terms) -> tuple[Array, Array]:
+def _of_places(
+    medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Terms
+) -> tuple[Array, Array]:
     """Return sigma_t J of lit stretches and its error, (stretches,) [1/m^2]."""
     ray, x0, x1 = stretches
     fog = fog_of(medium)
@@ -82,8 +113,11 @@ def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Te
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
     how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or RTOL}
     ends = x0, np.maximum(x0, x1)
-    value, error = height_fog_segments(fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how)
-    for x in (x0, x1):  # a relative uncertainty of the distance from the light adds r times the integrand
+    value, error = height_fog_segments(
+        fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how
+    )
+    # a relative uncertainty of the distance from the light adds r times the integrand
+    for x in (x0, x1):
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
         r = np.maximum(np.hypot(rays.height[ray], s), np.finfo(np.float64).tiny)
         z = heights.origin + heights.rise * (heights.foot + s)
@@ -95,12 +129,20 @@ def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Te
     return value, error
 
 
-def _of_suns(medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array) -> tuple[Array, Array]:
-    """Return the light of lit stretches under suns of irradiance 1, in closed form, and its error, (stretches,) [1]."""
+def _of_suns(
+    medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array
+) -> tuple[Array, Array]:
+    """Return the light of lit stretches under suns of irradiance 1, in closed form, and its
+    error, (stretches,) [1].
+    """
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     origin, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up
-    mu = float(np.broadcast_to(rays.position, rays.direction.shape)[0] @ medium.up) if len(rays.direction) else 1.0
+    mu = (
+        float(np.broadcast_to(rays.position, rays.direction.shape)[0] @ medium.up)
+        if len(rays.direction)
+        else 1.0
+    )
     phase = medium.phase(rays.foot[ray])
     value = height_fog_sun(fog, origin, rise, x0, x1, sun=mu, phase=phase)
     error = np.zeros_like(value)
@@ -112,5 +154,7 @@ def _of_suns(medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array
             f = np.exp(fog.log_density(z) - depth) * phase
         error += edge[ray] * np.where(np.isfinite(x), f, 0.0)
         # The exponent carries the rounding of its own size and of heights in scale heights.
-        error += _ROUNDING * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
+        error += (
+            _ROUNDING * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
+        )
     return value, error

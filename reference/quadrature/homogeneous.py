@@ -1,27 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of lit stretches in homogeneous media, bounded or not, added up for every ray, with an error bound.
+r"""The airlight of lit stretches in homogeneous media, bounded or not, added up for every
+ray, with an error bound.
 
-The single scattering of a piece of a ray inside one medium m is, for a light at a place (w = 1) or in a direction
-(w = 0, `reference.visibility.planes`),
+The single scattering of a piece of a ray inside one medium m is, for a light at a place (w = 1) or
+in a direction (w = 0, `reference.visibility.planes`),
 
     L = albedo_m sigma_m I / (4 pi)  int exp(-tau_camera - tau_shadow) p_m(cos) dx / (r^2 or 1),
     tau_camera = tau_0 + sigma_m (x - x_0),
     tau_shadow = sigma_0 s r + sum_j (sigma_j - sigma_0) |[enter_j, leave_j] and [0, s r]|,
 
-I its intensity or irradiance, r the distance to it, enter_j and leave_j the distances from the point x at which the
-shadow segment enters and leaves body j; s is `shadow_scale`. Under a directional light sigma_0 = 0 and r is unbounded.
-Near a place the integral is taken in v = asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth
-beside the light as far from it; else in x.
+I its intensity or irradiance, r the distance to it, enter_j and leave_j the distances from the
+point x at which the shadow segment enters and leaves body j; s is `shadow_scale`. Under a
+directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in v =
+asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth beside the light as far
+from it; else in x.
 
-Lit stretches are cut at the bounds of the media, where a shadow segment passes a corner of a body or touches it
-(`reference.quadrature.segments`), and at the kinks of tabulated phase functions. On such a piece the segment enters and
-leaves a polyhedron through the same two facets n . p = d, at the distance
+Lit stretches are cut at the bounds of the media, where a shadow segment passes a corner of a body
+or touches it (`reference.quadrature.segments`), and at the kinks of tabulated phase functions. On
+such a piece the segment enters and leaves a polyhedron through the same two facets n . p = d, at
+the distance
 
     r (d - n . x) / (n . P - w n . x),      P the light, x the point, r = |P - w x|.
 
-These are looked up once between two kinks of the segment, so that a node costs as much as its bodies, not their facets.
-The pieces are integrated by Gauss and Kronrod's pairs on panels that are halved until a ray meets the tolerance (see
-`analytic.panels`), once for channels whose extinction is the same in all media.
+These are looked up once between two kinks of the segment, so that a node costs as much as its
+bodies, not their facets. The pieces are integrated by Gauss and Kronrod's pairs on panels that are
+halved until a ray meets the tolerance (see `analytic.panels`), once for channels whose extinction
+is the same in all media.
 """
 
 from dataclasses import dataclass, field, replace
@@ -31,7 +35,12 @@ from numpy.typing import NDArray
 
 from airlight.reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
 from airlight.reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
-from airlight.reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
+from airlight.reference.quadrature.segments import (
+    Segments,
+    camera_segments,
+    depth_through_media,
+    shadow_kinks,
+)
 from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
 from airlight.reference.scene.convex_bounds import Bounds, Sphere
 from airlight.reference.scene.read import ReferenceScene, homogeneous_around
@@ -46,20 +55,28 @@ _RAYS = 4096  # rays at once
 
 @dataclass(frozen=True)
 class HomogeneousField:
-    """The medium around the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
+    """The medium around the camera, and media in disjoint convex bounds; a field
+    (`reference.quadrature.fields`).
+    """
 
     reference: ReferenceScene
 
     @property
     def bound_kind(self) -> BoundKind:
-        """The kind of the errors: the integrand is analytic on a piece, and the worse rule bounds the better one."""
+        """The kind of the errors: the integrand is analytic on a piece, and the worse
+        rule bounds the better one.
+        """
         return "proven"
 
     @property
     def strongest(self) -> Array:
         """The most that a metre of a ray scatters, (3,) [1/m]."""
         return np.max(
-            [strongest(medium) for medium in (homogeneous_around(self.reference), *self.reference.media)], axis=0
+            [
+                strongest(medium)
+                for medium in (homogeneous_around(self.reference), *self.reference.media)
+            ],
+            axis=0,
         )
 
     def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
@@ -74,8 +91,12 @@ class HomogeneousField:
         ends = [np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans]
         return np.max([np.zeros(len(direction)), *ends], axis=0)
 
-    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
+    def sums(
+        self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS
+    ) -> tuple[Array, Array]:
+        """Return the airlight of each ray from its lit stretches, and a bound of
+        its error, (rays, 3) each.
+        """
         segments = camera_segments(replace(self.reference, direction=rays.direction), distance)
         count = len(rays.foot)
         total, bound = np.zeros((count, 3)), np.zeros((count, 3))
@@ -84,10 +105,14 @@ class HomogeneousField:
         ray, x0, x1 = stretches
         for first in range(0, count, _RAYS):
             chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
-            pieces, kinks = smooth_pieces(self.reference, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
+            pieces, kinks = smooth_pieces(
+                self.reference, rays, segments, (ray[chosen], x0[chosen], x1[chosen])
+            )
             if len(pieces.ray):
                 block = slice(first, first + _RAYS)
-                integrand = _Integrand(self.reference, pieces, rays[pieces.ray], kinks, terms.shadow_scale)
+                integrand = _Integrand(
+                    self.reference, pieces, rays[pieces.ray], kinks, terms.shadow_scale
+                )
                 total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, terms)
         return total / (4 * np.pi), bound / (4 * np.pi)
 
@@ -95,10 +120,11 @@ class HomogeneousField:
 def smooth_pieces(
     reference: ReferenceScene, rays: Rays, segments: Segments, stretches: Stretches
 ) -> tuple[Pieces, list[Kinks]]:
-    """Cut lit stretches at the bounds of media and at the kinks of shadow segments and of phase functions.
+    """Cut lit stretches at the bounds of media and at the kinks of shadow
+    segments and of phase functions.
 
-    Returns the pieces, and rays and distances of the kinks of the shadow segments through each of the
-    bounded media.
+    Returns the pieces, and rays and distances of the kinks of the shadow segments through
+    each of the bounded media.
     """
     used = np.unique(stretches[0])
     found: list[Kinks] = []
@@ -114,7 +140,9 @@ def smooth_pieces(
 def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
     """Return rays, among those used, and distances of the kinks of phase functions."""
     every = []
-    for phase in {id(medium.phase): medium.phase for medium in (reference.medium, *reference.media)}.values():
+    for phase in {
+        id(medium.phase): medium.phase for medium in (reference.medium, *reference.media)
+    }.values():
         offset = np.outer(rays.height[used], -phase.kinks / np.sqrt(1 - phase.kinks**2))
         every.append((np.repeat(used, len(phase.kinks)), (rays.foot[used, None] + offset).ravel()))
     return every
@@ -122,7 +150,9 @@ def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list
 
 @dataclass
 class _Integrand:
-    """exp(-tau) p on the pieces of one block of rays (`reference.quadrature.adaptive_panels.Integrand`)."""
+    """exp(-tau) p on the pieces of one block of rays
+    (`reference.quadrature.adaptive_panels.Integrand`).
+    """
 
     reference: ReferenceScene
     pieces: Pieces
@@ -139,24 +169,36 @@ class _Integrand:
     def __post_init__(self):
         reference, pieces = self.reference, self.pieces
         sigma_t = by_medium(reference, "sigma_t", pieces.medium)
-        self.factor, self.extinction = sigma_t * by_medium(reference, "albedo", pieces.medium), sigma_t.max(axis=1)
+        self.factor, self.extinction = (
+            sigma_t * by_medium(reference, "albedo", pieces.medium),
+            sigma_t.max(axis=1),
+        )
         every = np.stack([medium.sigma_t for medium in (reference.medium, *reference.media)])
-        _, self.different, self.same = np.unique(every, axis=1, return_index=True, return_inverse=True)
+        _, self.different, self.same = np.unique(
+            every, axis=1, return_index=True, return_inverse=True
+        )
         self.sigma_t = sigma_t[:, self.different]
         self.bodies = [
             _Body.of(self.own, pieces, medium.bounds, kinks)
             for medium, kinks in zip(reference.media, self.kinks, strict=True)
         ]
 
-    def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
+    def __call__(
+        self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
+    ) -> tuple[Array, Array]:
         reference = self.reference
-        depth = self.pieces.depth[rows][:, None, self.different] + inside[:, :, None] * self.sigma_t[rows, None]
+        depth = (
+            self.pieces.depth[rows][:, None, self.different]
+            + inside[:, :, None] * self.sigma_t[rows, None]
+        )
         around = reference.medium.sigma_t[self.different]
         limit = self.scale * r if self.own.w else r
         if np.any(around > 0):
             depth += limit[:, :, None] * around
         for medium, body in zip(reference.media, self.bodies, strict=True):
-            depth += body.length(rows, x, r, limit)[:, :, None] * (medium.sigma_t[self.different] - around)
+            depth += body.length(rows, x, r, limit)[:, :, None] * (
+                medium.sigma_t[self.different] - around
+            )
         return np.exp(-depth) * self.phase(rows, scatter)[:, :, None], depth
 
     def phase(self, rows: Index, scatter: Array) -> Array:
@@ -179,7 +221,8 @@ class _Body:
     own: Rays  # the ray of each piece
     bounds: Bounds
     run: Index  # of a polyhedron: the number of the run of each piece
-    #: of each run and both facets, d - n . o, n . d and n . (P - w o): given numbers where the segment meets none
+    #: of each run and both facets, d - n . o, n . d and n . (P - w o): given numbers
+    #: where the segment meets none
     facets: tuple[tuple[Array, Array, Array], ...]
 
     @staticmethod
@@ -194,12 +237,16 @@ class _Body:
         r = np.linalg.norm(towards, axis=1)
         towards /= r[:, None]
         enter, leave, low, high = crossed_facets(bounds, point, towards)
-        # No corner between ray and light is on the run, so what the middle says of these cases holds for all of it. The
-        # planes of facets behind the ray or beyond the light would not: corners there were not looked for.
+        # No corner between ray and light is on the run, so what the middle says of these cases
+        # holds for all of it. The planes of facets behind the ray or beyond the light would not:
+        # corners there were not looked for.
         r = r if own.w else np.full(len(r), np.inf)
         missed = (low >= high) | (low >= r) | (high <= 0)
         facets = []
-        for facet, at_zero, unbounded in ((enter, missed | (low <= 0), False), (leave, missed, high >= r)):
+        for facet, at_zero, unbounded in (
+            (enter, missed | (low <= 0), False),
+            (leave, missed, high >= r),
+        ):
             given = at_zero | unbounded
             room = bounds.offset[facet] - bounds.normal[facet] @ own.origin
             slope = np.sum(bounds.normal[facet] * lines.direction, axis=1)
@@ -214,7 +261,9 @@ class _Body:
         return _Body(own, bounds, run, tuple(facets))
 
     def length(self, rows: Index, x: Array, r: Array, limit: Array) -> Array:
-        """Return the length inside of [0, limit] of segments from points x of pieces to the light, at r, (m, nodes)."""
+        """Return the length inside of [0, limit] of segments from points x of pieces to the
+        light, at r, (m, nodes).
+        """
         if isinstance(self.bounds, Sphere):
             enter, leave = self._sphere(rows, x, r)
         else:
@@ -222,7 +271,9 @@ class _Body:
             way = r if w else 1.0
             with np.errstate(divide="ignore", invalid="ignore"):
                 enter, leave = (
-                    way * (room[run, None] - x * slope[run, None]) / (rise[run, None] - w * x * slope[run, None])
+                    way
+                    * (room[run, None] - x * slope[run, None])
+                    / (rise[run, None] - w * x * slope[run, None])
                     for room, slope, rise in self.facets
                 )
         return np.maximum(np.minimum(leave, limit) - np.maximum(enter, 0.0), 0.0)
@@ -232,7 +283,8 @@ class _Body:
         own, centre = self.own, self.bounds.centre - self.own.origin
         along = np.sum(own.direction * centre, axis=1)[rows, None]
         towards = np.sum((own.position - own.w * own.origin) * centre, axis=1)[rows, None]
-        # (C - x) . (P - w x), by components: C . P - x d . P - w x d . C + w x^2, all from the camera.
+        # (C - x) . (P - w x), by components: C . P - x d . P - w x d . C + w
+        # x^2, all from the camera.
         place = np.sum((own.position - own.w * own.origin) * own.direction, axis=1)[rows, None]
         product = towards - x * place - own.w * x * (along - x)
         power = (x - along) ** 2 + (centre @ centre - self.bounds.radius**2 - along**2)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of an image: the values of the rays through pixel centres, or means over the areas of pixels.
+"""The reference of an image: the values of the rays through pixel centres, or means
+over the areas of pixels.
 
-A mean over a pixel is a sum over positions in it: eight replicates of a scrambled net, whose spread is the standard
-error, and a pilot that says how many positions a pixel needs. Each pixel has positions of its own, so that errors
-average out over an image (`reference.quadrature.replicates`). Near a light the radiance grows as one over the
-distance to it on the film: the mean over an area is finite. Under area lights each replicate has samples of its own of
-them, and its spread is that of both.
+A mean over a pixel is a sum over positions in it: eight replicates of a scrambled net, whose spread
+is the standard error, and a pilot that says how many positions a pixel needs. Each pixel has
+positions of its own, so that errors average out over an image (`reference.quadrature.replicates`).
+Near a light the radiance grows as one over the distance to it on the film: the mean over an area is
+finite. Under area lights each replicate has samples of its own of them, and its spread is that of
+both.
 """
 
 from dataclasses import replace
@@ -47,7 +49,9 @@ def rays_of_pixel(pixel: str) -> tuple[int, int]:
 
 
 def light_samples_of_ray(pixel: str) -> tuple[int, int]:
-    """Return how many samples of an area light a ray of a pixel, 'centre' or 'area', takes at least and at most."""
+    """Return how many samples of an area light a ray of a pixel, 'centre' or 'area',
+    takes at least and at most.
+    """
     return (_LIGHTS if pixel == "area" else PointPlan()).points
 
 
@@ -64,21 +68,24 @@ def quadrature_image(
 ) -> ReferenceImage:
     """Compute the reference of an image.
 
-    `reference`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
-    `shadow_scale`: attenuate over this fraction [1] of each shadow segment: 1 is the reference, 1 - epsilon what a
-    renderer with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays
-    off the surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`).
-    `pixel`: "centre": the radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a
-    mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each replicate.
-    `airlight_se` and `surface_se` say what was reached. `progress`: called with (done, total, what) as the work goes
-    on; `plan`: how many samples stand for area lights, along rays through pixel centres; `keep`: called with the name
-    of each part of that work and a function that does it: it may keep what it returns, and give it back when the same
-    image is computed again. Not for means over pixels. Returns ReferenceImage: radiances, (height, width, 3)
+    `reference`: the scene; `checks`: random shadow rays to each ray and light, which check the lit
+    intervals; `shadow_scale`: attenuate over this fraction [1] of each shadow segment: 1 is the
+    reference, 1 - epsilon what a renderer with a shadow-ray epsilon converges to (DESIGN section
+    6.1). Such a renderer also starts its shadow rays off the surface, and so do those for `surface`
+    then (`reference.visibility.certificate.reached_by_shadow_rays`). `pixel`: "centre": the
+    radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a
+    mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128
+    in each replicate. `airlight_se` and `surface_se` say what was reached. `progress`: called with
+    (done, total, what) as the work goes on; `plan`: how many samples stand for area lights, along
+    rays through pixel centres; `keep`: called with the name of each part of that work and a
+    function that does it: it may keep what it returns, and give it back when the same image is
+    computed again. Not for means over pixels. Returns ReferenceImage: radiances, (height, width, 3)
     [W/(m^2 sr)], and what is known of their errors. Raises InputError for another word in `pixel`.
 
-    Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for directional lights where all
-    media have bounds. Their shadow segments have no end, so `shadow_scale` leaves them as they are. A pixel whose
-    centre ray meets a point light has an infinite airlight; the mean over its area is finite.
+    Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for
+    directional lights where all media have bounds. Their shadow segments have no end, so
+    `shadow_scale` leaves them as they are. A pixel whose centre ray meets a point light has an
+    infinite airlight; the mean over its area is finite.
     """
     how: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale}
     if pixel == "area":
@@ -86,9 +93,13 @@ def quadrature_image(
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; expected 'centre' or 'area'")
     values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
-    layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
+    layers = np.concatenate(
+        [values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1
+    )
     replicates = values.replicates if reference.is_sampled else None
-    return _image(reference, values, layers, values.bound, replicates, field_of(reference).bound_kind)
+    return _image(
+        reference, values, layers, values.bound, replicates, field_of(reference).bound_kind
+    )
 
 
 def _image(
@@ -99,7 +110,9 @@ def _image(
     replicates: Array | None,
     kind: BoundKind,
 ) -> ReferenceImage:
-    """Return the image of layers, (pixels, 6 or 9); distances, angles and checks are those of the centres."""
+    """Return the image of layers, (pixels, 6 or 9); distances, angles and checks
+    are those of the centres.
+    """
     shape, checked = (reference.height, reference.width), centre.random_checks
     extra: dict[str, Any] = {"bound_kind": kind}
     extra |= {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
@@ -124,7 +137,11 @@ def _image(
 
 
 def _means(
-    reference: ReferenceScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
+    reference: ReferenceScene,
+    tolerance: float,
+    plan: PointPlan | None,
+    progress: Progress | None,
+    how: dict[str, Any],
 ) -> ReferenceImage:
     """Return the means over the areas of all pixels."""
     size, shapes = (reference.width, reference.height), read_shapes(reference.occluders)
@@ -133,7 +150,11 @@ def _means(
     seed = plan.seed if plan is not None else 0
     bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
     # Replicates are looked at together, but under area lights each has samples of them of its own.
-    groups = [[replicate] for replicate in range(REPLICATES)] if reference.is_sampled else [list(range(REPLICATES))]
+    groups = (
+        [[replicate] for replicate in range(REPLICATES)]
+        if reference.is_sampled
+        else [list(range(REPLICATES))]
+    )
     rounds, done = 2 * _POSITIONS.rounds * len(groups), 0
 
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
@@ -150,7 +171,9 @@ def _means(
                 seeds = np.random.default_rng((chosen.seed, chosen.most, group[0], first))
                 of_lights = replace(_LIGHTS, seed=int(seeds.integers(1 << 62)))
                 direction = film_directions(sensor, positions, size)
-                ray = ray_values(replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how)
+                ray = ray_values(
+                    replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how
+                )
                 emitted = ray.emitted.reshape(len(direction), -1)
                 values = np.concatenate([ray.airlight, ray.surface, emitted], axis=1)
                 parts.append(values.reshape(*square.shape[:3], -1).sum(axis=2))
@@ -170,4 +193,11 @@ def _means(
     if progress is not None:
         progress(rounds, rounds, "positions in pixels")
     checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))
-    return _image(reference, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means, "estimated")
+    return _image(
+        reference,
+        checked,
+        means.mean(axis=2),
+        bounds / (REPLICATES * counts[:, None]),
+        means,
+        "estimated",
+    )

@@ -20,7 +20,8 @@ from airlight.reference.visibility.planes import Rays, cone_interval, rays_at
 Array = NDArray[np.float64]
 
 _LEAST_SINE = 1e-4  # between a ray and a sun: along closer ones it is looked no further for shadows
-_END = 1e-6  # relative: an interval that ends this close to where a ray was looked at goes on to there
+# relative: an interval that ends this close to where a ray was looked at goes on to there
+_END = 1e-6
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class LightAirlight:
 
     radiance: Array  #: in-scattered, (rays, 3) [W/(m^2 sr)]
     bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]
-    angle: Array  #: between the ray and the direction to the light, pi where that is not before the surface [rad]
+    #: between the ray and the direction to the light, pi where that is not before the surface [rad]
+    angle: Array
     lit: LitIntervals  #: the intervals that were integrated
     reached: NDArray[np.bool_]  #: whether the light reaches the end of the ray
 
@@ -55,8 +57,9 @@ def light_airlight(
 ) -> LightAirlight:
     """Compute the airlight of one point, spot or directional light along every ray.
 
-    `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface, (rays,), infinite where
-    there is none [m]; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
+    `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface,
+    (rays,), infinite where there is none [m]; `shadow_scale`: see
+    `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
     found = lit_rays(reference, light, distance, **how)
     rays, lit, angle = found.rays, found.lit, np.full(len(distance), np.pi)
@@ -80,17 +83,22 @@ def lit_sums(
     distance: Array,
     shadow_scale: float = 1.0,
 ) -> tuple[Array, Array]:
-    """Return the airlight of a point or spot light from the lit intervals of rays, and its bound, (rays, 3) each."""
+    """Return the airlight of a point or spot light from the lit intervals of rays, and
+    its bound, (rays, 3) each.
+    """
     stretches = lit_stretches(light, rays, lit)
     terms = Terms(profile_of(light, rays), shadow_scale, lit.edge)
     value, bound = field_of(reference).sums(rays, stretches, distance, terms)
     return value * light.intensity, bound * light.intensity
 
 
-def _sun_sums(reference: ReferenceScene, light: DirectionalLight, found: LitRays) -> tuple[Array, Array]:
+def _sun_sums(
+    reference: ReferenceScene, light: DirectionalLight, found: LitRays
+) -> tuple[Array, Array]:
     rays, lit = found.rays, found.lit
     _, _, high = stretches = sun_stretches(reference, found)
-    # The effect on a ray of the uncertainty of coordinates, through an edge or a kink; at most all of the ray.
+    # The effect on a ray of the uncertainty of coordinates, through an edge or a
+    # kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
     terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
@@ -109,13 +117,16 @@ def lit_rays(
 ) -> LitRays:
     """Return which parts of the rays a point, spot or directional light reaches.
 
-    `reference`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes`
-    returned, if known; `known`: what can stand in a point light, if that was found for a ball that holds it; `checks`:
-    random shadow rays to each ray.
+    `reference`, `light`, `distance`: see `light_airlight`; `shapes`: what
+    `reference.scene.shapes.read_shapes` returned, if known; `known`: what can stand in a point
+    light, if that was found for a ball that holds it; `checks`: random shadow rays to each ray.
     """
     normal = None
     if isinstance(light, DirectionalLight):
-        rays, ball = rays_at(reference.origin, reference.direction, -light.direction, w=0), Ball(-light.direction, w=0)
+        rays, ball = (
+            rays_at(reference.origin, reference.direction, -light.direction, w=0),
+            Ball(-light.direction, w=0),
+        )
         shapes = read_shapes(reference.occluders) if shapes is None else shapes
         # No shadow falls on a ray where it has left the light's cylinder about all shapes.
         clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
@@ -123,7 +134,11 @@ def lit_rays(
         far = np.where(np.isfinite(distance), distance, last)
         ends = np.zeros_like(far), far
     else:
-        rays, ball, far = rays_at(reference.origin, reference.direction, light.position), Ball(light.position), distance
+        rays, ball, far = (
+            rays_at(reference.origin, reference.direction, light.position),
+            Ball(light.position),
+            distance,
+        )
         cone = cone_interval(rays, light, light.cutoff)
         none = cone[0] > cone[1]
         ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
@@ -136,22 +151,29 @@ def lit_rays(
 
 
 def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
-    """Return which parts of rays a directional light reaches; the last may end where its ray leaves the media."""
+    """Return which parts of rays a directional light reaches; the last may end where
+    its ray leaves the media.
+    """
     lit = found.lit
-    # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
+    # Behind all that could stand in the light, a ray is lit or not as at the
+    # end of what was looked at.
     goes_on = (reaches(lit, found.end) & np.isinf(found.distance))[lit.ray]
     last = lit.high * (1 + _END) >= found.end[lit.ray]
     leaves = np.where(
-        goes_on & last, field_of(reference).leave(reference.origin, reference.direction)[lit.ray], lit.high
+        goes_on & last,
+        field_of(reference).leave(reference.origin, reference.direction)[lit.ray],
+        lit.high,
     )
     return lit.ray, lit.low, np.maximum(lit.high, leaves)
 
 
 def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:
-    """Return the largest airlight of the parts that shadow rays left in doubt, for a light of strength 1, (rays, 3).
+    """Return the largest airlight of the parts that shadow rays left in doubt, for a light
+    of strength 1, (rays, 3).
 
-    In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
-    function at most its largest value. For a directional light it is exp(-tau) p, in the distance.
+    In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one,
+    and the phase function at most its largest value. For a directional light it is exp(-tau) p, in
+    the distance.
     """
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt

@@ -1,56 +1,64 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Samples of area lights: points of the light that suit one ray, and sections that suit one surface point.
+r"""Samples of area lights: points of the light that suit one ray, and sections
+that suit one surface point.
 
-**Along a ray.** A point y of the light at the height h over the ray sends J(y) into it, which grows like 1/h: points
-drawn evenly on the light leave a peak next to the light that no number of points resolves. In half planes about the
-ray, with phi the azimuth of such a half plane and l the arc length along the curve in which it cuts the light,
+**Along a ray.** A point y of the light at the height h over the ray sends J(y) into it, which grows
+like 1/h: points drawn evenly on the light leave a peak next to the light that no number of points
+resolves. In half planes about the ray, with phi the azimuth of such a half plane and l the arc
+length along the curve in which it cuts the light,
 
     dA = h dphi dl / n_in,        n_in the length of the part of the normal within the half plane,
 
-and h J(y) is bounded however close the ray passes: without extinction an unbounded ray receives (1 + cos) n_in from y,
-with cos the cosine of the angle in the half plane between normal and ray. Samples are therefore drawn by phi and l.
-These are polar coordinates about the ray, the same for all of its points, with the lit intervals of one point light.
+and h J(y) is bounded however close the ray passes: without extinction an unbounded ray receives
+(1 + cos) n_in from y, with cos the cosine of the angle in the half plane between normal and ray.
+Samples are therefore drawn by phi and l. These are polar coordinates about the ray, the same for
+all of its points, with the lit intervals of one point light.
 
-A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle of radius rho. There
-dA = R h dphi db with the angle b on the circle. The azimuths of a disk or sphere that the line of the ray misses are
-those of the quadratic form
+A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle
+of radius rho. There dA = R h dphi db with the angle b on the circle. The azimuths of a disk or
+sphere that the line of the ray misses are those of the quadratic form
 
     e^T M e <= 0,     M = c c^T - R^2 (1 - n n^T)     (a sphere: n = 0),
 
-e the unit normal of the half plane, c the way from the ray to the centre. With its eigenvalues -a <= 0 < b and the
-angle delta from the middle, half the chord is proportional to sqrt(S^2 - sin^2(delta)), S^2 = a/(a + b); with
-sin(delta) = S sin(g) that is a smooth function of g and periodic, as what follows from it, and samples are even in g. A
-line that meets the light has all azimuths, and samples that are even in phi. For a polygon phi follows the length of
-the section, which is tabulated: the density is linear between nodes, at corners of the light and between them, and the
-density itself weights a sample, so that the table costs no accuracy.
+e the unit normal of the half plane, c the way from the ray to the centre. With its eigenvalues
+-a <= 0 < b and the angle delta from the middle, half the chord is proportional to sqrt(S^2 -
+sin^2(delta)), S^2 = a/(a + b); with sin(delta) = S sin(g) that is a smooth function of g and
+periodic, as what follows from it, and samples are even in g. A line that meets the light has all
+azimuths, and samples that are even in phi. For a polygon phi follows the length of the section,
+which is tabulated: the density is linear between nodes, at corners of the light and between them,
+and the density itself weights a sample, so that the table costs no accuracy.
 
-**From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). In the same half planes,
-about an axis across the way to the light, the section of a flat light has a range of cosines. The visible part of the
-section is exact, by the same intervals as on a ray under a light: the section is the ray, the point the light. A sample
-is drawn evenly in the cosine from the visible part, and stands for all of it. The sum is therefore over a function of
-phi and of a place in the visible part, which is continuous where the visibility of points is not.
+**From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). In the
+same half planes, about an axis across the way to the light, the section of a flat light has a range
+of cosines. The visible part of the section is exact, by the same intervals as on a ray under a
+light: the section is the ray, the point the light. A sample is drawn evenly in the cosine from the
+visible part, and stands for all of it. The sum is therefore over a function of phi and of a place
+in the visible part, which is continuous where the visibility of points is not.
 
-Where the light is seen as a whole, phi is drawn by the length of the range: evenly in the solid angle (for rectangles
-Urena, Fajardo, King 2013, An area-preserving parametrization for spherical rectangles, has this in closed form). In a
-penumbra the function has kinks, at corners of the light and where an edge of a shadow meets its outline, and is smooth
-between: of that mirrored pairs (`reference.quadrature.replicates`) leave N^-2. Drawn by length, phi would go as the
-root of the number at both ends, where sections begin at a corner, and pairs would leave N^-3/2. In a penumbra the
-azimuths of a rectangle are therefore even, and its whole solid angle, which is known, is a control variate. Behind half
-a plane before a rectangle, 64 points in each of eight replicates leave 4.9e-3 of a penumbra, 64 sections by length
-1.3e-3, even pairs of them 2.2e-4; 256 sections leave 2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections
-across an edge of the shadow would leave next to nothing, but sections along it are visible as a whole or not at all and
-leave 1/N: hence the axes are turned.
+Where the light is seen as a whole, phi is drawn by the length of the range: evenly in the solid
+angle (for rectangles Urena, Fajardo, King 2013, An area-preserving parametrization for spherical
+rectangles, has this in closed form). In a penumbra the function has kinks, at corners of the light
+and where an edge of a shadow meets its outline, and is smooth between: of that mirrored pairs
+(`reference.quadrature.replicates`) leave N^-2. Drawn by length, phi would go as the root of the
+number at both ends, where sections begin at a corner, and pairs would leave N^-3/2. In a penumbra
+the azimuths of a rectangle are therefore even, and its whole solid angle, which is known, is a
+control variate. Behind half a plane before a rectangle, 64 points in each of eight replicates leave
+4.9e-3 of a penumbra, 64 sections by length 1.3e-3, even pairs of them 2.2e-4; 256 sections leave
+2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections across an edge of the shadow would
+leave next to nothing, but sections along it are visible as a whole or not at all and leave 1/N:
+hence the axes are turned.
 
-**A sphere** is seen from a point at the distance d from its centre as the disk that its tangents touch. The disk faces
-the point at a distance of d - R^2/d and has the radius R sqrt(1 - R^2/d^2). It fills the same cone of directions, so
-its sections are those of the sphere, with azimuths that follow sin(delta) = S sin(g), g even. The solid angle of the
-cone, 2 pi (1 - sqrt(1 - R^2/d^2)), is the control variate. The disk is within the sphere: a shape before the disk is
-before the sphere, unless it reaches into the sphere. Then, and where a point sees the whole sphere, samples are even in
-the cone, and each section is so short that it is seen or not.
+**A sphere** is seen from a point at the distance d from its centre as the disk that its tangents
+touch. The disk faces the point at a distance of d - R^2/d and has the radius R sqrt(1 - R^2/d^2).
+It fills the same cone of directions, so its sections are those of the sphere, with azimuths that
+follow sin(delta) = S sin(g), g even. The solid angle of the cone, 2 pi (1 - sqrt(1 - R^2/d^2)), is
+the control variate. The disk is within the sphere: a shape before the disk is before the sphere,
+unless it reaches into the sphere. Then, and where a point sees the whole sphere, samples are even
+in the cone, and each section is so short that it is seen or not.
 
-**On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and the rest of the
-coordinate serves within the triangle: along rays as above in one that is near, evenly over its area in others. For
-surface points each has a short section, evenly over the area.
+**On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`),
+and the rest of the coordinate serves within the triangle: along rays as above in one that is near,
+evenly over its area in others. For surface points each has a short section, evenly over the area.
 """
 
 from dataclasses import dataclass, fields
@@ -58,7 +66,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
+from airlight.reference.quadrature.mesh_choice import (
+    Choice,
+    choose_for_points,
+    choose_for_rays,
+    places_in,
+)
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.lit_intervals import IN_PLANE
@@ -75,7 +88,9 @@ _SHORT = 1e-6  # of the radius of a sphere: the length of its short sections
 
 @dataclass(frozen=True)
 class LightSamples:
-    """Samples of a light for each of some rays; the mean over them of weight times f is the integral over the area."""
+    """Samples of a light for each of some rays; the mean over them of weight times f is
+    the integral over the area.
+    """
 
     place: Array  #: (rays, samples, 3) [m]
     normal: Array  #: unit, of the side that emits, (rays, samples, 3)
@@ -88,7 +103,9 @@ class LightSamples:
 
 @dataclass(frozen=True)
 class Sections:
-    """Sections of a light, each with the surface point that looks at it; the mean of their weights is what it sees."""
+    """Sections of a light, each with the surface point that looks at it; the mean of their
+    weights is what it sees.
+    """
 
     eye: Array  #: the surface point, (n, 3) [m]
     axis: Array  #: unit, in the plane of point and section, (n, 3)
@@ -104,10 +121,11 @@ class Sections:
         return np.sum(q * self.axis[row], axis=1) / np.maximum(np.linalg.norm(q, axis=1), _TINY)
 
     def drawn(self, lit: LitIntervals, uniform: Array) -> tuple[Index, Array, Array]:
-        """Return which sections are seen at all, a point of what is seen of each, and the solid angle of that [sr].
+        """Return which sections are seen at all, a point of what is seen of each, and the
+        solid angle of that [sr].
 
-        `lit`: what is seen of each section, in fractions of its length; `uniform`: numbers from 0 to 1, (n,), by which
-        points are drawn.
+        `lit`: what is seen of each section, in fractions of its length; `uniform`: numbers from 0
+        to 1, (n,), by which points are drawn.
         """
         every, count = np.arange(len(self.weight)), len(self.weight)
         first, last = (self._cosine(every, np.full(count, end)) for end in (0.0, 1.0))
@@ -119,16 +137,24 @@ class Sections:
         begin = np.searchsorted(lit.ray, row)
         wanted = below[begin] + uniform[row] * total[row]
         chosen = np.clip(
-            np.searchsorted(below, wanted, side="right") - 1, begin, np.searchsorted(lit.ray, row, "right") - 1
+            np.searchsorted(below, wanted, side="right") - 1,
+            begin,
+            np.searchsorted(lit.ray, row, "right") - 1,
         )
-        cosine = low[chosen] + np.sign(high - low)[chosen] * np.clip(wanted - below[chosen], 0.0, wide[chosen])
+        cosine = low[chosen] + np.sign(high - low)[chosen] * np.clip(
+            wanted - below[chosen], 0.0, wide[chosen]
+        )
         sine = np.sqrt(np.maximum((1 - cosine) * (1 + cosine), 0.0))
-        # In the plane of point and section: where the direction (cosine, sine) meets the line (z, h) + t (dz, dh).
+        # In the plane of point and section: where the direction (cosine, sine) meets the
+        # line (z, h) + t (dz, dh).
         axis, way, start = self.axis[row], self.way[row], self.start[row] - self.eye[row]
         end = start + way
         over = end - np.sum(end * axis, axis=1)[:, None] * axis
         over /= np.maximum(np.linalg.norm(over, axis=1), _TINY)[:, None]
-        z, h, dz, dh = (np.sum(a * b, axis=1) for a, b in ((start, axis), (start, over), (way, axis), (way, over)))
+        z, h, dz, dh = (
+            np.sum(a * b, axis=1)
+            for a, b in ((start, axis), (start, over), (way, axis), (way, over))
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.nan_to_num((h * cosine - z * sine) / (dz * sine - dh * cosine))
         part = np.clip(part, lit.low[chosen], lit.high[chosen])
@@ -149,11 +175,18 @@ class _Axes:
 
     def components(self, vector: Array) -> Array:
         """Return the components of vectors, (rows, k, 3), along axis, up and side."""
-        return np.stack([np.einsum("rki,ri->rk", vector, part) for part in (self.axis, self.up, self.side)], axis=-1)
+        return np.stack(
+            [np.einsum("rki,ri->rk", vector, part) for part in (self.axis, self.up, self.side)],
+            axis=-1,
+        )
 
     def point(self, z: Array, h: Array, phi: Array) -> Array:
-        """Return the points at z along the axis, h over it, and the azimuth phi, (rows, k, 3) [m]."""
-        across = np.cos(phi)[..., None] * self.up[:, None] + np.sin(phi)[..., None] * self.side[:, None]
+        """Return the points at z along the axis, h over it, and the
+        azimuth phi, (rows, k, 3) [m].
+        """
+        across = (
+            np.cos(phi)[..., None] * self.up[:, None] + np.sin(phi)[..., None] * self.side[:, None]
+        )
         return self.origin[:, None] + z[..., None] * self.axis[:, None] + h[..., None] * across
 
 
@@ -176,12 +209,14 @@ def samples_for_rays(
 ) -> LightSamples:
     """Return samples of a light for the airlight of rays.
 
-    `light`: the light; `origin`, `direction`, `distance`: of the rays: where they start, (3,) [m], unit vectors, (rays,
-    3), and how far they go, (rays,) [m]; `square`: points of the unit square, (samples, 2) [1], or of each ray, (rays,
-    samples, 2).
+    `light`: the light; `origin`, `direction`, `distance`: of the rays: where they start, (3,) [m],
+    unit vectors, (rays, 3), and how far they go, (rays,) [m]; `square`: points of the unit square,
+    (samples, 2) [1], or of each ray, (rays, samples, 2).
     """
     if light.kind == "mesh":
-        return _on_triangles(choose_for_rays(light, origin, direction, distance, square), origin, direction)
+        return _on_triangles(
+            choose_for_rays(light, origin, direction, distance, square), origin, direction
+        )
     axes = _axes(origin, direction, light.centre)
     if light.kind == "sphere":
         return _on_sphere(light, axes, distance, square)
@@ -192,17 +227,21 @@ def samples_for_rays(
 def sections_for_points(
     light: ReferenceAreaLight, place: Array, square: Array, turn: float = 0.0, even: bool = False
 ) -> Sections:
-    """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
+    """Return sections of a light for surface points that lie before it, point by point,
+    even in the solid angle.
 
-    `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], or
-    of each surface point, (points, samples, 2). Where sections are not short, the second number is left for the place
-    in the visible part of a section. `turn`: the angle by which the axis is turned about the way to the light [rad];
-    `even`: for points that see a part of the light: rectangles have even azimuths instead of even solid angles, spheres
-    long sections instead of short ones.
+    `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square,
+    (samples, 2) [1], or of each surface point, (points, samples, 2). Where sections are not short,
+    the second number is left for the place in the visible part of a section. `turn`: the angle by
+    which the axis is turned about the way to the light [rad]; `even`: for points that see a part of
+    the light: rectangles have even azimuths instead of even solid angles, spheres long sections
+    instead of short ones.
     """
     if light.kind == "mesh":
         chosen = choose_for_points(light, place, square)
-        return _before_triangles(chosen, np.repeat(place, square.shape[-2], axis=0), _SHORT * light.radius)
+        return _before_triangles(
+            chosen, np.repeat(place, square.shape[-2], axis=0), _SHORT * light.radius
+        )
     if light.kind == "sphere" and not even:
         return _in_cone(light, place, square)
     way = light.centre - place
@@ -225,7 +264,9 @@ def sections_for_points(
 
 
 def solid_angle(light: ReferenceAreaLight, place: Array) -> Array:
-    """Return the solid angle of a sphere, or of a rectangle by that of its corners, from points before it [sr]."""
+    """Return the solid angle of a sphere, or of a rectangle by that of its corners,
+    from points before it [sr].
+    """
     if light.kind == "sphere":
         return 2 * np.pi * _one_minus_cosine(light, np.linalg.norm(place - light.centre, axis=1))
     x, y, z = ((place - light.centre) @ light.frame.T).T
@@ -261,13 +302,19 @@ class _Fan:
     cells: int = _CELLS  # of the table of sections between two corners
 
     def section(self, phi: Array) -> tuple[Array, Array, Array, Array]:
-        """Return z and h of both ends of the sections at azimuths, (rows, k) each; without length where there is none.
+        """Return z and h of both ends of the sections at azimuths, (rows, k) each; without
+        length where there is none.
 
         The end that is closer to the axis comes first.
         """
         z0, h0, z1, h1 = self._polygon(phi) if self.corners is not None else self._disk(phi)
         swap = h0 > h1
-        z0, z1, h0, h1 = np.where(swap, z1, z0), np.where(swap, z0, z1), np.where(swap, h1, h0), np.where(swap, h0, h1)
+        z0, z1, h0, h1 = (
+            np.where(swap, z1, z0),
+            np.where(swap, z0, z1),
+            np.where(swap, h1, h0),
+            np.where(swap, h0, h1),
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             on_axis = z0 - h0 * (z1 - z0) / (h1 - h0)
         behind = (h0 < 0) & (h1 > 0)
@@ -289,7 +336,11 @@ class _Fan:
         first = np.argmax(cut, axis=-1)[..., None]
         last = cut.shape[-1] - 1 - np.argmax(cut[..., ::-1], axis=-1)[..., None]
         last = np.where(cut.any(axis=-1, keepdims=True), last, first)
-        z0, h0, z1, h1 = (np.take_along_axis(part, end, axis=-1)[..., 0] for end in (first, last) for part in (z, h))
+        z0, h0, z1, h1 = (
+            np.take_along_axis(part, end, axis=-1)[..., 0]
+            for end in (first, last)
+            for part in (z, h)
+        )
         return z0, h0, z1, h1
 
     def _disk(self, phi: Array) -> tuple[Array, Array, Array, Array]:
@@ -305,18 +356,24 @@ class _Fan:
         return z - half * n_d, h + half * n_w, z + half * n_d, h - half * n_w
 
     def even(self, uniform: Array) -> tuple[Array, Array]:
-        """Return azimuths, (rows, k), even or by the smooth map of a disk, and one over their density."""
+        """Return azimuths, (rows, k), even or by the smooth map of a disk,
+        and one over their density.
+        """
         if self.corners is None:
             spread = _spread(self.axes.height, self.radius, self.normal[:, 1:])
-            return spread.azimuth(np.broadcast_to(uniform, (len(self.axes.along), uniform.shape[-1])))
+            return spread.azimuth(
+                np.broadcast_to(uniform, (len(self.axes.along), uniform.shape[-1]))
+            )
         ends = self._breaks()[:, [0, -1]]
         width = np.diff(ends, axis=1)
         return ends[:, :1] + width * uniform, width
 
     def drawn(self, uniform: Array, length) -> tuple[Array, Array]:
-        """Return azimuths, of a polygon by the length of the sections, (rows, k), and one over their density.
+        """Return azimuths, of a polygon by the length of the sections, (rows, k),
+        and one over their density.
 
-        `uniform`: numbers from 0 to 1, (k,), or (rows, k); `length`: (z0, h0, z1, h1) -> what the density is to follow.
+        `uniform`: numbers from 0 to 1, (k,), or (rows, k); `length`: (z0, h0, z1, h1) -> what
+        the density is to follow.
         """
         if self.corners is None:
             return self.even(uniform)
@@ -324,7 +381,9 @@ class _Fan:
         return phi, 1 / density
 
     def _breaks(self) -> Array:
-        """Return the azimuths of the corners of a polygon, and of nodes between them, (rows, nodes)."""
+        """Return the azimuths of the corners of a polygon, and of nodes
+        between them, (rows, nodes).
+        """
         assert self.corners is not None
         a, b = self.corners[..., 1], self.corners[..., 2]
         turn = a * np.roll(b, -1, axis=1) - b * np.roll(a, -1, axis=1)
@@ -344,8 +403,13 @@ def _fan(light: ReferenceAreaLight, axes: _Axes) -> _Fan:
         way = light.centre - axes.origin
         d = np.linalg.norm(way, axis=1)
         ratio = np.minimum(light.radius / d, 1.0)
-        normal, radius = -(way / d[:, None])[:, None], light.radius * np.sqrt((1 - ratio) * (1 + ratio))
-        axes = _axes(axes.origin, axes.axis, axes.origin + ((1 - ratio) * (1 + ratio))[:, None] * way)
+        normal, radius = (
+            -(way / d[:, None])[:, None],
+            light.radius * np.sqrt((1 - ratio) * (1 + ratio)),
+        )
+        axes = _axes(
+            axes.origin, axes.axis, axes.origin + ((1 - ratio) * (1 + ratio))[:, None] * way
+        )
     normal = axes.components(normal)[:, 0]
     if light.kind != "rectangle":
         return _Fan(axes, None, normal, radius)
@@ -354,7 +418,9 @@ def _fan(light: ReferenceAreaLight, axes: _Axes) -> _Fan:
 
 
 def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
-    """Return samples by azimuth and by the place in the section, and the areas for which they stand."""
+    """Return samples by azimuth and by the place in the section, and the
+    areas for which they stand.
+    """
     phi, per_density = fan.drawn(square[..., 0], lambda z0, h0, z1, h1: np.hypot(z1 - z0, h1 - h0))
     z0, h0, z1, h1 = fan.section(phi)
     part = square[..., 1]
@@ -369,34 +435,50 @@ def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
 
 
 def _on_triangles(chosen: Choice, origin: Array, direction: Array) -> LightSamples:
-    """Return samples of a mesh for rays: of triangles that are near as of a flat light, of others evenly."""
+    """Return samples of a mesh for rays: of triangles that are near as of a flat
+    light, of others evenly.
+    """
     rows = len(direction)
     place, weight = places_in(chosen.corners, chosen.square), chosen.area.copy()
     near = np.flatnonzero(chosen.near)
     if len(near):
         corners = chosen.corners[near]
-        axes = _axes(origin, np.repeat(direction, len(weight) // rows, axis=0)[near], corners.mean(axis=1))
+        axes = _axes(
+            origin, np.repeat(direction, len(weight) // rows, axis=0)[near], corners.mean(axis=1)
+        )
         normal = axes.components(chosen.normal[near, None])[:, 0]
         radius = np.zeros(len(near))
-        fan = _Fan(axes, axes.components(corners - axes.origin[:, None]), normal, radius, _CELLS_OF_MANY)
+        fan = _Fan(
+            axes, axes.components(corners - axes.origin[:, None]), normal, radius, _CELLS_OF_MANY
+        )
         found = _on_flat(fan, chosen.square[near, None])
         place[near], weight[near] = (part[:, 0] for part in found)
     shape = rows, -1, 3
-    return LightSamples(place.reshape(shape), chosen.normal.reshape(shape), (weight / chosen.chance).reshape(rows, -1))
+    return LightSamples(
+        place.reshape(shape),
+        chosen.normal.reshape(shape),
+        (weight / chosen.chance).reshape(rows, -1),
+    )
 
 
 def _before_triangles(chosen: Choice, eye: Array, length: float) -> Sections:
-    """Return short sections of triangles, across the way to points; without weight for points behind them."""
+    """Return short sections of triangles, across the way to points; without
+    weight for points behind them.
+    """
     start = places_in(chosen.corners, chosen.square)
     way = eye - start
     above = np.sum(way * chosen.normal, axis=1)
     sees = above > IN_PLANE * np.maximum(1.0, np.abs(start).max(axis=1, initial=0.0))
-    weight = np.where(sees, chosen.area * above / np.linalg.norm(way, axis=1) ** 3 / chosen.chance, 0.0)
+    weight = np.where(
+        sees, chosen.area * above / np.linalg.norm(way, axis=1) ** 3 / chosen.chance, 0.0
+    )
     across = np.cross(chosen.normal, way)
     size = np.linalg.norm(across, axis=1)[:, None]
     side = chosen.corners[:, 1] - chosen.corners[:, 0]
     along = size > _ASIDE * np.linalg.norm(way, axis=1)[:, None]
-    across = np.where(along, across / np.maximum(size, _TINY), side / np.linalg.norm(side, axis=1)[:, None])
+    across = np.where(
+        along, across / np.maximum(size, _TINY), side / np.linalg.norm(side, axis=1)[:, None]
+    )
     return Sections(eye, across, start, length * across, weight)
 
 
@@ -419,7 +501,9 @@ class _Spread:
 
 
 def _spread(height: Array, radius: Array | float, normal: Array) -> _Spread:
-    """Return the azimuths of a disk with normals (rows, 2) across the axes, or of a sphere, whose normals are zero."""
+    """Return the azimuths of a disk with normals (rows, 2) across the axes, or of a
+    sphere, whose normals are zero.
+    """
     n_u, n_v = normal.T
     first = height**2 - radius**2 * (1 - n_u**2)
     second, mixed = -(radius**2) * (1 - n_v**2), radius**2 * n_u * n_v
@@ -431,9 +515,12 @@ def _spread(height: Array, radius: Array | float, normal: Array) -> _Spread:
 
 
 def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
-    """Return numbers, (rows, k), whose density is linear between nodes, (rows, nodes), and that density."""
+    """Return numbers, (rows, k), whose density is linear between nodes, (rows,
+    nodes), and that density.
+    """
     width = np.diff(nodes, axis=1)
-    # At a corner sections begin at a point, or at once with a side: the density on both sides of a node differs.
+    # At a corner sections begin at a point, or at once with a side: the density on both
+    # sides of a node differs.
     left, right = density(nodes[:, :-1] + _ASIDE * width), density(nodes[:, 1:] - _ASIDE * width)
     mass = 0.5 * width * (left + right)
     none = mass.sum(axis=1, keepdims=True) <= 0
@@ -442,7 +529,9 @@ def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
     below = np.cumsum(mass, axis=1)
     wanted = np.broadcast_to(uniform, (len(nodes), uniform.shape[-1])) * total
     cell = np.minimum((below[:, None, :-1] <= wanted[..., None]).sum(axis=2), mass.shape[1] - 1)
-    first, left, right, wide = (np.take_along_axis(part, cell, axis=1) for part in (nodes[:, :-1], left, right, width))
+    first, left, right, wide = (
+        np.take_along_axis(part, cell, axis=1) for part in (nodes[:, :-1], left, right, width)
+    )
     rest = wanted - np.take_along_axis(below - mass, cell, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(wide > 0, np.maximum(rest, 0.0) / wide, 0.0)
@@ -454,11 +543,15 @@ def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
 # --- Spheres ---
 
 
-def _on_sphere(light: ReferenceAreaLight, axes: _Axes, distance: Array, square: Array) -> LightSamples:
-    """Return samples of a sphere by azimuth and by the angle on the circle in which a half plane cuts it.
+def _on_sphere(
+    light: ReferenceAreaLight, axes: _Axes, distance: Array, square: Array
+) -> LightSamples:
+    """Return samples of a sphere by azimuth and by the angle on the circle in
+    which a half plane cuts it.
 
-    Both are periodic where the line misses the sphere. Where it does not, the circle ends at the line, and where the
-    ray ends at the sphere, at what its beginning sees: the ray sees no other point of the sphere.
+    Both are periodic where the line misses the sphere. Where it does not, the circle ends at the
+    line, and where the ray ends at the sphere, at what its beginning sees: the ray sees no other
+    point of the sphere.
     """
     radius, rows = light.radius, len(axes.along)
     spread = _spread(axes.height, radius, np.zeros((rows, 2)))
@@ -472,12 +565,17 @@ def _on_sphere(light: ReferenceAreaLight, axes: _Axes, distance: Array, square: 
         beside = axes.height[:, None] * np.sin(phi)
         rho = np.sqrt(np.maximum((radius - beside) * (radius + beside), 0.0))
         middle = axes.height[:, None] * np.cos(phi)
-        reach = np.where(meets, np.arccos(np.clip(-middle / np.maximum(rho, _TINY), -1.0, 1.0)), np.pi)
+        reach = np.where(
+            meets, np.arccos(np.clip(-middle / np.maximum(rho, _TINY), -1.0, 1.0)), np.pi
+        )
         seen = np.hypot(middle, axes.along[:, None])
-        back = np.arctan2(-axes.along[:, None], -middle) + np.arccos(np.clip(rho / np.maximum(seen, rho), 0.0, 1.0))
+        back = np.arctan2(-axes.along[:, None], -middle) + np.arccos(
+            np.clip(rho / np.maximum(seen, rho), 0.0, 1.0)
+        )
         return middle, rho, -reach, np.where(ends, np.clip(back, -reach, reach), reach)
 
-    # The lattice of `reference.quadrature.replicates` is folded in its first coordinate and periodic in the other.
+    # The lattice of `reference.quadrature.replicates` is folded in its first coordinate
+    # and periodic in the other.
     folded, periodic = square[..., 0], square[..., 1]
     phi, rate = spread.azimuth(np.where(meets, periodic, folded))
     middle, rho, low, high = circle(phi)
@@ -488,7 +586,9 @@ def _on_sphere(light: ReferenceAreaLight, axes: _Axes, distance: Array, square: 
 
 
 def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections:
-    """Return short sections of a sphere for points outside of it, even in the cone of directions that meet it."""
+    """Return short sections of a sphere for points outside of it, even in the cone of
+    directions that meet it.
+    """
     way = light.centre - place
     d = np.linalg.norm(way, axis=1)[:, None]
     axis = way / d
@@ -511,15 +611,19 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
 
 
 def _one_minus_cosine(light: ReferenceAreaLight, d: Array) -> Array:
-    """Return one minus the cosine of the half angle of the cone that a sphere fills, by the distance to its centre."""
+    """Return one minus the cosine of the half angle of the cone that a sphere fills, by
+    the distance to its centre.
+    """
     ratio = np.minimum(light.radius / d, 1.0)
     return ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))
 
 
 def to_sphere(light: ReferenceAreaLight, way: Array, towards: Array) -> Array:
-    """Return how far a sphere is in unit directions that meet it, `way` from its centre, (n, 3) each [m].
+    """Return how far a sphere is in unit directions that meet it, `way` from its
+    centre, (n, 3) each [m].
 
-    Directions to the rim of the disk that the tangents touch may miss the sphere by rounding: they go to the tangent.
+    Directions to the rim of the disk that the tangents touch may miss the sphere by
+    rounding: they go to the tangent.
     """
     near = -np.sum(way * towards, axis=1)
     beside = np.linalg.norm(way + near[:, None] * towards, axis=1)

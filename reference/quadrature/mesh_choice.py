@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Which triangles of a mesh of light samples lie on: by what they send to a ray, or to a surface point.
+r"""Which triangles of a mesh of light samples lie on: by what they send to a
+ray, or to a surface point.
 
-A triangle of area a and unit normal n about the point c sends to a ray in a clear medium, as one point at its middle,
+A triangle of area a and unit normal n about the point c sends to a ray in a clear medium, as
+one point at its middle,
 
     a int max(0, n . (x - c)) / |x - c|^3 dx  =  a [q s / (h^2 r) - p / r],    r^2 = h^2 + s^2,
 
-s the distance along the ray from the foot of c, h the height of c over it, q + p s = n . (x - c), between the ends of
-the part of the ray that is before the triangle. To h^2 its area is added: one that the ray meets sends a finite amount.
-To a surface point it sends a max(0, n . (x - c)) / |x - c|^3.
+s the distance along the ray from the foot of c, h the height of c over it, q + p s = n . (x - c),
+between the ends of the part of the ray that is before the triangle. To h^2 its area is added: one
+that the ray meets sends a finite amount. To a surface point it sends a max(0, n . (x - c)) / |x -
+c|^3.
 
-Triangles are chosen in proportion, and a fifth by area, so that none that sends something is left out; weights are by
-the chance itself. A mesh of many is chosen by groups of neighbours, and these by area within a group.
+Triangles are chosen in proportion, and a fifth by area, so that none that sends something is left
+out; weights are by the chance itself. A mesh of many is chosen by groups of neighbours, and these
+by area within a group.
 """
 
 from dataclasses import dataclass
@@ -38,13 +42,16 @@ class Choice:
     area: Array  #: [m^2]
     chance: Array  #: with which a triangle was chosen [1]
     square: Array  #: points of the unit square, spread over it within each triangle, (..., 2)
-    near: NDArray[np.bool_]  #: whether it is so close to its ray, or point, that its points differ in what they send
+    #: whether it is so close to its ray, or point, that its points differ in what they send
+    near: NDArray[np.bool_]
 
 
 def choose_for_rays(
     light: ReferenceAreaLight, origin: Array, direction: Array, distance: Array, square: Array
 ) -> Choice:
-    """Choose triangles for samples of rays; the parameters are those of `light_samples.samples_for_rays`."""
+    """Choose triangles for samples of rays; the parameters are those of
+    `light_samples.samples_for_rays`.
+    """
     mesh = _Mesh(light)
     way = mesh.centre - origin
     foot = direction @ way.T
@@ -62,12 +69,16 @@ def choose_for_rays(
         r = np.sqrt(softened + np.minimum(np.abs(s), _FAR) ** 2)
         return q * np.clip(s, -_FAR, _FAR) / (softened * r) - p / r
 
-    worth = np.where((end > begin) & ((p != 0) | (q > 0)), mesh.area * (until(end) - until(begin)), 0.0)
+    worth = np.where(
+        (end > begin) & ((p != 0) | (q > 0)), mesh.area * (until(end) - until(begin)), 0.0
+    )
     return mesh.chosen(worth, square_height, square)
 
 
 def choose_for_points(light: ReferenceAreaLight, place: Array, square: Array) -> Choice:
-    """Choose triangles for samples of surface points; the parameters are those of `samples_for_points`."""
+    """Choose triangles for samples of surface points; the parameters are those
+    of `samples_for_points`.
+    """
     mesh = _Mesh(light)
     way = place[:, None] - mesh.centre
     r2 = np.sum(way * way, axis=2)
@@ -103,14 +114,17 @@ class _Mesh:
         rows, samples = len(worth), square.shape[-2]
         total = worth.sum(axis=1, keepdims=True)
         part = np.where(total > 0, 1 - _BY_AREA, 0.0)
-        chance = part * worth / np.where(total > 0, total, 1.0) + (1 - part) * self.area / self.area.sum()
+        chance = (
+            part * worth / np.where(total > 0, total, 1.0)
+            + (1 - part) * self.area / self.area.sum()
+        )
         ends = np.cumsum(chance, axis=1)
         ends /= ends[:, -1:]
         # One search for all rows: that of row k lies between k and k + 1.
         row = np.arange(rows)[:, None]
-        group = np.searchsorted((ends + row).ravel(), (square[..., 0] + row).ravel(), side="right").reshape(
-            rows, samples
-        )
+        group = np.searchsorted(
+            (ends + row).ravel(), (square[..., 0] + row).ravel(), side="right"
+        ).reshape(rows, samples)
         group = np.clip(group - row * len(self.area), 0, len(self.area) - 1)
         its_chance = np.take_along_axis(chance, group, axis=1)
         first = np.take_along_axis(ends, group, axis=1) - its_chance
@@ -119,7 +133,9 @@ class _Mesh:
         low = self.below[self.begin[group]]
         wanted = low + rest * self.area[group]
         last = np.append(self.begin[1:], len(self.areas))[group] - 1
-        number = np.clip(np.searchsorted(self.below, wanted, side="right") - 1, self.begin[group], last)
+        number = np.clip(
+            np.searchsorted(self.below, wanted, side="right") - 1, self.begin[group], last
+        )
         rest = np.clip((wanted - self.below[number]) / self.areas[number], 0.0, 1.0)
         its_chance = its_chance * self.areas[number] / self.area[group]
         near = np.take_along_axis(square_distance, group, axis=1) < _CLOSE * self.area[group]
@@ -136,7 +152,9 @@ class _Mesh:
 
 
 def places_in(corners: Array, square: Array) -> Array:
-    """Return points of triangles, (n, 3, 3), evenly for points of the unit square, (n, 2), as (n, 3) [m]."""
+    """Return points of triangles, (n, 3, 3), evenly for points of the unit
+    square, (n, 2), as (n, 3) [m].
+    """
     root = np.sqrt(square[:, :1])
     across = root * square[:, 1:]
     return (1 - root) * corners[:, 0] + (root - across) * corners[:, 1] + across * corners[:, 2]

@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference along camera rays: certified airlight integrals summed over the lit intervals of every ray.
+"""The reference along camera rays: certified airlight integrals summed over the
+lit intervals of every ray.
 
 For each light and each ray, in float64:
 
-1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
-   is a polygon or a sphere its distance is computed again in float64);
-2. the ray up to there, or its part in the cone of a spot, is cut into lit intervals by exact geometry
-   (`reference.visibility.shadows`), which random shadow rays then check (`reference.visibility.certificate`);
-3. the intervals are integrated and added up, with an error estimate (`reference.quadrature.fields`);
+1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same
+   surface; where that is a polygon or a sphere its distance is computed again in float64);
+2. the ray up to there, or its part in the cone of a spot, is cut into lit intervals by exact
+   geometry (`reference.visibility.shadows`), which random shadow rays then check
+   (`reference.visibility.certificate`);
+3. the intervals are integrated and added up, with an error estimate
+   (`reference.quadrature.fields`);
 4. a light reaches the surface where its last interval does (`reference.quadrature.surface`).
 
-The bound of a ray adds the estimates, the effect of the rounding of each edge between light and shadow, and the parts
-that shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), and the sky
-(`reference.quadrature.sky`), with their own standard errors.
+The bound of a ray adds the estimates, the effect of the rounding of each edge between light and
+shadow, and the parts that shadow rays left in doubt. Area lights come last
+(`reference.quadrature.area_lights`), and the sky (`reference.quadrature.sky`), with their own
+standard errors.
 """
 
 from collections.abc import Callable
@@ -47,23 +51,30 @@ class ReferenceImage:
     """Radiance of every pixel; arrays of shape (height, width[, 3])."""
 
     airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
-    airlight_bound: Array  #: its error without that of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
+    #: its error without that of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
+    airlight_bound: Array
     surface: Array  #: radiance of the lit surface through the medium [W/(m^2 sr)]
-    distance: Array  #: to the visible surface at the pixel's centre, infinite where there is none [m]
-    light_angle: Array  #: smallest angle between the centre's ray and the direction to a light before the surface [rad]
+    #: to the visible surface at the pixel's centre, infinite where there is none [m]
+    distance: Array
+    #: smallest angle between the centre's ray and the direction to a light before the surface [rad]
+    light_angle: Array
     transitions: int  #: edges between light and shadow
     missed: float  #: fraction of the first random shadow rays that contradicted the lit intervals
     checked: int = 0  #: random shadow rays that checked the lit intervals
     disagreements: int = 0  #: of these, how many contradicted them
-    refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
+    #: contradictions that were settled, by mending the intervals or by a float64 test
+    refined: int = 0
     left: int = 0  #: contradictions that were not: their worth is in the bound
-    emitted: Array | None = None  #: area lights, or the background, seen directly [W/(m^2 sr)]; None without any
-    airlight_se: Array | None = None  #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
+    #: area lights, or the background, seen directly [W/(m^2 sr)]; None without any
+    emitted: Array | None = None
+    #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
+    airlight_se: Array | None = None
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
-    #: means over the image of what area lights add to airlight and surface, by replicate of their points, (2,
-    #: replicates, 3) [W/(m^2 sr)]
+    #: means over the image of what area lights add to airlight and surface, by replicate of their
+    #: points, (2, replicates, 3) [W/(m^2 sr)]
     replicate_means: Array | None = None
-    #: what `airlight_bound` is: 'proven', or 'estimated' in density grids and for means over the areas of pixels
+    #: what `airlight_bound` is: 'proven', or 'estimated' in density grids and for means
+    #: over the areas of pixels
     bound_kind: BoundKind = "proven"
 
 
@@ -78,8 +89,8 @@ class RayValues:
     light_angle: Array  #: (rays,) [rad]
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
-    #: area lights or a sky, seen directly, (rays, 3), and for each replicate of their samples airlight and
-    #: surface, (rays, 6, replicates) [W/(m^2 sr)]; in other scenes without columns
+    #: area lights or a sky, seen directly, (rays, 3), and for each replicate of their samples
+    #: airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]; in other scenes without columns
     emitted: Array = field(default_factory=lambda: np.empty((0, 0)))
     replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
 
@@ -97,9 +108,10 @@ def ray_values(
     """Compute airlight, lit surface and distances of every ray of `reference.direction`.
 
     `reference`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
-    `reference.quadrature.image.quadrature_image`; `shapes`: what `reference.scene.shapes.read_shapes` returned for the
-    occluders, if that is known. Returns RayValues: radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how
-    the lit intervals were checked.
+    `reference.quadrature.image.quadrature_image`; `shapes`: what
+    `reference.scene.shapes.read_shapes` returned for the occluders, if that is known. Returns
+    RayValues: radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals
+    were checked.
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     hits = surface_hits(reference)
@@ -135,20 +147,34 @@ def ray_values(
     if reference.area:
         done = total - _STEPS * wide_parts
         tell = partial(_tell, progress, total)
-        how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
+        how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | (
+            {"keep": keep} if keep else {}
+        )
         beams = beams_of(reference, hits.distance)
         scattered = area_airlight(reference, beams, airlight, tell=partial(tell, done), **how_kept)
         lit = np.zeros_like(scattered.replicates)
         if plan.surfaces:
-            lit = area_surface(reference, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept)
+            lit = area_surface(
+                reference, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept
+            )
         tell(done + 2 * _STEPS, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)
-        airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
+        airlight, surface, bound = (
+            airlight + mean[:, :3],
+            surface + mean[:, 3:],
+            bound + scattered.bound,
+        )
         found.append(scattered.random_checks)
         wide["replicates"] = replicates
     if reference.sky is not None:
-        sky = sky_light(reference, hits, shapes=shapes, plan=plan, tell=partial(_tell, progress, total, total - _STEPS))
+        sky = sky_light(
+            reference,
+            hits,
+            shapes=shapes,
+            plan=plan,
+            tell=partial(_tell, progress, total, total - _STEPS),
+        )
         mean = sky.replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
         wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates

@@ -1,50 +1,56 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""How many points of an area light a ray needs, and replicates of their sums whose intervals hold.
 
-Eight independent scramblings of N points each give a mean; their spread S gives the standard error S/sqrt(8). If the
-means are normal, (mean - value)/(S/sqrt(8)) has Student's distribution with 7 degrees of freedom, and 2.365 standard
-errors to either side hold the value in 95 % of all runs. That is so for an N that is fixed beforehand. If points are
-doubled until S *of the same points* is small, N is a stopping time, and S, given that it stopped the doubling, is too
-small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the value with
+Eight independent scramblings of N points each give a mean; their spread S gives the standard error
+S/sqrt(8). If the means are normal, (mean - value)/(S/sqrt(8)) has Student's distribution with 7
+degrees of freedom, and 2.365 standard errors to either side hold the value in 95 % of all runs.
+That is so for an N that is fixed beforehand. If points are doubled until S *of the same points* is
+small, N is a stopping time, and S, given that it stopped the doubling, is too small. With n_k = 2^k
+n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the value with
 
     sum_k  P(S_0, ..., S_{k-1} > e)  P(S_k <= e, |mean - value| < 2.365 S_k/sqrt(8)),
 
-where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds with S ~ 1/N this is
-92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.
+where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds
+with S ~ 1/N this is 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.
 
-A pilot therefore decides, and is not counted: eight replicates of other scramblings, with four times as many points
-each time, until they predict a small enough standard error at not more than four times their points. N is then
-independent of the points that count, and Student's distribution holds for every N; the total cost is 1.2 to 1.7 times
-that of the points that count. The pilot assumes S ~ N^-5/4, a little slower than the N^-3/2 of scrambled nets for
-smooth functions (Owen 1997, Scrambled net variance for integrals of smooth functions), which fog reaches. Where this is
-too optimistic, the stated error is larger than the requested one, and right. A ray that could not reach the error with
-all its points at that rate gets them all at once.
+A pilot therefore decides, and is not counted: eight replicates of other scramblings, with four
+times as many points each time, until they predict a small enough standard error at not more than
+four times their points. N is then independent of the points that count, and Student's distribution
+holds for every N; the total cost is 1.2 to 1.7 times that of the points that count. The pilot
+assumes S ~ N^-5/4, a little slower than the N^-3/2 of scrambled nets for smooth functions (Owen
+1997, Scrambled net variance for integrals of smooth functions), which fog reaches. Where this is
+too optimistic, the stated error is larger than the requested one, and right. A ray that could not
+reach the error with all its points at that rate gets them all at once.
 
-**Points of the unit square.** They are Sobol's in base 2, scrambled at random: in each coordinate a digit is flipped or
-not by a coin of its own for each value of the digits before it (Owen 1995, Randomly permuted (t,m,s)-nets and
-(t,s)-sequences). Each point is then uniform on its own, so every sum over N of them has the right mean, and independent
-scramblings show its spread. Sums over nets of that scrambling become normal (Loh 2003, On the asymptotic distribution
-of scrambled net quadrature), as Student's intervals of a few replicates take for granted. With few points they can be
-skewed, and the intervals of such a ray hold in 93 % of all runs. A random matrix with a digital shift has the same
-variance but rarely a large error, often next to none: kurtosis 50 at 128 points of a light in a penumbra, where nested
-scrambling has -0.2, and intervals that hold in 99 % of all runs.
+**Points of the unit square.** They are Sobol's in base 2, scrambled at random: in each coordinate a
+digit is flipped or not by a coin of its own for each value of the digits before it (Owen 1995,
+Randomly permuted (t,m,s)-nets and (t,s)-sequences). Each point is then uniform on its own, so every
+sum over N of them has the right mean, and independent scramblings show its spread. Sums over nets
+of that scrambling become normal (Loh 2003, On the asymptotic distribution of scrambled net
+quadrature), as Student's intervals of a few replicates take for granted. With few points they can
+be skewed, and the intervals of such a ray hold in 93 % of all runs. A random matrix with a digital
+shift has the same variance but rarely a large error, often next to none: kurtosis 50 at 128 points
+of a light in a penumbra, where nested scrambling has -0.2, and intervals that hold in 99 % of all
+runs.
 
-**Pairs.** A smooth function of the first coordinate alone leaves N^-3/2 of a scrambled net, since each point is
-anywhere in its stratum. Two points of a stratum of twice the width, mirrored at its middle, leave nothing of what is
-linear there, and N^-5/2 of what is smooth; at a kink they leave N^-2 (Owen 2008, Local antithetic sampling with
-scrambled nets). With the other coordinate mirrored, 1 - v, what is linear in that goes too. Points that are pairs for
-one N are none for another: each number of points therefore has its own set.
+**Pairs.** A smooth function of the first coordinate alone leaves N^-3/2 of a scrambled net, since
+each point is anywhere in its stratum. Two points of a stratum of twice the width, mirrored at its
+middle, leave nothing of what is linear there, and N^-5/2 of what is smooth; at a kink they leave
+N^-2 (Owen 2008, Local antithetic sampling with scrambled nets). With the other coordinate mirrored,
+1 - v, what is linear in that goes too. Points that are pairs for one N are none for another: each
+number of points therefore has its own set.
 
-The light of a sphere is smooth, and periodic in an angle. There a lattice does better, (i, 1555 i)/N modulo 1, with a
-random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and in the order of the mirrored digits of i,
-so that every power of two of them is a lattice. For every N from 16 to 16384 the shortest frequency that all N points
-see alike is at least 0.76 sqrt(N).
+The light of a sphere is smooth, and periodic in an angle. There a lattice does better, (i, 1555
+i)/N modulo 1, with a random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and
+in the order of the mirrored digits of i, so that every power of two of them is a lattice. For every
+N from 16 to 16384 the shortest frequency that all N points see alike is at least 0.76 sqrt(N).
 
-**Rays.** If all rays had the same points, their errors would be the same too, and the mean of an image no more exact
-than one pixel. Each ray therefore has random digits of its own, by which its points are moved: the exclusive or of the
-digits of coordinates, or a sum modulo 1 in a lattice. A scrambled net, a mirrored pair and a lattice remain what they
-are. Whatever the points before they are moved, each is uniform afterwards, so the mean over the moves is the integral:
-errors of two rays are uncorrelated, and the mean over M rays has the variance of one over M.
+**Rays.** If all rays had the same points, their errors would be the same too, and the mean of an
+image no more exact than one pixel. Each ray therefore has random digits of its own, by which its
+points are moved: the exclusive or of the digits of coordinates, or a sum modulo 1 in a lattice. A
+scrambled net, a mirrored pair and a lattice remain what they are. Whatever the points before they
+are moved, each is uniform afterwards, so the mean over the moves is the integral: errors of two
+rays are uncorrelated, and the mean over M rays has the variance of one over M.
 """
 
 from collections.abc import Callable, Mapping
@@ -59,7 +65,8 @@ Index = NDArray[np.int64]
 Kept = Mapping[str, Array]
 Keep = Callable[[str, Callable[[], Kept]], Kept]
 
-FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
+#: of the mean over rays: below this a ray's error need not be small relative to its value
+FLOOR = 0.05
 PILOT = "pilot-"  #: the name of the part of the work that decides
 _PILOT_SEED = 1 << 30  # apart from the seeds of points that count
 REPLICATES = 8  #: independent scramblings
@@ -74,11 +81,13 @@ _RATE = 1.25  # the power of 1/N by which a standard error is foreseen to fall
 class PointPlan:
     """How many points stand for a light."""
 
-    error: float = 1e-3  #: standard error over value for which a pilot chooses the points of a ray; 0: all points
+    #: standard error over value for which a pilot chooses the points of a ray; 0: all points
+    error: float = 1e-3
     first: int = 16  #: points of each replicate that every ray gets, a power of two
     most: int = 1024  #: points that no ray or surface point exceeds, a power of two
     seed: int = 0  #: of the scramblings
-    surfaces: bool = True  #: whether surfaces get the light; if not, theirs is that of other lights alone
+    #: whether surfaces get the light; if not, theirs is that of other lights alone
+    surfaces: bool = True
 
     @property
     def rounds(self) -> int:
@@ -90,7 +99,9 @@ class PointPlan:
         """How many points a ray takes at least and at most: of all replicates, with its pilots."""
         if not self.decides:
             return REPLICATES * self.most, REPLICATES * self.most
-        return REPLICATES * (sum(self.pilots[:1]) + self.first), REPLICATES * (sum(self.pilots) + self.most)
+        return REPLICATES * (sum(self.pilots[:1]) + self.first), REPLICATES * (
+            sum(self.pilots) + self.most
+        )
 
     @property
     def decides(self) -> bool:
@@ -110,8 +121,8 @@ class PointPlan:
 def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:
     """Return the points of the unit square of a replicate of a light, (plan.most, 2) [1].
 
-    `plan`: how many, and the seed; `number`: of the light; `replicate`: number of the replicate; `kind`: of the light,
-    or "pairs" for points by twos, mirrored.
+    `plan`: how many, and the seed; `number`: of the light; `replicate`: number of the replicate;
+    `kind`: of the light, or "pairs" for points by twos, mirrored.
     """
     generator = np.random.default_rng((plan.seed, number, replicate))
     if kind == "pairs" and plan.most > 1:
@@ -119,16 +130,22 @@ def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Ar
         u, v = square_points(replace(plan, most=half), number, replicate, "").T
         stratum = np.floor(half * u)  # one point in each, moved to its lower half
         u = 0.5 * (stratum / half + u)
-        return np.stack([np.concatenate([u, (2 * stratum + 1) / half - u]), np.concatenate([v, 1 - v])], axis=1)
+        return np.stack(
+            [np.concatenate([u, (2 * stratum + 1) / half - u]), np.concatenate([v, 1 - v])], axis=1
+        )
     if kind == "sphere":
         return _folded(_lattice(plan.most) + generator.random(2))
     digits = max(1, plan.most - 1).bit_length()
-    sobol = (scipy.stats.qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(np.int64)
+    sobol = (scipy.stats.qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(
+        np.int64
+    )
     return np.stack([_scrambled(column, digits, generator) for column in sobol.T], axis=1)
 
 
 def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Generator) -> Array:
-    """Scramble the first binary digits of numbers, (n,), all different: what follows them is random."""
+    """Scramble the first binary digits of numbers, (n,), all different:
+    what follows them is random.
+    """
     flips = np.zeros_like(numbers)
     for digit in range(digits):
         before, place = numbers >> (digits - digit), digits - digit - 1
@@ -137,7 +154,9 @@ def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Gen
 
 
 def _lattice(count: int) -> Array:
-    """Return the points of a lattice, of which every power of two is one, (count, 2), the second not modulo 1."""
+    """Return the points of a lattice, of which every power of two is one, (count, 2),
+    the second not modulo 1.
+    """
     return np.array([mirrored_digits(i) for i in range(count)])[:, None] * _LATTICE
 
 
@@ -163,7 +182,9 @@ class RayPoints:
         if kind == "sphere":
             square = np.tile(_lattice(plan.most), (REPLICATES, 1))
         else:
-            square = np.concatenate([square_points(plan, number, replicate, kind) for replicate in replicates])
+            square = np.concatenate(
+                [square_points(plan, number, replicate, kind) for replicate in replicates]
+            )
         generator = np.random.default_rng((plan.seed, number, plan.most, part, _MOVES))
         return cls(square, generator.random((rays, REPLICATES, 2)), kind)
 
@@ -180,7 +201,9 @@ class RayPoints:
 
 
 def mirrored_digits(number: int) -> float:
-    """Return a number with its binary digits mirrored at the point: the first 2^k of them are a lattice."""
+    """Return a number with its binary digits mirrored at the point: the first
+    2^k of them are a lattice.
+    """
     return float(int(f"{number:032b}"[::-1], 2)) / 2.0**32
 
 
@@ -188,12 +211,14 @@ Sums = Callable[[str, PointPlan, Index], Array]
 
 
 def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tuple[Array, Index]:
-    """Return the means of every ray and replicate, (rays, columns, replicates), and of how many points, (rays,).
+    """Return the means of every ray and replicate, (rays, columns, replicates), and of
+    how many points, (rays,).
 
-    `rays`: how many; `known`: what else they receive, to which errors are relative too, (rays, columns); `plan`: the
-    error to reach, and how many points a ray has; `sums`: called with `PILOT`, or an empty name for what counts, the
-    plan with its seed and as many points, `most`, as these rays get, and the numbers of some rays; returns what all
-    points give in each replicate, added up, (rays, columns, replicates).
+    `rays`: how many; `known`: what else they receive, to which errors are relative too, (rays,
+    columns); `plan`: the error to reach, and how many points a ray has; `sums`: called with
+    `PILOT`, or an empty name for what counts, the plan with its seed and as many points, `most`, as
+    these rays get, and the numbers of some rays; returns what all points give in each replicate,
+    added up, (rays, columns, replicates).
     """
     counts = np.full(rays, plan.most)
     if plan.decides:
@@ -218,7 +243,9 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
         if floor is None:
             floor = FLOOR * value.mean(axis=0)
         # The largest of the channels: standard error over the one that is allowed.
-        excess = (standard_error(mean) / (plan.error * np.maximum(value, floor) + np.finfo(float).tiny)).max(axis=1)
+        excess = (
+            standard_error(mean) / (plan.error * np.maximum(value, floor) + np.finfo(float).tiny)
+        ).max(axis=1)
         needed = np.clip(count * excess ** (1 / _RATE) / plan.first, 1.0, plan.most / plan.first)
         near = needed * plan.first <= _AHEAD * count
         foreseen = plan.first << np.ceil(np.log2(needed)).astype(int)

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Media in convex bounds along rays, in float64: segments, optical depths, and where shadow segments have kinks.
+"""Media in convex bounds along rays, in float64: segments, optical depths, and where
+shadow segments have kinks.
 
 The bodies are disjoint, so the optical depth between two points of a ray is
 
     tau = sigma_0 l + sum_j (sigma_j - sigma_0) l_j,
 
-l the distance, l_j what lies in body j, sigma_0 the extinction of what surrounds the bodies. A body holds one interval
-[enter, leave] of a straight line; l_j is the part of it between the points.
+l the distance, l_j what lies in body j, sigma_0 the extinction of what surrounds the bodies. A body
+holds one interval [enter, leave] of a straight line; l_j is the part of it between the points.
 
-In the plane of a ray and a light (`reference.visibility.planes`) a body is a convex polygon or a disk, and as x moves
-along the ray, the part of the shadow segment in it is an analytic function of x until the segment passes a corner of
-the polygon, or becomes a tangent of the disk. Such a point (z, y) matters only between ray and light, and the segment
-passes it at the x to which the map of the plane takes it.
+In the plane of a ray and a light (`reference.visibility.planes`) a body is a convex polygon or a
+disk, and as x moves along the ray, the part of the shadow segment in it is an analytic function of
+x until the segment passes a corner of the polygon, or becomes a tangent of the disk. Such a point
+(z, y) matters only between ray and light, and the segment passes it at the x to which the map of
+the plane takes it.
 """
 
 from dataclasses import dataclass
@@ -34,19 +36,23 @@ _BLOCK = 1 << 21  # numbers in one block of rays and edges
 
 @dataclass(frozen=True)
 class Segments:
-    """The parts of rays and their media; arrays of shape (slots, rays), empty parts have start >= end."""
+    """The parts of rays and their media; arrays of shape (slots, rays), empty
+    parts have start >= end.
+    """
 
     start: Array  #: distance from the origin [m]
     end: Array  #: may be infinite [m]
     medium: Index  #: number in `ReferenceScene.media`, or `AMBIENT`
 
 
-def depth_through_media(reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def depth_through_media(
+    reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array
+) -> Array:
     """Return the optical depth of parts of rays where all media are homogeneous.
 
-    `reference`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3);
-    `low`, `high`: distances of the ends from the origin, (n,), finite [m]. Returns `tau`: optical depth of each
-    channel, (n, 3), 0 where high <= low.
+    `reference`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit
+    vectors, (n, 3); `low`, `high`: distances of the ends from the origin, (n,), finite [m]. Returns
+    `tau`: optical depth of each channel, (n, 3), 0 where high <= low.
 
     Valid for any points, inside or outside of the media.
     """
@@ -59,17 +65,28 @@ def depth_through_media(reference: ReferenceScene, origin: Array, direction: Arr
 
 
 def camera_segments(reference: ReferenceScene, distance: Array) -> Segments:
-    """Return the parts of the camera rays before `distance`, (pixels,) [m], that lie in media that scatter.
+    """Return the parts of the camera rays before `distance`, (pixels,) [m], that
+    lie in media that scatter.
 
-    The slots of a ray hold the bodies in the order in which it passes them, and what lies before, between and behind.
+    The slots of a ray hold the bodies in the order in which it passes them, and what lies
+    before, between and behind.
     """
-    spans = [crossings(medium.bounds, reference.origin, reference.direction) for medium in reference.media]
+    spans = [
+        crossings(medium.bounds, reference.origin, reference.direction)
+        for medium in reference.media
+    ]
     enter, leave = np.array(spans).reshape(len(spans), 2, len(distance)).swapaxes(0, 1)
     enter, leave = np.maximum(enter, 0.0), np.minimum(leave, distance)
     # Bodies that a ray misses come last, as nothing at the end of the ray.
-    enter, leave = np.where(enter < leave, enter, distance), np.where(enter < leave, leave, distance)
+    enter, leave = (
+        np.where(enter < leave, enter, distance),
+        np.where(enter < leave, leave, distance),
+    )
     order = np.argsort(enter, axis=0, kind="stable")
-    enter, leave = np.take_along_axis(enter, order, axis=0), np.take_along_axis(leave, order, axis=0)
+    enter, leave = (
+        np.take_along_axis(enter, order, axis=0),
+        np.take_along_axis(leave, order, axis=0),
+    )
     if not np.any(reference.medium.sigma_t * reference.medium.albedo > 0):
         return Segments(enter, leave, order)
     start = np.concatenate([np.zeros((1, len(distance))), leave, enter])
@@ -79,7 +96,9 @@ def camera_segments(reference: ReferenceScene, distance: Array) -> Segments:
 
 
 def scattering_range(segments: Segments) -> tuple[Array, Array]:
-    """Return the first and the last distance of each ray at which a medium scatters, (rays,) [m]; low >= high: none."""
+    """Return the first and the last distance of each ray at which a medium scatters,
+    (rays,) [m]; low >= high: none.
+    """
     empty = segments.start >= segments.end
     low = np.min(np.where(empty, np.inf, segments.start), axis=0)
     high = np.max(np.where(empty, -np.inf, segments.end), axis=0)
@@ -87,10 +106,11 @@ def scattering_range(segments: Segments) -> tuple[Array, Array]:
 
 
 def shadow_kinks(bounds: Bounds, rays: Rays) -> tuple[Index, Array]:
-    """Return where on rays the shadow segment has kinks: where it passes a corner of a body or touches it.
+    """Return where on rays the shadow segment has kinks: where it passes a corner
+    of a body or touches it.
 
-    `bounds`: the body; `rays`: the rays in their planes with lights. Returns `ray`, `x`: number of the ray and distance
-    of each kink [m], in no particular order.
+    `bounds`: the body; `rays`: the rays in their planes with lights. Returns `ray`, `x`: number of
+    the ray and distance of each kink [m], in no particular order.
     """
     if isinstance(bounds, Sphere):
         find, step = partial(_tangents, bounds), _BLOCK
@@ -110,7 +130,9 @@ def shadow_kinks(bounds: Bounds, rays: Rays) -> tuple[Index, Array]:
 
 
 def _corners(body: Polyhedron, rays: Rays) -> tuple[Index, Array, Array]:
-    """Return where the edges of a polyhedron meet the planes of rays and lights: numbers of the rays, z and y."""
+    """Return where the edges of a polyhedron meet the planes of rays and lights:
+    numbers of the rays, z and y.
+    """
     ends = body.edge - rays.origin
     across = -rays.normal
     normal = np.cross(rays.direction, across)
@@ -122,7 +144,9 @@ def _corners(body: Polyhedron, rays: Rays) -> tuple[Index, Array, Array]:
 
 
 def _tangents(sphere: Sphere, rays: Rays) -> tuple[Index, Array, Array]:
-    """Return where tangents from the lights touch the disks of a sphere (`reference.visibility.shadows`)."""
+    """Return where tangents from the lights touch the disks of a sphere
+    (`reference.visibility.shadows`).
+    """
     centre, across = sphere.centre - rays.origin, -rays.normal
     beside = np.cross(rays.direction, across) @ centre
     c_z, c_y = rays.direction @ centre, across @ centre

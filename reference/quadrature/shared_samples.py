@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Even points on area lights, for sums that all rays share: point lights with the cosine to the normal as profile.
+"""Even points on area lights, for sums that all rays share: point lights with the cosine
+to the normal as profile.
 
-The radiance Le of an element dA of the surface, seen under the angle whose cosine to its normal is cos_l, is the
-intensity Le cos_l dA. The points are uniform on the surface, so one of N stands for the area A/N. They come from the
-unit square by maps that keep areas: a rectangle as it is; a disk by concentric squares (Shirley, Chiu 1997, A low
-distortion map between disk and square, J. Graphics Tools 2(3)); a sphere by its heights and azimuths (Archimedes); a
-triangle of a mesh by the root of how far they are from a corner.
+The radiance Le of an element dA of the surface, seen under the angle whose cosine to its normal is
+cos_l, is the intensity Le cos_l dA. The points are uniform on the surface, so one of N stands for
+the area A/N. They come from the unit square by maps that keep areas: a rectangle as it is; a disk
+by concentric squares (Shirley, Chiu 1997, A low distortion map between disk and square, J. Graphics
+Tools 2(3)); a sphere by its heights and azimuths (Archimedes); a triangle of a mesh by the root of
+how far they are from a corner.
 """
 
 from collections.abc import Sequence
@@ -23,13 +25,16 @@ Array = NDArray[np.float64]
 def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[ReferenceLight]:
     """Return the points of a light as lights whose mean is the light.
 
-    `light`: the light; `square`: points of the unit square, (n, 2) [1]. Returns each with the intensity radiance times
-    the whole area [W/sr].
+    `light`: the light; `square`: points of the unit square, (n, 2) [1]. Returns each with the
+    intensity radiance times the whole area [W/sr].
     """
     if light.kind == "sphere":
         height, azimuth = 1 - 2 * square[:, 0], 2 * np.pi * square[:, 1]
         across = np.sqrt(np.maximum(1 - height**2, 0.0))
-        normals = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1) @ light.frame
+        normals = (
+            np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1)
+            @ light.frame
+        )
         places = light.centre + light.radius * normals
     elif light.kind == "mesh":
         chosen = choose_by_area(light, square)

@@ -6,20 +6,24 @@ A sky of the radiance Ls shines from all directions w'. Along a camera ray w
     L = int_0^d  exp(-tau(o, x)) sigma_s(x)  1/(4 pi) int p(w . w') V(x, w') exp(-tau(x, w')) Ls dw'  dx
       = int  K(w')  Ls dw',
 
-where K(w') is what the ray receives of a directional light of irradiance 1 from w': the integrals change places, and
-every K is exact (`reference.quadrature.light_airlight`): lit intervals by geometry, height fog in closed form, pieces
-of bounded media with an error that is added up. Surfaces have f cos in the place of the phase function. One integral
-remains, over the sphere of directions. It is taken by a lattice of directions, even in the solid angle, in
-eight replicates whose spread is its standard error (`reference.quadrature.replicates`). K is smooth in w' where nothing
-stands in the light and bounds have no edges; an edge costs digits, and no pixel is without an error.
+where K(w') is what the ray receives of a directional light of irradiance 1 from w': the integrals
+change places, and every K is exact (`reference.quadrature.light_airlight`): lit intervals by
+geometry, height fog in closed form, pieces of bounded media with an error that is added up.
+Surfaces have f cos in the place of the phase function. One integral remains, over the sphere of
+directions. It is taken by a lattice of directions, even in the solid angle, in eight replicates
+whose spread is its standard error (`reference.quadrature.replicates`). K is smooth in w' where
+nothing stands in the light and bounds have no edges; an edge costs digits, and no pixel is without
+an error.
 
 It follows at once:
 
-- In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite, and nothing of it
-  arrives: the scattered light is 0, as is the sky seen through it. Such a scene has no sky (`ReferenceScene.sky`).
-- In height fog the paths from directions at and below the horizon end at the floor of the fog. Without a floor they
-  would be infinitely deep. Under an isotropic phase function the light scattered at a height z, with the column C above
-  and B below it, is Ls (E_2(C) + E_2(B))/2, E_2 the exponential integral: it checks the sum.
+- In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite,
+  and nothing of it arrives: the scattered light is 0, as is the sky seen through it. Such a scene
+  has no sky (`ReferenceScene.sky`).
+- In height fog the paths from directions at and below the horizon end at the floor of the fog.
+  Without a floor they would be infinitely deep. Under an isotropic phase function the light
+  scattered at a height z, with the column C above and B below it, is Ls (E_2(C) + E_2(B))/2, E_2
+  the exponential integral: it checks the sum.
 """
 
 from collections.abc import Callable
@@ -61,9 +65,9 @@ def sky_light(
 ) -> SkyLight:
     """Compute what a uniform sky adds to airlight and surfaces along every ray.
 
-    `reference`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in the light; `plan`:
-    the most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the fraction
-    of the work that is done.
+    `reference`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in
+    the light; `plan`: the most directions of a replicate, its seed, and whether surfaces get the
+    light; `tell`: called with the fraction of the work that is done.
     """
     assert reference.sky is not None
     count, most = len(hits.distance), min(plan.most, _MOST)
@@ -72,7 +76,9 @@ def sky_light(
     point = reference.origin + hits.distance[visible, None] * reference.direction[visible]
     start = np.zeros(len(visible))
     left = np.exp(
-        -optical_depth(reference, reference.origin, reference.direction[visible], start, hits.distance[visible])
+        -optical_depth(
+            reference, reference.origin, reference.direction[visible], start, hits.distance[visible]
+        )
     )
     reflection = Reflection(hits.interaction)
     for replicate in range(REPLICATES):
@@ -85,7 +91,9 @@ def sky_light(
             lit = received.reached[visible]
             row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
             if len(row):
-                through = optical_depth(reference, point[lit], towards, start[lit], np.full(len(row), UNBOUNDED))
+                through = optical_depth(
+                    reference, point[lit], towards, start[lit], np.full(len(row), UNBOUNDED)
+                )
                 radiance = reflection(row, towards) * np.exp(-through) * left[lit] * sun.irradiance
                 replicates[row, 3:, replicate] += radiance
             tell((replicate + (number + 1) / most) / REPLICATES)
@@ -93,7 +101,9 @@ def sky_light(
 
 
 def _directions(square: Array) -> Array:
-    """Return the directions in which the suns shine, unit vectors, even in the solid angle, (n, 3)."""
+    """Return the directions in which the suns shine, unit vectors, even in
+    the solid angle, (n, 3).
+    """
     height, azimuth = 1 - 2 * square[:, 0], 2 * np.pi * square[:, 1]
     across = np.sqrt(np.maximum(1 - height**2, 0.0))
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1)

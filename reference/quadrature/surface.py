@@ -3,9 +3,10 @@
 
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
-with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment (see
-`reference.quadrature.ray_values`). Through bounded media the optical depth is that of both ways piece by piece. A
-directional light has its irradiance in the place of I / r^2, and an unbounded shadow segment: only bodies dim it.
+with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment
+(see `reference.quadrature.ray_values`). Through bounded media the optical depth is that of both
+ways piece by piece. A directional light has its irradiance in the place of I / r^2, and an
+unbounded shadow segment: only bodies dim it.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,8 @@ from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-UNBOUNDED = float(np.finfo(float).max)  #: how far the shadow segment of a directional light goes [m]
+#: how far the shadow segment of a directional light goes [m]
+UNBOUNDED = float(np.finfo(float).max)
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,17 @@ class SurfaceHits:
 
 def surface_hits(reference: ReferenceScene) -> SurfaceHits:
     """Cast the pixel-centre rays from the pinhole."""
-    ray = mi.Ray3f(mi.Point3f(*(float(c) for c in reference.origin)), dr.normalize(mi.Vector3f(reference.direction.T)))
+    ray = mi.Ray3f(
+        mi.Point3f(*(float(c) for c in reference.origin)),
+        dr.normalize(mi.Vector3f(reference.direction.T)),
+    )
     dr.make_opaque(ray)  # one kernel for all cameras
     interaction = reference.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
     dr.eval(interaction)  # whatever is read of it
     valid = np.array(interaction.is_valid(), dtype=bool)
-    return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
+    return SurfaceHits(
+        np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction
+    )
 
 
 @dataclass(frozen=True)
@@ -54,22 +61,29 @@ class Reflection:
     interaction: Any  #: Mitsuba's surface interactions
 
     def __call__(self, ray: Index, towards: Array) -> Array:
-        """Return f cos_s, (n, 3) [1/sr], where rays of these numbers hit, for light from unit directions, (n, 3)."""
+        """Return f cos_s, (n, 3) [1/sr], where rays of these numbers hit, for light from
+        unit directions, (n, 3).
+        """
         at = dr.gather(mi.SurfaceInteraction3f, self.interaction, on_device(mi.UInt32, ray))
         local = at.to_local(dr.normalize(vectors(mi.Vector3f, towards)))
         return as_rows(at.bsdf().eval(mi.BSDFContext(), at, local))
 
 
 def lit_surface(
-    reference: ReferenceScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
+    reference: ReferenceScene,
+    hits: SurfaceHits,
+    *,
+    reached: Sequence[NDArray[np.bool_]],
+    shadow_scale: float = 1.0,
 ) -> Array:
-    """Return the radiance of the surface at each pixel centre that point, spot and directional lights give it.
+    """Return the radiance of the surface at each pixel centre that point, spot and
+    directional lights give it.
 
     In W/(m^2 sr), (pixels, 3).
 
-    `reference`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones last, whether it
-    reaches the surface at the end of each ray, as its lit intervals say; `shadow_scale`: see
-    `reference.quadrature.ray_values`.
+    `reference`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones
+    last, whether it reaches the surface at the end of each ray, as its lit intervals say;
+    `shadow_scale`: see `reference.quadrature.ray_values`.
     """
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))
@@ -77,14 +91,18 @@ def lit_surface(
         return total
     far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
     point = reference.origin + far[:, None] * reference.direction
-    to_camera = optical_depth(reference, reference.origin, reference.direction, np.zeros(len(far)), far)
+    to_camera = optical_depth(
+        reference, reference.origin, reference.direction, np.zeros(len(far)), far
+    )
     emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-        reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
+        reflected = interaction.bsdf().eval(
+            mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing
+        )
         radiance = as_rows(reflected * arriving)
         if isinstance(light, DirectionalLight):
             way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), UNBOUNDED)

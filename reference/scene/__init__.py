@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A Mitsuba scene as numbers in float64: what all estimators of the reference may share.
 
-These are facts that Mitsuba reports. Each estimator derives for itself what follows from them along a ray.
+These are facts that Mitsuba reports. Each estimator derives for itself what
+follows from them along a ray.
 
 Read in this order:
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Area lights: Mitsuba's `area` emitters of constant radiance on rectangles, disks, spheres and meshes.
+"""Area lights: Mitsuba's `area` emitters of constant radiance on rectangles,
+disks, spheres and meshes.
 
-A rectangle, a disk and a triangle emit from the side of their normal, a sphere outwards. Normals at vertices, which
-only smooth the look of a mesh, say which side of its triangles that is, and nothing more. The material is opaque (the
-shape is a surface like others, most often a black one) or `null` (the shape is nothing but its emission).
+A rectangle, a disk and a triangle emit from the side of their normal, a sphere outwards. Normals at
+vertices, which only smooth the look of a mesh, say which side of its triangles that is, and nothing
+more. The material is opaque (the shape is a surface like others, most often a black one) or `null`
+(the shape is nothing but its emission).
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,9 @@ from airlight.reference.scene.transforms import SAME, matrix_of, outwards
 Array = NDArray[np.float64]
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
-_LIFT = 1e-9  # of a mesh's size and place: how far before its triangles its light starts, so that they do not hide it
+# of a mesh's size and place: how far before its triangles its light starts, so
+# that they do not hide it
+_LIFT = 1e-9
 _CONVEX = 1e-6  # of the same: corners this far before a triangle are in its plane; float32
 _PAIRS = 1e9  # triangles times corners that are looked at to see whether a mesh is convex
 _BITS = 16  # of a coordinate by which triangles are put in order
@@ -32,14 +36,20 @@ class ReferenceAreaLight:
 
     kind: str  #: "rectangle", "disk", "sphere" or "mesh"
     centre: Array  #: [m], (3,)
-    frame: Array  #: unit vectors as rows, (3, 3): along both sides, and the normal of the side that emits
-    half: Array  #: half of both sides, (2,) [m]; of a disk and a sphere twice the radius, of a mesh of a ball around it
+    #: unit vectors as rows, (3, 3): along both sides, and the normal of the side that emits
+    frame: Array
+    #: half of both sides, (2,) [m]; of a disk and a sphere twice the radius, of a
+    #: mesh of a ball around it
+    half: Array
     radiance: Array  #: [W/(m^2 sr)], RGB
-    opaque: bool  #: whether the shape is a surface too; else it is `null`, and neither shadows nor ends rays
+    #: whether the shape is a surface too; else it is `null`, and neither shadows nor ends rays
+    opaque: bool
     shape: Any  #: Mitsuba's shape
-    #: of a mesh, a hair before where they are, counter-clockwise from the side that emits, (triangles, 3, 3) [m]
+    #: of a mesh, a hair before where they are, counter-clockwise from the side that
+    #: emits, (triangles, 3, 3) [m]
     triangles: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
-    shadows_itself: bool = False  #: whether its shape is opaque, and parts of it can stand in the light of others
+    #: whether its shape is opaque, and parts of it can stand in the light of others
+    shadows_itself: bool = False
 
     @property
     def name(self) -> str:
@@ -78,7 +88,9 @@ class ReferenceAreaLight:
 
 
 def triangle_normals(triangles: Array) -> Array:
-    """Return vectors along the normals of triangles, twice as long as these are large, (triangles, 3) [m^2]."""
+    """Return vectors along the normals of triangles, twice as long as these are
+    large, (triangles, 3) [m^2].
+    """
     return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
@@ -95,19 +107,25 @@ def is_area(emitter: Any) -> bool:
 def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     """Read an area light.
 
-    `emitter`: Mitsuba's; `camera`: position of the camera [m], (3,). Raises InputError by the name of the shape: for
-    other shapes, textures, shapes without area or with different scales, a sphere that is inside out or holds the
-    camera, and a light that bounds a medium.
+    `emitter`: Mitsuba's; `camera`: position of the camera [m], (3,). Raises InputError by the name
+    of the shape: for other shapes, textures, shapes without area or with different scales, a sphere
+    that is inside out or holds the camera, and a light that bounds a medium.
     """
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())
     if kind is None and not shape.is_mesh():
-        raise _refusal(shape, f"is a {shape.class_name().lower()}", "a rectangle, a disk, a sphere, or a mesh")
+        raise _refusal(
+            shape, f"is a {shape.class_name().lower()}", "a rectangle, a disk, a sphere, or a mesh"
+        )
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise _refusal(shape, "has a texture as radiance", "one radiance: give its mean as 'rgb'")
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
-        raise _refusal(shape, "bounds a medium", "two shapes, one that emits and one of material 'null' for the medium")
+        raise _refusal(
+            shape,
+            "bounds a medium",
+            "two shapes, one that emits and one of material 'null' for the medium",
+        )
     radiance = colour(parameters["radiance.value"], f"light '{shape.id()}': its radiance")
     opaque = shape.bsdf().class_name() != "Null"
     if kind is None:
@@ -116,7 +134,11 @@ def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     frame, half = _sides(shape, kind, matrix)
     light = ReferenceAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + SAME):
-        raise _refusal(shape, "holds the camera", "a camera outside of lights: move it, or make the sphere smaller")
+        raise _refusal(
+            shape,
+            "holds the camera",
+            "a camera outside of lights: move it, or make the sphere smaller",
+        )
     return light
 
 
@@ -142,14 +164,22 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     size = radius + float(np.abs(centre).max())
     triangles = corners[faces] + _LIFT * size * normal[:, None]
     hides = opaque and not _is_convex(corners[faces][:, 0], normal, known, _CONVEX * size)
-    light = ReferenceAreaLight("mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape)
-    return replace(light, triangles=triangles[_neighbours(triangles.mean(axis=1))], shadows_itself=hides)
+    light = ReferenceAreaLight(
+        "mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape
+    )
+    return replace(
+        light, triangles=triangles[_neighbours(triangles.mean(axis=1))], shadows_itself=hides
+    )
 
 
 def _neighbours(place: Array) -> NDArray[np.int64]:
-    """Return an order of points, (n, 3), where neighbours follow one another, that of their bits in turn (Morton)."""
+    """Return an order of points, (n, 3), where neighbours follow one another, that of
+    their bits in turn (Morton).
+    """
     low, high = place.min(axis=0), place.max(axis=0)
-    cell = ((place - low) / max(float((high - low).max()), np.finfo(float).tiny) * ((1 << _BITS) - 1)).astype(np.int64)
+    cell = (
+        (place - low) / max(float((high - low).max()), np.finfo(float).tiny) * ((1 << _BITS) - 1)
+    ).astype(np.int64)
     code = np.zeros(len(place), np.int64)
     for bit in range(_BITS):
         for axis in range(3):
@@ -158,13 +188,17 @@ def _neighbours(place: Array) -> NDArray[np.int64]:
 
 
 def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool:
-    """Return whether no point of a mesh is before one of its triangles; no for one too large to look."""
+    """Return whether no point of a mesh is before one of its triangles; no
+    for one too large to look.
+    """
     if float(len(corner)) * len(known) > _PAIRS:
         return False
     step = max(1, (1 << 22) // len(known))
     blocks = (slice(first, first + step) for first in range(0, len(corner), step))
     level = np.sum(corner * normal, axis=1)
-    return all(((normal[block] @ known.T).max(axis=1) <= level[block] + slack).all() for block in blocks)
+    return all(
+        ((normal[block] @ known.T).max(axis=1) <= level[block] + slack).all() for block in blocks
+    )
 
 
 def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
@@ -178,7 +212,9 @@ def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
     if np.abs(unit @ unit.T - np.eye(len(unit))).max() > SAME:
         raise _refusal(shape, "is sheared", "axes at right angles to each other")
     if kind != "rectangle" and np.ptp(length) > SAME * length.max():
-        raise _refusal(shape, "has different scales along its axes", f"one scale: Mitsuba's {kind} is round")
+        raise _refusal(
+            shape, "has different scales along its axes", f"one scale: Mitsuba's {kind} is round"
+        )
     # Mitsuba says to which side the normal points; in float64 it is at right angles to the sides.
     across = np.cross(unit[0], unit[1])
     if kind == "sphere":

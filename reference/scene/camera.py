@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Camera rays in float64: directions through positions on the film of a perspective camera.
 
-Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane on; near a light this rounding changes
-the airlight by 1e-5. Here directions are derived in units of a pixel on the plane where pixels are squares of size 1; a
-test compares them with `sample_ray`.
+Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane on; near a light this
+rounding changes the airlight by 1e-5. Here directions are derived in units of a pixel on the plane
+where pixels are squares of size 1; a test compares them with `sample_ray`.
 """
 
 import mitsuba as mi
@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
     """Return the unit directions through positions on the film, (n, 3) [1].
 
-    `sensor`: a perspective sensor of Mitsuba; `positions`: columns and rows from the upper left corner, (n, 2)
-    [pixels]: pixel centres end in one half; `size`: width and height of the film [pixels].
+    `sensor`: a perspective sensor of Mitsuba; `positions`: columns and rows from the upper left
+    corner, (n, 2) [pixels]: pixel centres end in one half; `size`: width and height of the film
+    [pixels].
 
     Valid for positions outside of the film too.
     """
@@ -31,7 +32,9 @@ def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
 
 
 def film_positions(sensor, directions: Array, size: tuple[int, int]) -> Array:
-    """Return the positions on the film that directions of any length pass, (n, 2) [pixels]; NaN for those behind it."""
+    """Return the positions on the film that directions of any length pass, (n, 2) [pixels];
+    NaN for those behind it.
+    """
     local = np.linalg.solve(camera_matrix(sensor)[:3, :3], directions.T).T
     focal, principal = _pinhole(sensor, size)
     depth = np.where(local[:, 2] > 0, local[:, 2], np.nan)
@@ -39,9 +42,11 @@ def film_positions(sensor, directions: Array, size: tuple[int, int]) -> Array:
 
 
 def _pinhole(sensor, size: tuple[int, int]) -> tuple[float, Array]:
-    """Return the distance of the film and the position on it that the camera's axis passes, (2,) [pixels].
+    """Return the distance of the film and the position on it that the camera's
+    axis passes, (2,) [pixels].
 
-    Mitsuba adds the offsets of the principal point, in parts of the film, to a position before it looks through it.
+    Mitsuba adds the offsets of the principal point, in parts of the film, to a position
+    before it looks through it.
     """
     parameters = mi.traverse(sensor)
     pixel = 2 * np.tan(0.5 * np.deg2rad(float(parameters["x_fov"][0]))) / size[0]
@@ -50,7 +55,9 @@ def _pinhole(sensor, size: tuple[int, int]) -> tuple[float, Array]:
 
 
 def pixel_centres(size: tuple[int, int]) -> Array:
-    """Return the centres of the pixels of a film of this width and height, row by row, (pixels, 2) [pixels]."""
+    """Return the centres of the pixels of a film of this width and height, row by
+    row, (pixels, 2) [pixels].
+    """
     row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
     return np.stack([column + 0.5, row + 0.5], axis=1)
 

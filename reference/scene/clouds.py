@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a scene of clouds for the reference: media of any order of scattering in closed meshes of any shape.
+"""Reading a scene of clouds for the reference: media of any order of scattering in
+closed meshes of any shape.
 
-Clouds lie in vacuum, apart from one another. Suns are directional emitters, the sky is at most one emitter of
-constant radiance. Other lights are refused by name. The density of a `heterogeneous` cloud is Mitsuba's own volume,
-over its largest value.
+Clouds lie in vacuum, apart from one another. Suns are directional emitters, the sky is at most one
+emitter of constant radiance. Other lights are refused by name. The density of a `heterogeneous`
+cloud is Mitsuba's own volume, over its largest value.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,11 @@ from numpy.typing import NDArray
 
 from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from airlight.reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from airlight.reference.scene.directional_light import (
+    DirectionalLight,
+    is_directional,
+    read_directional,
+)
 from airlight.reference.scene.read import (
     VACUUM,
     ReferenceMedium,
@@ -52,8 +57,8 @@ class CloudDensity:
     def along(self, origin: Array, way: Array, begin: Array, length: Array) -> Array:
         """Return the integral of the density over stretches of rays [m].
 
-        `origin`: where all rays start, (3,) [m]; `way`: unit directions, (n, 3); `begin`, `length`: where stretches
-        begin, and how long they are, (n,) [m].
+        `origin`: where all rays start, (3,) [m]; `way`: unit directions, (n, 3); `begin`, `length`:
+        where stretches begin, and how long they are, (n,) [m].
 
         The midpoint rule with steps of an eighth of a voxel; Mitsuba's values are in float32.
         """
@@ -77,7 +82,8 @@ class Cloud(ReferenceMedium):
     """A medium within a closed surface."""
 
     shape: Any  #: Mitsuba's shape that bounds it
-    density: CloudDensity | None = None  #: over `sigma_t`, the largest extinction; None for a homogeneous medium
+    #: over `sigma_t`, the largest extinction; None for a homogeneous medium
+    density: CloudDensity | None = None
 
     @property
     def name(self) -> str:
@@ -109,26 +115,36 @@ class CloudScene:
 def read_clouds(scene) -> CloudScene:
     """Read a scene of clouds of the current RGB variant.
 
-    Raises InputError for a scene without clouds, sun or sky, or with what has no place among them, by its name.
+    Raises InputError for a scene without clouds, sun or sky, or with what has no place
+    among them, by its name.
     """
     if not scene.sensors():
         raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'")
+        raise InputError(
+            f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
+        )
     suns, sky = _lights(scene)
     opaque, boundaries = sorted_shapes(scene)
     if not boundaries:
-        raise InputError("the scene has no cloud; expected a closed shape of material 'null' with an interior medium")
+        raise InputError(
+            "the scene has no cloud; expected a closed shape of material 'null' with an interior "
+            "medium"
+        )
     for shape in opaque:
         if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta):
             raise InputError(
-                f"shape '{shape.id()}' has a {shape.bsdf().class_name()} material, a mirror: paths cannot find the sun "
+                f"shape '{shape.id()}' has a {shape.bsdf().class_name()} material, a mirror: paths "
+                "cannot find the sun "
                 "in it; expected a rough one"
             )
     for shape in boundaries:
         if shape.exterior_medium() is not None:
-            raise InputError(f"the exterior medium of shape '{shape.id()}' is not vacuum; expected none around clouds")
+            raise InputError(
+                f"the exterior medium of shape '{shape.id()}' is not vacuum; expected none around "
+                "clouds"
+            )
     clouds = tuple(_read_cloud(shape) for shape in boundaries)
     width, height = (int(n) for n in sensor.film().size())
     origin = camera_matrix(sensor)[:3, 3]
@@ -156,13 +172,18 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
             skies.append(np.broadcast_to(given, 3))
         else:
             raise InputError(
-                f"light '{emitter.id()}' is a {emitter.class_name()}; clouds are lit by emitters of type 'directional' "
+                f"light '{emitter.id()}' is a {emitter.class_name()}; clouds are lit by emitters "
+                "of type 'directional' "
                 "and 'constant'"
             )
     if len(skies) > 1:
-        raise InputError(f"the scene has {len(skies)} emitters of type 'constant'; expected at most one sky")
+        raise InputError(
+            f"the scene has {len(skies)} emitters of type 'constant'; expected at most one sky"
+        )
     if not suns and not skies:
-        raise InputError("the scene has no light; expected an emitter of type 'directional' or 'constant'")
+        raise InputError(
+            "the scene has no light; expected an emitter of type 'directional' or 'constant'"
+        )
     return tuple(suns), skies[0] if skies else np.zeros(3)
 
 
@@ -181,10 +202,13 @@ def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
     number = _enclosing(boundaries, origin)
     own = sensor.get_medium()
     if number < 0 and own is not None:
-        raise InputError("the camera references a medium and is in no cloud; remove the medium from the sensor")
+        raise InputError(
+            "the camera references a medium and is in no cloud; remove the medium from the sensor"
+        )
     if number >= 0 and own != boundaries[number].interior_medium():
         raise InputError(
-            f"the camera is inside of shape '{boundaries[number].id()}', but references another medium or none; "
+            f"the camera is inside of shape '{boundaries[number].id()}', but references another "
+            "medium or none; "
             "reference that shape's interior medium in the sensor"
         )
     return number
@@ -193,7 +217,8 @@ def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
 def _enclosing(shapes: list[Any], point: Array) -> int:
     """Return the number of the closed surface around a point, (3,) [m], -1 if there is none.
 
-    A ray from the point meets the surfaces that enclose it an odd number of times; the one met first from inside is it.
+    A ray from the point meets the surfaces that enclose it an odd number of times; the one met
+    first from inside is it.
     """
     scene = scene_from(shapes)
     for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
@@ -204,26 +229,36 @@ def _enclosing(shapes: list[Any], point: Array) -> int:
         if not bool(si.is_valid()[0]) or float(dr.dot(si.n, mi.Vector3f(*direction))[0]) <= 0:
             return -1
     hit = si.shape
-    return next(number for number, shape in enumerate(shapes) if bool((hit == mi.ShapePtr(shape))[0]))
+    return next(
+        number for number, shape in enumerate(shapes) if bool((hit == mi.ShapePtr(shape))[0])
+    )
 
 
 def _read_density(shape: Any, name: str) -> CloudDensity:
     """Return the density within a shape; messages call its medium by `name`.
 
-    Raises InputError for an extinction that is no grid of one channel with finite values of 0 or more, not all 0,
-    around the shape.
+    Raises InputError for an extinction that is no grid of one channel with finite values of 0 or
+    more, not all 0, around the shape.
     """
     medium = shape.interior_medium()
     parameters = mi.traverse(medium)
-    for key, what in (("sigma_t.data", "a grid as its extinction"), ("albedo.value.value", "one albedo everywhere")):
+    for key, what in (
+        ("sigma_t.data", "a grid as its extinction"),
+        ("albedo.value.value", "one albedo everywhere"),
+    ):
         if key not in parameters:
-            raise InputError(f"{name} is heterogeneous without {what}; the reference of clouds wants one")
+            raise InputError(
+                f"{name} is heterogeneous without {what}; the reference of clouds wants one"
+            )
     values, low, high = grid_values(medium, name)
     box = shape.bbox()
     margin = _BEYOND * (high - low)
-    if np.any(np.array(box.min).ravel() < low - margin) or np.any(np.array(box.max).ravel() > high + margin):
+    if np.any(np.array(box.min).ravel() < low - margin) or np.any(
+        np.array(box.max).ravel() > high + margin
+    ):
         raise InputError(
-            f"{name} has a grid that does not cover the shape: it reaches from {_words(low)} to {_words(high)}; "
+            f"{name} has a grid that does not cover the shape: it reaches from {_words(low)} to "
+            f"{_words(high)}; "
             "expected a to_world of the volume whose unit cube holds the shape"
         )
     voxel = float(((high - low) / values.shape[2::-1]).min())

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colours of Mitsuba's lights and media as three numbers, each of which must be one that an image can have."""
+"""Colours of Mitsuba's lights and media as three numbers, each of which must be
+one that an image can have.
+"""
 
 from typing import Any
 
@@ -14,7 +16,8 @@ Array = NDArray[np.float64]
 def colour(value: Any, name: str, *, largest: float = np.inf) -> Array:
     """Return a number or a colour of Mitsuba as RGB, (3,).
 
-    Raises InputError, in which it is called `name`, for what is not finite, below 0, or above the largest value.
+    Raises InputError, in which it is called `name`, for what is not finite, below 0, or
+    above the largest value.
     """
     numbers = np.array(value, dtype=np.float64).reshape(-1)
     if not np.all(np.isfinite(numbers) & (numbers >= 0) & (numbers <= largest)):

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Convex bounds of media in float64: polyhedra and spheres, read from Mitsuba's shapes and checked.
 
-A polyhedron is what its facets' half spaces n . x <= offset have in common. Vertices are float32 numbers, so a facet of
-four corners is only nearly flat; a mesh counts as convex where no vertex lies further outside any facet's plane than
+A polyhedron is what its facets' half spaces n . x <= offset have in common. Vertices are float32
+numbers, so a facet of four corners is only nearly flat; a mesh counts as convex where no vertex
+lies further outside any facet's plane than
 
     size (1e-6 + 4 eps largest coordinate / altitude of the facet),        eps = 2^-24:
 
-what rounding the corners of that facet can do to its plane. Slivers with an altitude below 1e-6 of the size have no
-plane worth the name; their neighbours bound the body without them.
+what rounding the corners of that facet can do to its plane. Slivers with an altitude below 1e-6 of
+the size have no plane worth the name; their neighbours bound the body without them.
 """
 
 from dataclasses import dataclass
@@ -50,25 +51,31 @@ Bounds = Polyhedron | Sphere
 def read_bounds(shape: Any) -> Bounds:
     """Read the bounds of a medium from a shape.
 
-    Raises InputError for a shape that is neither a sphere nor a closed convex mesh whose normals point outwards, by its
-    name.
+    Raises InputError for a shape that is neither a sphere nor a closed convex mesh whose normals
+    point outwards, by its name.
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
         return _read_sphere(shape, matrix_of(parameters["to_world"]))
     if not shape.is_mesh() or "vertex_positions" not in parameters:
-        raise _refusal(shape, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed convex mesh")
+        raise _refusal(
+            shape, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed convex mesh"
+        )
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
     if len(faces) > LARGEST_MESH:
-        raise _refusal(shape, f"has {len(faces)} triangles", f"at most {LARGEST_MESH}: simplify the mesh")
+        raise _refusal(
+            shape, f"has {len(faces)} triangles", f"at most {LARGEST_MESH}: simplify the mesh"
+        )
     return _read_polyhedron(shape, vertices, faces)
 
 
 def _read_sphere(shape: Any, matrix: Array) -> Sphere:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(lengths) > SAME * lengths.max():
-        raise _refusal(shape, "is a sphere with different scales along its axes", "one scale, or a mesh")
+        raise _refusal(
+            shape, "is a sphere with different scales along its axes", "one scale, or a mesh"
+        )
     if shape.has_flipped_normals():
         raise _refusal(shape, "is inside out", outwards(matrix))
     return Sphere(matrix[:3, 3], float(lengths.mean()))
@@ -91,12 +98,15 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
         raise _refusal(
             shape,
             "is inside out",
-            "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too",
+            "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh "
+            "asks for too",
         )
     if shape.has_flipped_normals():
         normal = -normal
     offset = np.mean(np.sum(corner * normal[:, None], axis=2), axis=1)
-    allowed = size * (_FLAT + 2.0**-22 * np.abs(vertices).max() / np.maximum(altitude, _FLAT * size))
+    allowed = size * (
+        _FLAT + 2.0**-22 * np.abs(vertices).max() / np.maximum(altitude, _FLAT * size)
+    )
     for first in range(0, len(faces), 256):
         block = slice(first, first + 256)
         outside = np.max(vertices @ normal[block].T, axis=0) - offset[block]
@@ -104,7 +114,8 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
             raise _refusal(
                 shape,
                 "is not convex",
-                "convex bounds: cut the body into convex parts, or for a cloud take the estimator cloud-paths",
+                "convex bounds: cut the body into convex parts, or for a cloud take the estimator "
+                "cloud-paths",
             )
     if not np.any(sound):
         raise _refusal(shape, "has no volume", "a closed convex mesh")
@@ -114,7 +125,9 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
 
 
 def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
-    """Return the ends of the edges and the two faces beside each; refuse a surface that is not closed."""
+    """Return the ends of the edges and the two faces beside each; refuse a
+    surface that is not closed.
+    """
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     face = np.tile(np.arange(len(faces)), 3)
     lower, upper = ends.min(axis=1), ends.max(axis=1)
@@ -123,7 +136,11 @@ def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
     # In a closed surface every edge comes twice, once in each direction.
     closed = len(ends) % 2 == 0 and np.array_equal(ends[::2], ends[1::2, ::-1])
     if not closed or np.any(lower == upper) or np.any(np.all(ends[2::2] == ends[:-2:2], axis=1)):
-        raise _refusal(shape, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
+        raise _refusal(
+            shape,
+            "is not a closed surface",
+            "a closed convex mesh without doubled or degenerate faces",
+        )
     return ends[::2], np.stack([face[::2], face[1::2]], axis=1)
 
 
@@ -139,16 +156,23 @@ def holds(bounds: Bounds, point: Array) -> bool:
 
 
 def in_surface(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point, (3,) [m], lies in the surface of bounds, as far as float32 can tell."""
+    """Return whether a point, (3,) [m], lies in the surface of bounds, as
+    far as float32 can tell.
+    """
     margin = 1e-6 * float(np.abs(point).max())
     if isinstance(bounds, Sphere):
-        return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin + 1e-6 * bounds.radius)
+        return bool(
+            abs(np.linalg.norm(point - bounds.centre) - bounds.radius)
+            < margin + 1e-6 * bounds.radius
+        )
     furthest = float(np.max(bounds.normal @ point - bounds.offset))
     return abs(furthest) < margin + 1e-6 * float(np.ptp(bounds.offset))
 
 
 def normals_at(bounds: Bounds, points: Array) -> Array:
-    """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges that of one of the facets."""
+    """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges
+    that of one of the facets.
+    """
     if isinstance(bounds, Sphere):
         return (points - bounds.centre) / bounds.radius
     return bounds.normal[np.argmax(points @ bounds.normal.T - bounds.offset, axis=1)]

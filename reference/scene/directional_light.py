@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Directional lights of the reference, such as the sun: direction and irradiance, read from Mitsuba."""
+"""Directional lights of the reference, such as the sun: direction and
+irradiance, read from Mitsuba.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +33,8 @@ def is_directional(emitter) -> bool:
 
 
 def read_directional(emitter) -> DirectionalLight:
-    """Read a directional emitter: its direction from the transform, its irradiance by asking at a point.
+    """Read a directional emitter: its direction from the transform, its
+    irradiance by asking at a point.
 
     Raises InputError for a transform that scales the direction.
     """
@@ -39,8 +42,10 @@ def read_directional(emitter) -> DirectionalLight:
     length = float(np.linalg.norm(axis))
     if abs(length - 1) > SAME:
         raise InputError(
-            f"light '{emitter.id()}' has a to_world that scales its direction by {length:g}, by which Mitsuba "
-            "multiplies its light on surfaces; expected no scale: remove it, or give 'direction' instead of 'to_world'"
+            f"light '{emitter.id()}' has a to_world that scales its direction by {length:g}, by "
+            "which Mitsuba "
+            "multiplies its light on surfaces; expected no scale: remove it, or give 'direction' "
+            "instead of 'to_world'"
         )
     _, arriving = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     irradiance = colour(arriving, f"light '{emitter.id()}': its irradiance")

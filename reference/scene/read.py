@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading a Mitsuba scene for the reference, in float64 NumPy.
 
-`realtime.scene.read_scene` reads the same scene for the methods under test. The two share no code on purpose: this one
-asks Mitsuba's emitters for their intensity and reads the parameters of the medium, where the other does it the other
-way round.
+`realtime.scene.read_scene` reads the same scene for the methods under test. The two share no code
+on purpose: this one asks Mitsuba's emitters for their intensity and reads the parameters of the
+medium, where the other does it the other way round.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,11 @@ from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, rea
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from airlight.reference.scene.colours import colour
 from airlight.reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
-from airlight.reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from airlight.reference.scene.directional_light import (
+    DirectionalLight,
+    is_directional,
+    read_directional,
+)
 from airlight.reference.scene.transforms import SAME, matrix_of, stretch
 from airlight.reference.scene.varying import (
     NO_EXTINCTION,
@@ -93,14 +97,16 @@ class ReferenceScene:
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
-    medium: ReferenceMedium | VaryingMedium  #: around the camera, a vacuum of extinction 0 where there is none
+    #: around the camera, a vacuum of extinction 0 where there is none
+    medium: ReferenceMedium | VaryingMedium
     lights: tuple[ReferenceLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
-    directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
+    #: directional lights; all media then have bounds, or a cap
+    directional: tuple[DirectionalLight, ...] = ()
     area: tuple[ReferenceAreaLight, ...] = ()  #: area lights
     background: Any = None  #: Mitsuba's emitter around the scene, seen behind it; not in `scene`
-    #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None where none arrives:
-    #: through an unbounded homogeneous medium
+    #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None
+    #: where none arrives: through an unbounded homogeneous medium
     sky: Array | None = None
 
     @property
@@ -112,7 +118,8 @@ class ReferenceScene:
 def read_reference(scene) -> ReferenceScene:
     """Read a Mitsuba scene of the current RGB variant.
 
-    Raises InputError for a scene whose reference cannot be computed, with the name of what is in the way.
+    Raises InputError for a scene whose reference cannot be computed, with the
+    name of what is in the way.
     """
     if not scene.sensors():
         raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
@@ -122,10 +129,13 @@ def read_reference(scene) -> ReferenceScene:
     emitters = [emitter for emitter in scene.emitters() if emitter != background]
     far = tuple(emitter for emitter in emitters if is_directional(emitter))
     wide = tuple(emitter for emitter in emitters if is_area(emitter))
-    near = tuple(emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter))
+    near = tuple(
+        emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter)
+    )
     if not far + near + wide and background is None:
         raise InputError(
-            "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+            "the scene has no light; expected at least one emitter of type 'point', 'spot', "
+            "'directional' or 'area'"
         )
     lights = tuple(_read_light(emitter) for emitter in near)
     origin = camera_matrix(sensor)[:3, 3]
@@ -138,18 +148,23 @@ def read_reference(scene) -> ReferenceScene:
     for emitter, sun in zip(far, suns, strict=True):
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(
-                f"light '{emitter.id()}' is directional: nothing of it arrives through a medium without bounds; give "
-                "the medium bounds, a closed convex shape of material 'null' with the medium as its interior"
+                f"light '{emitter.id()}' is directional: nothing of it arrives through a medium "
+                "without bounds; give "
+                "the medium bounds, a closed convex shape of material 'null' with the medium as "
+                "its interior"
             )
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(
-                f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
-                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
+                f"light '{emitter.id()}' is directional and shines from the horizon or below: each "
+                "of its light paths "
+                "through height fog, which has no sides, is infinitely deep; expected a light from "
+                "above the horizon"
             )
     sky = _sky(background, medium)
     if not far + near + wide and sky is None:
         raise InputError(
-            f"light '{background.id()}' is a sky: nothing of it arrives through a medium without bounds; give the "
+            f"light '{background.id()}' is a sky: nothing of it arrives through a medium without "
+            "bounds; give the "
             "medium bounds, or add a light"
         )
     return ReferenceScene(
@@ -180,7 +195,9 @@ def homogeneous_around(reference: ReferenceScene) -> ReferenceMedium:
 
 
 def _background(scene):
-    """Return the emitter around a scene, a sky or the background of lights in it; None without one."""
+    """Return the emitter around a scene, a sky or the background of lights
+    in it; None without one.
+    """
     around = [emitter for emitter in scene.emitters() if emitter.class_name() in _AROUND]
     lights = {emitter.class_name() for emitter in scene.emitters()} - set(_AROUND)
     return around[0] if around and (lights or around[0].class_name() == _AROUND[0]) else None
@@ -192,9 +209,14 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
         return None
     if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
         if not np.all(medium.sigma_t > 0):
-            raise InputError("a sky shines through a medium without bounds in some channels; expected bounds")
+            raise InputError(
+                "a sky shines through a medium without bounds in some channels; expected bounds"
+            )
         return None
-    return colour(background.eval(dr.zeros(mi.SurfaceInteraction3f)), f"light '{background.id()}': its radiance")
+    return colour(
+        background.eval(dr.zeros(mi.SurfaceInteraction3f)),
+        f"light '{background.id()}': its radiance",
+    )
 
 
 def whole_scene(reference: ReferenceScene):
@@ -208,7 +230,9 @@ def _rebuilt(scene, emitters: list[Any]):
     """Return a scene with these emitters; all parts keep their names."""
     parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
     names = [part.id() for part in parts]
-    built = mi.load_dict({"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)})
+    built = mi.load_dict(
+        {"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)}
+    )
     for part, name in zip(parts, names, strict=True):
         part.set_id(name)
     return built
@@ -222,11 +246,13 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         null = shape.bsdf().class_name() == "Null"
         if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
             raise InputError(
-                f"shape '{shape.id()}' is partly transparent; expected opaque surfaces, or material 'null'"
+                f"shape '{shape.id()}' is partly transparent; expected opaque surfaces, or "
+                "material 'null'"
             )
         if not null and (inside is not None or outside is not None):
             raise InputError(
-                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; expected the "
+                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} "
+                "material; expected the "
                 "material 'null' on it, and no media on other shapes"
             )
         if not null:
@@ -234,22 +260,29 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         elif inside is not None:
             boundaries.append(shape)
         elif outside is not None:
-            raise InputError(f"shape '{shape.id()}' is a hole in a medium; expected media inside of convex bounds")
+            raise InputError(
+                f"shape '{shape.id()}' is a hole in a medium; expected media inside of convex "
+                "bounds"
+            )
     return opaque, boundaries
 
 
 def scene_of(shapes: list[Any], whole):
-    """Return a scene of some of the shapes of `whole`, or `whole` itself if they are all of its shapes."""
+    """Return a scene of some of the shapes of `whole`, or `whole` itself if
+    they are all of its shapes.
+    """
     return whole if len(shapes) == len(whole.shapes()) else scene_from(shapes)
 
 
 def scene_from(shapes: list[Any]):
     """Return a scene of some shapes, which keep their names."""
-    # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.
+    # The keys become the names of the shapes, in the whole scene too: they keep those they
+    # have, if these are keys.
     names = {shape.id() for shape in shapes}
     sound = len(names) == len(shapes) and not any("." in name or not name for name in names)
     return mi.load_dict(
-        {"type": "scene"} | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
+        {"type": "scene"}
+        | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
     )
 
 
@@ -261,53 +294,73 @@ def _read_ambient(
     ambient = own
     for medium, shape in zip(media, boundaries, strict=True):
         if in_surface(medium.bounds, origin):
-            raise InputError(f"the camera is in the surface of shape '{medium.name}'; move it off, inside or outside")
+            raise InputError(
+                f"the camera is in the surface of shape '{medium.name}'; move it off, inside or "
+                "outside"
+            )
         if holds(medium.bounds, origin):
             if own != medium.plugin:
                 raise InputError(
-                    f"the camera is inside of shape '{medium.name}', but references another medium or none; "
+                    f"the camera is inside of shape '{medium.name}', but references another medium "
+                    "or none; "
                     "reference that shape's interior medium in the sensor"
                 )
             ambient = shape.exterior_medium()
     for medium, shape in zip(media, boundaries, strict=True):
         if shape.exterior_medium() != ambient:
             raise InputError(
-                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; "
-                "expected the medium that the camera references as exterior of all shapes, or none at all"
+                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or "
+                "the camera; "
+                "expected the medium that the camera references as exterior of all shapes, or none "
+                "at all"
             )
     if is_height_fog(ambient) or is_grid(ambient):
         kind = "height fog" if is_height_fog(ambient) else "a density grid"
         if media:
             raise InputError(
-                f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove the medium of the "
+                f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove "
+                "the medium of the "
                 "shape, or take a medium of type 'homogeneous' around it"
             )
-        return (read_height_fog if is_height_fog(ambient) else read_grid)(ambient, *read_scattering(ambient))
+        return (read_height_fog if is_height_fog(ambient) else read_grid)(
+            ambient, *read_scattering(ambient)
+        )
     if ambient is not None:
         return read_medium(ambient, "the medium")
     if not media:
-        raise InputError("the camera references no medium: it would be in a vacuum; reference the medium in the sensor")
+        raise InputError(
+            "the camera references no medium: it would be in a vacuum; reference the medium in the "
+            "sensor"
+        )
     return VACUUM
 
 
 def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium | None:
-    """Return a density grid in vacuum whose only boundary holds its whole box, which then bounds nothing."""
+    """Return a density grid in vacuum whose only boundary holds its whole box,
+    which then bounds nothing.
+    """
     shape = boundaries[0] if len(boundaries) == 1 else None
     if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
         return None
     own, inside = sensor.get_medium(), shape.interior_medium()
     grid = read_grid(inside, *read_scattering(inside))
-    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+    low, high = (
+        np.array(corner, dtype=np.float64).ravel()
+        for corner in (shape.bbox().min, shape.bbox().max)
+    )
     margin = _SHAPE_MARGIN * (grid.high - grid.low)
     if np.any(low > grid.low + margin) or np.any(high < grid.high - margin):
         return None
     bounds, middle = read_bounds(shape), 0.5 * (grid.low + grid.high)
     corners = np.array(np.meshgrid(*zip(grid.low, grid.high, strict=True))).reshape(3, 8).T
-    if not all(holds(bounds, middle + (1 - 2 * _SHAPE_MARGIN) * (corner - middle)) for corner in corners):
+    if not all(
+        holds(bounds, middle + (1 - 2 * _SHAPE_MARGIN) * (corner - middle)) for corner in corners
+    ):
         return None
     if own not in ((inside,) if holds(bounds, origin) else (None, inside)):
         raise InputError(
-            f"the camera references another medium than that of shape '{shape.id()}', a density grid, or is in the "
+            f"the camera references another medium than that of shape '{shape.id()}', a density "
+            "grid, or is in the "
             "shape and references none; expected that medium"
         )
     return grid
@@ -316,36 +369,58 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
 def _read_bounded(shape) -> BoundedMedium:
     inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
     return BoundedMedium(
-        inside.sigma_t, inside.albedo, inside.phase, inside.plugin, bounds=read_bounds(shape), name=shape.id()
+        inside.sigma_t,
+        inside.albedo,
+        inside.phase,
+        inside.plugin,
+        bounds=read_bounds(shape),
+        name=shape.id(),
     )
 
 
 def read_medium(medium, name: str) -> ReferenceMedium:
     """Read a homogeneous medium; messages call it by `name`."""
     if is_height_fog(medium):
-        raise InputError(f"{name} is height fog, which has no sides; expected it in the sensor, and no shape around it")
+        raise InputError(
+            f"{name} is height fog, which has no sides; expected it in the sensor, and no shape "
+            "around it"
+        )
     if not medium.is_homogeneous():
         raise InputError(
-            f"{name} is heterogeneous; expected a medium of type 'homogeneous', or a density grid in the sensor, or "
+            f"{name} is heterogeneous; expected a medium of type 'homogeneous', or a density grid "
+            "in the sensor, or "
             "one in vacuum in a convex shape that holds its whole box"
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
-    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64) * float(parameters["scale"])
-    return ReferenceMedium(colour(sigma_t, f"{name}: its sigma_t"), *read_scattering(medium), medium)
+    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64) * float(
+        parameters["scale"]
+    )
+    return ReferenceMedium(
+        colour(sigma_t, f"{name}: its sigma_t"), *read_scattering(medium), medium
+    )
 
 
 def read_scattering(medium) -> tuple[Array, PhaseFunction]:
-    """Return the albedo of a medium, RGB, one number or colour everywhere, and its phase function."""
+    """Return the albedo of a medium, RGB, one number or colour
+    everywhere, and its phase function.
+    """
     parameters = mi.traverse(medium)
     _require_constant(parameters, "albedo", f"medium '{medium.id()}'")
-    albedo = colour(parameters["albedo.value.value"], f"medium '{medium.id()}': its albedo", largest=_LARGEST_ALBEDO)
+    albedo = colour(
+        parameters["albedo.value.value"],
+        f"medium '{medium.id()}': its albedo",
+        largest=_LARGEST_ALBEDO,
+    )
     return albedo, _read_phase(medium.phase_function())
 
 
 def _require_constant(parameters, coefficient: str, name: str) -> None:
     if f"{coefficient}.value.value" not in parameters:
-        raise InputError(f"{name}: its {coefficient} differs from place to place; expected one number or one 'rgb'")
+        raise InputError(
+            f"{name}: its {coefficient} differs from place to place; expected one number or one "
+            "'rgb'"
+        )
 
 
 def _read_phase(phase) -> PhaseFunction:
@@ -359,15 +434,20 @@ def _read_phase(phase) -> PhaseFunction:
         return HenyeyGreenstein(float(parameters["g"][0]))
     if name == "TabulatedPhaseFunction":
         return Tabulated(tuple(float(v) for v in np.array(parameters["values"])))
-    raise InputError(f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase")
+    raise InputError(
+        f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase"
+    )
 
 
 def _read_light(emitter) -> ReferenceLight:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
-        word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(name, name)
+        word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(
+            name, name
+        )
         raise InputError(
-            f"light '{emitter.id()}' of type '{word}' is the scene's only light; expected lights of type 'point', "
+            f"light '{emitter.id()}' of type '{word}' is the scene's only light; expected lights "
+            "of type 'point', "
             "'spot', 'directional', 'area' or 'constant'"
         )
     parameters = mi.traverse(emitter)
@@ -375,11 +455,15 @@ def _read_light(emitter) -> ReferenceLight:
     spot = name == "SpotLight"
     if spot and stretch(matrix) - 1 > SAME:
         raise InputError(
-            f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} to 1; expected one "
-            "scale for all axes and no shear, which a 'rotate' brings whose axis is not of unit length: take the scale "
+            f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} "
+            "to 1; expected one "
+            "scale for all axes and no shear, which a 'rotate' brings whose axis is not of unit "
+            "length: take the scale "
             "away, in a modelling program before the export"
         )
-    position = matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
+    position = (
+        matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
+    )
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]) if spot else np.array([0.0, 0.0, 1.0])
     # Mitsuba's own answer at a far point on the axis, where positions lose no digits that matter.
     distance = 1024.0 * max(1.0, float(np.abs(position).max()))
@@ -387,27 +471,40 @@ def _read_light(emitter) -> ReferenceLight:
     interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
     dr.make_opaque(interaction)  # one kernel for all lights of a kind
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-    intensity = _as_given(emitter, colour(arriving, f"light '{emitter.id()}': its intensity") * distance**2)
+    intensity = _as_given(
+        emitter, colour(arriving, f"light '{emitter.id()}': its intensity") * distance**2
+    )
     if not spot:
         return ReferenceLight(position, intensity)
     degrees = float(parameters["cutoff_angle"][0])
     if not 0 < degrees < 90:
         raise InputError(
-            f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than 0 and less than "
+            f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than "
+            "0 and less than "
             "90: a wider light is a 'point' light"
         )
     cutoff = np.deg2rad(degrees)
     return ReferenceLight(
-        position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff)
+        position,
+        intensity,
+        axis,
+        cutoff,
+        min(np.deg2rad(float(parameters["beam_width"][0])), cutoff),
     )
 
 
 def _as_given(emitter, measured: Array) -> Array:
-    """Return the intensity as the scene gives it, where that is what was measured: measuring rounds it to float32."""
+    """Return the intensity as the scene gives it, where that is what was measured:
+    measuring rounds it to float32.
+    """
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters:
         return measured
-    texture = np.array(parameters["texture.value"], dtype=np.float64) if "texture.value" in parameters else 1.0
+    texture = (
+        np.array(parameters["texture.value"], dtype=np.float64)
+        if "texture.value" in parameters
+        else 1.0
+    )
     given = np.array(parameters["intensity.value"], dtype=np.float64) * texture
     given = colour(given, f"light '{emitter.id()}': its intensity")
     return given if np.allclose(given, measured, rtol=1e-5, atol=0) else measured

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Occluders as numbers: triangles of meshes and rectangles, spheres, and disks.
 
-Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of the image of its
-first axis, whatever else the transform does to it, and so does this module. Shadows do not depend on the side to which
-normals point.
+Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of
+the image of its first axis, whatever else the transform does to it, and so does this module.
+Shadows do not depend on the side to which normals point.
 """
 
 import math
@@ -26,7 +26,8 @@ class Disks:
     """Flat round shapes."""
 
     centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: (disks, 3) [m]
-    normal: Array = field(default_factory=lambda: np.empty((0, 3)))  #: unit, of either side, (disks, 3)
+    #: unit, of either side, (disks, 3)
+    normal: Array = field(default_factory=lambda: np.empty((0, 3)))
     radius: Array = field(default_factory=lambda: np.empty(0))  #: (disks,) [m]
 
 
@@ -35,10 +36,12 @@ class Shapes:
     """The opaque shapes of a scene."""
 
     triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
-    centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of the spheres, (spheres, 3) [m]
+    #: of the spheres, (spheres, 3) [m]
+    centre: Array = field(default_factory=lambda: np.empty((0, 3)))
     radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]
     disks: Disks = field(default_factory=Disks)
-    single: tuple[tuple[Any, Array | Sphere | Disks], ...] = ()  #: all shapes one by one, each as numbers
+    #: all shapes one by one, each as numbers
+    single: tuple[tuple[Any, Array | Sphere | Disks], ...] = ()
 
     @property
     def count(self) -> int:
@@ -49,7 +52,8 @@ class Shapes:
 def read_shapes(scene) -> Shapes:
     """Read the shapes of a Mitsuba scene, all of them opaque.
 
-    Raises InputError for a shape that is neither a mesh nor a rectangle, a sphere or a disk, with its name.
+    Raises InputError for a shape that is neither a mesh nor a rectangle, a sphere
+    or a disk, with its name.
     """
     single = tuple((shape, _read(shape)) for shape in scene.shapes())
     triangles = [part for _, part in single if isinstance(part, np.ndarray)]
@@ -60,7 +64,10 @@ def read_shapes(scene) -> Shapes:
         np.array([sphere.centre for sphere in spheres]).reshape(-1, 3),
         np.array([sphere.radius for sphere in spheres]),
         Disks(
-            *(np.concatenate(column) for column in zip(*((d.centre, d.normal, d.radius) for d in (Disks(), *disks))))
+            *(
+                np.concatenate(column)
+                for column in zip(*((d.centre, d.normal, d.radius) for d in (Disks(), *disks)))
+            )
         ),
         single,
     )
@@ -75,10 +82,14 @@ def _read(shape) -> Array | Sphere | Disks:
         return Sphere(matrix[:3, 3], float(length[0]))
     if shape.class_name() != "Disk":
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name().lower()}; expected meshes, rectangles, spheres and disks, "
+            f"shape '{shape.id()}' is a {shape.class_name().lower()}; expected meshes, rectangles, "
+            "spheres and disks, "
             "whose shadows are exact: replace it by a mesh, as fine as you need"
         )
-    if abs(length[0] - length[1]) > SAME * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > SAME * length[0] ** 2:
+    if (
+        abs(length[0] - length[1]) > SAME * length[0]
+        or abs(matrix[:3, 0] @ matrix[:3, 1]) > SAME * length[0] ** 2
+    ):
         raise InputError(f"shape '{shape.id()}' is an oval disk; expected a round one, or a mesh")
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
@@ -91,16 +102,21 @@ def distance_to(shapes: Shapes, point: Array) -> float:
     above = np.sum(away * shapes.disks.normal, axis=1)
     beside = np.linalg.norm(away - above[:, None] * shapes.disks.normal, axis=1)
     disks = np.hypot(above, np.maximum(beside - shapes.disks.radius, 0.0))
-    return min(distance_to_triangles(shapes.triangles, point), *spheres.tolist(), *disks.tolist(), math.inf)
+    return min(
+        distance_to_triangles(shapes.triangles, point), *spheres.tolist(), *disks.tolist(), math.inf
+    )
 
 
 def distance_to_triangles(triangles: Array, point: Array) -> float:
-    """Return the distance from a point, (3,) [m], to triangles, (n, 3, 3) [m]: to their planes, or to their sides."""
+    """Return the distance from a point, (3,) [m], to triangles, (n, 3, 3) [m]: to their
+    planes, or to their sides.
+    """
     corners = triangles - point
     sides = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(sides[:, 0], sides[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    inwards = np.einsum("tsx,tx->ts", np.cross(sides, -corners), normals)  # of a side: how far the foot lies
+    # of a side: how far the foot lies
+    inwards = np.einsum("tsx,tx->ts", np.cross(sides, -corners), normals)
     planes = np.abs(np.einsum("tx,tx->t", corners[:, 0], normals))[np.all(inwards > 0, axis=1)]
     length = np.maximum(np.sum(sides**2, axis=2), np.finfo(float).tiny)
     along = np.clip(-np.sum(corners * sides, axis=2) / length, 0, 1)

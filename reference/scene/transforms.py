@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Transforms of Mitsuba as matrices in float64, and what their scales do to lights and spheres.
 
-A spot turns directions into its own frame and compares their angle to its axis with its cone. One scale for all axes,
-and a mirror, leave angles as they are; other scales make the cone oval. A directional light takes the image of the axis
-z for its direction and keeps its length, by which Mitsuba then multiplies the light on surfaces. A sphere that is
-mirrored is inside out.
+A spot turns directions into its own frame and compares their angle to its axis with its cone. One
+scale for all axes, and a mirror, leave angles as they are; other scales make the cone oval. A
+directional light takes the image of the axis z for its direction and keeps its length, by which
+Mitsuba then multiplies the light on surfaces. A sphere that is mirrored is inside out.
 """
 
 from typing import Any

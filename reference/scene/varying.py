@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Media around the camera whose extinction differs from place to place: height fog and density grids.
+r"""Media around the camera whose extinction differs from place to place:
+height fog and density grids.
 
-**Height fog** is a `heterogeneous` medium without sides whose extinction is a volume of type `heightfog`. The plugin
-(`validation.scenes.height_fog`) gives its numbers. Each estimator derives for itself what follows from them.
+**Height fog** is a `heterogeneous` medium without sides whose extinction is a volume of type
+`heightfog`. The plugin (`validation.scenes.height_fog`) gives its numbers. Each estimator derives
+for itself what follows from them.
 
-**A density grid** is a `heterogeneous` medium with a `gridvolume`. Values sit at the centres of voxels, (i + 1/2)/n of
-the box of `to_world`. Between centres the extinction is trilinear, in the outer half voxels constant across the faces,
-beyond the box 0. Mitsuba tells Python the values and the box of the volume, and not which side of the box is which axis
-of the grid. Extinctions at random places are therefore compared with Mitsuba's for each way in which the grid can lie
-in the box, mirrored and turned by right angles. One must agree, so that no other filter, wrap mode or transform is
-taken for this.
+**A density grid** is a `heterogeneous` medium with a `gridvolume`. Values sit at the centres of
+voxels, (i + 1/2)/n of the box of `to_world`. Between centres the extinction is trilinear, in the
+outer half voxels constant across the faces, beyond the box 0. Mitsuba tells Python the values and
+the box of the volume, and not which side of the box is which axis of the grid. Extinctions at
+random places are therefore compared with Mitsuba's for each way in which the grid can lie in the
+box, mirrored and turned by right angles. One must agree, so that no other filter, wrap mode or
+transform is taken for this.
 """
 
 from collections.abc import Iterator
@@ -28,7 +31,8 @@ from airlight.errors import InputError
 Array = NDArray[np.float64]
 
 NO_EXTINCTION = (
-    "the medium has an extinction that differs from place to place, and this asks for one number; expected a medium of "
+    "the medium has an extinction that differs from place to place, and this asks for one number; "
+    "expected a medium of "
     "type 'homogeneous'"
 )
 _PLACES = 512  # at which extinctions are compared
@@ -54,7 +58,8 @@ class VaryingMedium:
 class HeightMedium(VaryingMedium):
     """A medium whose density depends on height alone."""
 
-    layers: tuple[tuple[float, float, float], ...]  #: extinction at the base [1/m], base [m], scale height [m]
+    #: extinction at the base [1/m], base [m], scale height [m]
+    layers: tuple[tuple[float, float, float], ...]
     constant: float  #: extinction everywhere between floor and cap [1/m]
     clamped: bool  #: whether layers are constant below their bases
     floor: float  #: [m]
@@ -81,7 +86,9 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
         for i in "12"
         if (sigma_t := float(number[f"sigma_{i}"][0])) > 0
     )
-    largest = np.array(medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64).reshape(-1)
+    largest = np.array(
+        medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64
+    ).reshape(-1)
     return HeightMedium(
         layers=layers,
         constant=scale * float(number["sigma_0"][0]),
@@ -105,13 +112,19 @@ class GridMedium(VaryingMedium):
     high: Array  #: the opposite corner, (3,) [m]
 
     def crossed(self, origin: Array, direction: Array) -> tuple[Array, Array]:
-        """Return the distances at which rays enter and leave the box, (n,) [m]; equal where they miss it."""
+        """Return the distances at which rays enter and leave the box, (n,) [m];
+        equal where they miss it.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack([(corner - origin) / direction for corner in (self.low, self.high)])
         # Along a face: within both planes or beyond one.
         inside = (origin >= self.low) & (origin <= self.high)
-        near = np.where(direction == 0, np.where(inside, -np.inf, np.inf), ends.min(axis=0)).max(axis=-1)
-        far = np.where(direction == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(axis=-1)
+        near = np.where(direction == 0, np.where(inside, -np.inf, np.inf), ends.min(axis=0)).max(
+            axis=-1
+        )
+        far = np.where(direction == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(
+            axis=-1
+        )
         meets = (far > near) & (far > 0)
         return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
 
@@ -130,34 +143,53 @@ class GridMedium(VaryingMedium):
 
 
 def is_grid(medium) -> bool:
-    """Return whether a medium of Mitsuba has an extinction on a grid; one that is called homogeneous has no box."""
-    return medium is not None and not medium.is_homogeneous() and "sigma_t.data" in mi.traverse(medium)
+    """Return whether a medium of Mitsuba has an extinction on a grid; one that is
+    called homogeneous has no box.
+    """
+    return (
+        medium is not None and not medium.is_homogeneous() and "sigma_t.data" in mi.traverse(medium)
+    )
 
 
 def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     """Read a grid around the camera; its albedo, RGB, and its phase function were read.
 
-    Raises InputError for what `grid_values` refuses, and for a grid that Mitsuba reads otherwise than `GridMedium`.
+    Raises InputError for what `grid_values` refuses, and for a grid that Mitsuba reads
+    otherwise than `GridMedium`.
     """
     name = f"medium '{medium.id()}'"
     values, low, high = grid_values(medium, name)
     largest = np.full(3, values.max())
-    grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
+    grid = GridMedium(
+        values=values,
+        low=low,
+        high=high,
+        albedo=albedo,
+        phase=phase,
+        largest=largest,
+        plugin=medium,
+    )
     # Mitsuba's extinctions at random places in the box.
     fraction = np.random.default_rng(1).random((_PLACES, 3))
     interaction = dr.zeros(mi.MediumInteraction3f, _PLACES)
     interaction.p = mi.Point3f((low + fraction * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]
-    # The grid as it lies in the box: the first way that agrees; of ways that agree all give the same extinctions.
+    # The grid as it lies in the box: the first way that agrees; of ways that agree all
+    # give the same extinctions.
     worst = np.inf
     for turned in _turned(values):
-        difference = np.abs(theirs - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max() / values.max()
+        difference = (
+            np.abs(theirs - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max()
+            / values.max()
+        )
         if difference <= _DIFFERENCE:
             return replace(grid, values=turned)
         worst = min(worst, float(difference))
     raise InputError(
-        f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
-        "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales, moves, mirrors and "
+        f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest "
+        "value; expected a "
+        "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales, "
+        "moves, mirrors and "
         "turns by right angles"
     )
 
@@ -171,20 +203,28 @@ def _turned(values: Array) -> Iterator[Array]:
 
 
 def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
-    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and the corners of its box, (3,) [m].
+    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and the
+    corners of its box, (3,) [m].
 
-    Messages call it by `name`. Raises InputError for a grid of several channels, and for values that are not finite,
-    below 0, or 0 alone.
+    Messages call it by `name`. Raises InputError for a grid of several channels, and for values
+    that are not finite, below 0, or 0 alone.
     """
     parameters = mi.traverse(medium)
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)
     if values.ndim > 3 and values.shape[3] != 1:
-        raise InputError(f"{name} has a grid of {values.shape[3]} channels; expected a grid of one: grey extinction")
+        raise InputError(
+            f"{name} has a grid of {values.shape[3]} channels; expected a grid of one: grey "
+            "extinction"
+        )
     values = values.reshape(values.shape[:3]) * float(np.array(parameters["scale"]).ravel()[0])
     if not np.isfinite(values).all() or values.min() < 0:
-        raise InputError(f"{name} has densities below 0 or not finite; expected finite ones of 0 or more")
+        raise InputError(
+            f"{name} has densities below 0 or not finite; expected finite ones of 0 or more"
+        )
     if not values.max() > 0:
-        raise InputError(f"{name} has a grid that is 0 everywhere; expected densities above 0 somewhere")
+        raise InputError(
+            f"{name} has a grid that is 0 everywhere; expected densities above 0 somewhere"
+        )
     box = next(part for part in parameters.hierarchy if part.class_name() == "GridVolume").bbox()
     low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (box.min, box.max))
     return values, low, high

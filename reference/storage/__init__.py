@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files: written whole or not at all, layered images, finished references found again by their content.
+"""Files: written whole or not at all, layered images, finished references
+found again by their content.
 
 Read in this order:
 

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which airlight this is: its version, its commit, and a digest of all its files.
 
-A version names what was released, and all commits between two releases have one. Whatever is printed or written names
-the commit and the digest beside it: they tell two commits apart, and a changed file from the commit.
+A version names what was released, and all commits between two releases have one. Whatever is
+printed or written names the commit and the digest beside it: they tell two commits apart, and a
+changed file from the commit.
 
-A checkout asks git, once in a process and not before somebody wants to know. A copy without git has its commit in
-`src/airlight/commit.txt`: `git archive` fills it in, as `.gitattributes` says, and `setup.py` does in wheels and source
-distributions, with the digest of the files then. A file that was changed afterwards is noticed by that digest.
+A checkout asks git, once in a process and not before somebody wants to know. A copy without git has
+its commit in `src/airlight/commit.txt`: `git archive` fills it in, as `.gitattributes` says, and
+`setup.py` does in wheels and source distributions, with the digest of the files then. A file that
+was changed afterwards is noticed by that digest.
 
-The digest is of bytes, comments too, unlike those of `code.py`, which decide what is computed again: it takes a
-twentieth of a second in place of two, and is the same for every version of Python. Nothing of ours is imported at the
-top, as `setup.py` runs this file where no package is installed, and nothing that `airlight --help` would wait for.
+The digest is of bytes, comments too, unlike those of `code.py`, which decide what is computed
+again: it takes a twentieth of a second in place of two, and is the same for every version of
+Python. Nothing of ours is imported at the top, as `setup.py` runs this file where no package is
+installed, and nothing that `airlight --help` would wait for.
 """
 
 import os
@@ -22,7 +25,8 @@ UNKNOWN = "unknown"
 COMMIT = "commit.txt"  #: in the package
 _DIGITS = 12  # of a commit or a digest that is printed
 _PATIENCE = 30.0  # until git has answered; a file system may be far away [s]
-_ELSEWHERE = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")  # that git sets for hooks of any project
+# that git sets for hooks of any project
+_ELSEWHERE = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,8 @@ class Build:
 
     airlight: str  #: version
     commit: str  #: 'unknown' where neither git nor the builder of the copy tells
-    changed: bool | None  #: whether its files differ from those of the commit; None where nobody knows
+    #: whether its files differ from those of the commit; None where nobody knows
+    changed: bool | None
     digest: str  #: SHA-256 of the names and the bytes of all its files
 
     @property
@@ -61,11 +66,18 @@ def build_of(package: Path, version: str) -> Build:
 def commit_line(package: Path) -> str:
     """Return the content of `commit.txt` in a copy of a folder that has no git."""
     built = build_of(package, "")
-    return " ".join([built.commit, *([] if built.changed is None else ["changed" if built.changed else built.digest])])
+    return " ".join(
+        [
+            built.commit,
+            *([] if built.changed is None else ["changed" if built.changed else built.digest]),
+        ]
+    )
 
 
 def package_digest(package: Path) -> str:
-    """Return a digest of the files of the package, the same in a checkout and installed, on every system."""
+    """Return a digest of the files of the package, the same in a checkout and
+    installed, on every system.
+    """
     import hashlib
 
     paths = [
@@ -83,7 +95,9 @@ def package_digest(package: Path) -> str:
 
 
 def _written(package: Path) -> list[str]:
-    """Return the words that a builder of a copy, or `git archive`, has left: a commit, and the digest of its files."""
+    """Return the words that a builder of a copy, or `git archive`, has left: a commit, and
+    the digest of its files.
+    """
     try:
         words = (package / COMMIT).read_text(encoding="utf-8").split()
     except OSError:
@@ -92,19 +106,46 @@ def _written(package: Path) -> list[str]:
 
 
 def _asked(package: Path) -> tuple[str, bool] | None:
-    """Ask git for the commit of a checkout, and whether files of the package differ; None where there is no answer."""
+    """Ask git for the commit of a checkout, and whether files of the package differ; None
+    where there is no answer.
+    """
     import subprocess
 
     root = package.parents[1].resolve()
-    if not (root / ".git").exists():  # a file in worktrees; the repository around an installed copy is not ours
+    # a file in worktrees; the repository around an installed copy is not ours
+    if not (root / ".git").exists():
         return None
-    folders = {str(each.resolve().relative_to(root)) for each in (package, *package.iterdir()) if each.is_dir()}
-    asked = ["git", "--no-optional-locks", "status", "--porcelain=v2", "--branch", "--", *sorted(folders)]
+    folders = {
+        str(each.resolve().relative_to(root))
+        for each in (package, *package.iterdir())
+        if each.is_dir()
+    }
+    asked = [
+        "git",
+        "--no-optional-locks",
+        "status",
+        "--porcelain=v2",
+        "--branch",
+        "--",
+        *sorted(folders),
+    ]
     world = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
     try:
-        ran = subprocess.run(asked, cwd=root, env=world, capture_output=True, text=True, timeout=_PATIENCE, check=True)
+        ran = subprocess.run(
+            asked,
+            cwd=root,
+            env=world,
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            check=True,
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     lines = ran.stdout.splitlines()
-    commit = next((line.split()[2] for line in lines if line.startswith("# branch.oid ")), "(initial)")
-    return None if commit == "(initial)" else (commit, any(not line.startswith("#") for line in lines))
+    commit = next(
+        (line.split()[2] for line in lines if line.startswith("# branch.oid ")), "(initial)"
+    )
+    return (
+        None if commit == "(initial)" else (commit, any(not line.startswith("#") for line in lines))
+    )

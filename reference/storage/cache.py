@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arrays on disk under a key: whole or not there, and together no larger than a limit.
 
-A killed run loses nothing that was finished and leaves nothing half-written. Each file holds a digest of its content
-and its key: a file that was damaged, edited or renamed counts as missing. `reference.storage.store` says which key
-arrays have.
+A killed run loses nothing that was finished and leaves nothing half-written. Each file holds a
+digest of its content and its key: a file that was damaged, edited or renamed counts as missing.
+`reference.storage.store` says which key arrays have.
 
-Only files `KIND-DIGEST.npz`, and those in a folder `KIND-DIGEST`, are ever removed: a folder given by mistake loses
-nothing.
+Only files `KIND-DIGEST.npz`, and those in a folder `KIND-DIGEST`, are ever removed: a folder given
+by mistake loses nothing.
 """
 
 import hashlib
@@ -34,7 +34,8 @@ DEFAULT_LIMIT = 4 * 2**30  #: bytes
 _DIGEST = "digest"  # the name of the digest among the arrays
 _KIND = re.compile(r"([a-z]+(?:-[a-z]+)*)-[0-9a-f]{32}")
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(i?)b?", flags=re.IGNORECASE)
-_LOOK = 100  # how often the size of the cache is looked at, on average, while a whole limit is written
+# how often the size of the cache is looked at, on average, while a whole limit is written
+_LOOK = 100
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,9 @@ class Entry:
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache: AIRLIGHT_CACHE_DIR, or `airlight` in the user's cache folder."""
+    """Return the folder of the cache: AIRLIGHT_CACHE_DIR, or `airlight` in
+    the user's cache folder.
+    """
     chosen = os.environ.get("AIRLIGHT_CACHE_DIR")
     if chosen:
         return Path(chosen)
@@ -66,15 +69,20 @@ def cache_limit() -> int:
         return DEFAULT_LIMIT
     size = _SIZE.fullmatch(text)
     if size is None:
-        raise InputError(f"AIRLIGHT_CACHE_SIZE: got {text!r}, expected a size such as 500MB, 4GiB or a number of bytes")
+        raise InputError(
+            f"AIRLIGHT_CACHE_SIZE: got {text!r}, expected a size such as 500MB, 4GiB or a number "
+            "of bytes"
+        )
     number, prefix, binary = size.groups()
     return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " "))
 
 
 def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] | None:
-    """Return the arrays under a key, or None if the file is missing or damaged, or the limit of the cache is 0.
+    """Return the arrays under a key, or None if the file is missing or damaged, or the
+    limit of the cache is 0.
 
-    With `names` it returns these arrays alone, without a check of the digest: to look at a small part of a large file.
+    With `names` it returns these arrays alone, without a check of the digest: to look at a
+    small part of a large file.
     """
     if cache_limit() == 0:
         return None
@@ -82,7 +90,16 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
         # Opened here, since `np.load` leaves a file that it cannot read open.
         with open(_path(key), "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in (names or stored.files)}
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error):
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        AttributeError,
+        TypeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
         return None
     if names:
         return arrays
@@ -95,12 +112,13 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
 
 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
-    """Write arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'.
+    """Write arrays under a key, replacing what is there; a key may name a folder, as
+    in 'volpath-0a1b/000017'.
 
-    Then the files that were used longest ago are removed until the cache is no larger than its limit. The size of the
-    cache is looked at by chance, the more often the larger the file is. With a limit of 0 nothing is written. Where the
-    folder cannot be written a note on the error stream says so: the arrays are there all the same. Raises OSError where
-    the disk is full.
+    Then the files that were used longest ago are removed until the cache is no larger than its
+    limit. The size of the cache is looked at by chance, the more often the larger the file is. With
+    a limit of 0 nothing is written. Where the folder cannot be written a note on the error stream
+    says so: the arrays are there all the same. Raises OSError where the disk is full.
     """
     limit = cache_limit()
     if limit == 0:
@@ -120,7 +138,8 @@ def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    # Not flushed, which takes half the time of a small file: one that a loss of power damages counts as missing.
+    # Not flushed, which takes half the time of a small file: one that a loss of power
+    # damages counts as missing.
     try:
         write_bytes(path, data, flush=False)
     except FileNotFoundError:  # the folder was empty, and another process has just removed it
@@ -130,14 +149,17 @@ def _write(path: Path, data: bytes) -> None:
 @cache  # once for each folder
 def _note_unwritable(folder: Path) -> None:
     logging.getLogger("airlight").warning(
-        "airlight: note: the cache folder %s cannot be written, so nothing is cached: name one that can be written by "
+        "airlight: note: the cache folder %s cannot be written, so nothing is cached: name one "
+        "that can be written by "
         "AIRLIGHT_CACHE_DIR, or set AIRLIGHT_CACHE_SIZE=0",
         folder,
     )
 
 
 def is_stored(key: str) -> bool:
-    """Return whether there is a file under a key, damaged or not; none where the limit of the cache is 0."""
+    """Return whether there is a file under a key, damaged or not; none where the
+    limit of the cache is 0.
+    """
     return cache_limit() > 0 and _path(key).exists()
 
 
@@ -171,7 +193,9 @@ def cache_entries() -> list[Entry]:
 
 
 def _listed(folder: Path) -> list[Path]:
-    """Return the contents of a folder, none once another process removed it (`Path.glob` of Python 3.11 raises)."""
+    """Return the contents of a folder, none once another process removed it
+    (`Path.glob` of Python 3.11 raises).
+    """
     try:
         return list(folder.iterdir())
     except OSError:
@@ -179,7 +203,9 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def remove_oldest(limit: int) -> tuple[int, int]:
-    """Remove the files that were used longest ago until the others take `limit` bytes; return how many, and bytes."""
+    """Remove the files that were used longest ago until the others take `limit` bytes;
+    return how many, and bytes.
+    """
     entries = cache_entries()
     excess, files, freed = sum(entry.size for entry in entries) - limit, 0, 0
     for entry in entries:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Digests of code: the code that computes a result is an input of it.
 
-A module counts with all modules of ours that it imports, directly or not, as Python compiles them, without comments,
-docstrings and line numbers: rewording one throws nothing away. Data count with the code that may read them: the files
-in the folders of these modules (tables of scenes, certified values, claims), and files beside a module of the user's
-that it names. The versions of Mitsuba, Dr.Jit, NumPy and SciPy count too.
+A module counts with all modules of ours that it imports, directly or not, as Python compiles them,
+without comments, docstrings and line numbers: rewording one throws nothing away. Data count with
+the code that may read them: the files in the folders of these modules (tables of scenes, certified
+values, claims), and files beside a module of the user's that it names. The versions of Mitsuba,
+Dr.Jit, NumPy and SciPy count too.
 """
 
 import hashlib
@@ -17,7 +18,8 @@ from pathlib import Path
 from types import CodeType
 
 _ROOT = Path(__file__).resolve().parents[2]
-_FOLDERS = ("analytic", "realtime", "reference", "validation", "reports")  # of the package `airlight`
+# of the package `airlight`
+_FOLDERS = ("analytic", "realtime", "reference", "validation", "reports")
 _VERSIONS = ("mitsuba", "drjit", "numpy", "scipy")
 _CODE = (".py", ".pyc")
 
@@ -31,9 +33,11 @@ def source_digest(*modules: str) -> str:
 
 
 def code_digest(starts: Iterable[Path]) -> str:
-    """Return a digest of the code of some files and of all that they import, as far as it is ours or the user's.
+    """Return a digest of the code of some files and of all that they import, as far as
+    it is ours or the user's.
 
-    From a file of the user's, which may lie anywhere, the modules beside it are followed, and those of its package.
+    From a file of the user's, which may lie anywhere, the modules beside it are followed,
+    and those of its package.
     """
     # Follow imports from file to file.
     waiting, digests = [path.resolve() for path in starts], dict[Path, bytes]()
@@ -56,10 +60,14 @@ def code_digest(starts: Iterable[Path]) -> str:
 
 @lru_cache(maxsize=1024)
 def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
-    """Return a digest of the code of a file, and the names and words in it, those of modules among them."""
+    """Return a digest of the code of a file, and the names and words in it,
+    those of modules among them.
+    """
     names: set[str] = set()
     try:
-        code = _bare(compile(_source(path), path.name, "exec", dont_inherit=True, optimize=2), names)
+        code = _bare(
+            compile(_source(path), path.name, "exec", dont_inherit=True, optimize=2), names
+        )
     except (SyntaxError, ValueError):  # a file of the user's: what runs it says so
         return hashlib.sha256(_source(path)).digest(), frozenset()
     # Version 2 of the format has no references, which depend on what else is in memory.
@@ -67,14 +75,20 @@ def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
 
 
 def _bare(code: CodeType, names: set[str]) -> CodeType:
-    """Return code without its places in the file, and add the names and the words that it mentions."""
+    """Return code without its places in the file, and add the names and
+    the words that it mentions.
+    """
     names.update(code.co_names, _words(code.co_consts))
-    constants = tuple(_bare(each, names) if isinstance(each, CodeType) else each for each in code.co_consts)
+    constants = tuple(
+        _bare(each, names) if isinstance(each, CodeType) else each for each in code.co_consts
+    )
     return code.replace(co_consts=constants, co_filename="", co_firstlineno=1, co_linetable=b"")
 
 
 def _words(constants: Iterable[object]) -> Iterator[str]:
-    """Yield the words among constants, those in tuples and sets too: a registry may name modules by them."""
+    """Yield the words among constants, those in tuples and sets too: a registry
+    may name modules by them.
+    """
     for each in constants:
         if isinstance(each, str):
             yield each
@@ -105,7 +119,9 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """Yield the files of a folder of ours that are no modules, those of folders without modules below it too."""
+    """Yield the files of a folder of ours that are no modules, those of folders
+    without modules below it too.
+    """
     for path in folder.iterdir():
         if path.is_dir() and path.name != "__pycache__" and not any(path.glob("*.py")):
             yield from _data(path)
@@ -129,7 +145,10 @@ def _modules() -> dict[str, Path]:
     """Return the files of our modules by name, those of packages too."""
     paths = [path for folder in _FOLDERS for path in (_ROOT / folder).rglob("*.py")]
     parts = {path: path.relative_to(_ROOT).with_suffix("").parts for path in paths}
-    return {".".join(["airlight", *names]).removesuffix(".__init__"): path for path, names in parts.items()}
+    return {
+        ".".join(["airlight", *names]).removesuffix(".__init__"): path
+        for path, names in parts.items()
+    }
 
 
 def _is_ours(path: Path) -> bool:

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Layered OpenEXR images: radiance by layer, depth, standard errors, and in the header what made them.
+"""Layered OpenEXR images: radiance by layer, depth, standard errors, and in
+the header what made them.
 
-A file is one part of scan lines in float32 with ZIP compression, which every viewer reads. A layer is three channels
-`name.R`, `name.G`, `name.B`; the total, `airlight + surface`, is in plain `R`, `G`, `B`, so that viewers show it.
+A file is one part of scan lines in float32 with ZIP compression, which every viewer reads. A layer
+is three channels `name.R`, `name.G`, `name.B`; the total, `airlight + surface`, is in plain `R`,
+`G`, `B`, so that viewers show it.
 
-The binding of OpenEXR 3.5 writes an array with strides as if it were contiguous, drops the upper half of an integer
-attribute, changes the header dictionary that it is given, refuses NumPy's scalars, and leaves out parts that it cannot
-read: hence the conversions and checks below.
+The binding of OpenEXR 3.5 writes an array with strides as if it were contiguous, drops the upper
+half of an integer attribute, changes the header dictionary that it is given, refuses NumPy's
+scalars, and leaves out parts that it cannot read: hence the conversions and checks below.
 """
 
 import contextlib
@@ -28,7 +30,8 @@ from airlight.reference.storage.files import NO_SPACE, atomic_path
 TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
-BOUND = "airlight:bound"  #: header attribute: of what kind the error in the layer `<layer>_bound` is
+#: header attribute: of what kind the error in the layer `<layer>_bound` is
+BOUND = "airlight:bound"
 
 Attribute = str | int | float
 
@@ -42,9 +45,11 @@ _STANDARD = frozenset((
 ))
 # fmt: on
 _ONE_LEVEL = str(OpenEXR.ONE_LEVEL)
-_SRGB = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)  # x and y of red, green, blue and white, the default
+# x and y of red, green, blue and white, the default
+_SRGB = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)
 _INTEGERS = "colours in unsigned integers"
-_COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
+# as other programs name channels
+_COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}
 _WHOLE = frozenset((*_COLOURS, "y"))
 _MAGIC = 20000630
 _ENCODED = "its values are encoded for a screen: save linear radiance as EXR"
@@ -56,7 +61,11 @@ _OTHERS = (
     (b"#?", " but Radiance HDR", _CONVERTED),
     (b"PF", " but PFM", _CONVERTED),
     (b"II*\x00", " but TIFF", _CONVERTED),
-    (b"\x93NUMPY", " but an array of NumPy", "from Python give the array: airlight.compare(SCENE, numpy.load(FILE))"),
+    (
+        b"\x93NUMPY",
+        " but an array of NumPy",
+        "from Python give the array: airlight.compare(SCENE, numpy.load(FILE))",
+    ),
     (b"", "", "expected linear radiance as EXR: save it again"),
 )
 _DEEP = 0x800  # the bit of the second word of a file
@@ -73,12 +82,13 @@ class Image:
         Arrays (height, width, 3) by name: `airlight`, `surface`, their standard errors `airlight_se`, `surface_se`
         [W/(m^2 sr)], and `total`.
     depth
-        Distance along the ray to the visible surface [m], (height, width); infinite where the ray hits nothing.
+        Distance along the ray to the visible surface [m], (height, width); infinite
+        where the ray hits nothing.
     attributes
         Header attributes such as `airlight:method`.
     window
-        First column and row, and those after the last, of the pixels that the file holds, where these are a part of
-        the frame: the others are 0 and say nothing.
+        First column and row, and those after the last, of the pixels that the file holds, where
+        these are a part of the frame: the others are 0 and say nothing.
     """
 
     layers: Mapping[str, NDArray[np.floating]]
@@ -93,14 +103,20 @@ class Image:
         inside = np.zeros(next(iter(self.layers.values())).shape[:2], dtype=bool)
         left, top, right, bottom = self.window
         inside[top:bottom, left:right] = True
-        return inside if mask is None or np.shape(mask) != inside.shape else inside & (np.asarray(mask) != 0)
+        return (
+            inside
+            if mask is None or np.shape(mask) != inside.shape
+            else inside & (np.asarray(mask) != 0)
+        )
 
 
-def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
+def layer(
+    image: Image, name: str, path: str | os.PathLike[str] = "the image"
+) -> NDArray[np.floating]:
     """Return a layer in the unit of the file, radiance [W/(m^2 sr)] in ours, (height, width, 3).
 
-    `name`: of the layer; the empty name is the total; `path`: name of the image in messages. Raises InputError for a
-    layer that is not there, with the layers that are and the nearest name.
+    `name`: of the layer; the empty name is the total; `path`: name of the image in messages. Raises
+    InputError for a layer that is not there, with the layers that are and the nearest name.
     """
     name = name or TOTAL
     if name in image.layers:
@@ -123,15 +139,17 @@ def layer_names(image: Image) -> str:
 def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
     """Write an image as a single-part float32 EXR, whole or not at all.
 
-    If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the airlight alone. The
-    format keeps attributes in 32 bits: a float keeps about 7 digits, and a number beyond their range becomes text.
+    If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the
+    airlight alone. The format keeps attributes in 32 bits: a float keeps about 7 digits, and a
+    number beyond their range becomes text.
 
     Raises
     ------
     InputError
-        If there are no layers, or they have two sizes, another shape than (height, width, 3), or values too large for
-        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own; for values
-        that are not finite, unless `finite` is False, as for an image of another program that is to be judged.
+        If there are no layers, or they have two sizes, another shape than (height, width, 3), or
+        values too large for float32; if a `total` is given that is not the sum; if an attribute has
+        a name of the format's own; for values that are not finite, unless `finite` is False, as for
+        an image of another program that is to be judged.
     OSError
         If the disk is full; the file is as it was.
     """
@@ -148,11 +166,12 @@ def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True
 def read_exr(path: str | os.PathLike[str]) -> Image:
     """Read an image written by `write_exr` or by another program.
 
-    Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
-    channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
-    layers). All parts of a file are read: a channel that names no layer belongs to the layer with the name of its part.
-    The image is the display window: a data window is cut off beyond it, and missing pixels are 0, see `Image.window`. A
-    subsampled channel is repeated.
+    Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a
+    lone `Y` three equal channels; the attribute `airlight:read` says so, and names the channels
+    left out (alpha, integers, incomplete layers). All parts of a file are read: a channel that
+    names no layer belongs to the layer with the name of its part. The image is the display window:
+    a data window is cut off beyond it, and missing pixels are 0, see `Image.window`. A subsampled
+    channel is repeated.
 
     Raises
     ------
@@ -165,18 +184,27 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
         with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
             declared = len(file.parts)
             levels = any(
-                str(getattr(part.header.get("tiles"), "mode", _ONE_LEVEL)) != _ONE_LEVEL for part in file.parts
+                str(getattr(part.header.get("tiles"), "mode", _ONE_LEVEL)) != _ONE_LEVEL
+                for part in file.parts
             )
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             # The binding empties its own headers when the file is closed.
-            parts = [_Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts]
+            parts = [
+                _Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts
+            ]
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
-        raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
+        raise InputError(
+            f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again"
+        ) from error
     if levels:
-        raise InputError(f"{path} has tiles of several resolutions, a mipmap; save it with one level, or in scan lines")
+        raise InputError(
+            f"{path} has tiles of several resolutions, a mipmap; save it with one level, or in "
+            "scan lines"
+        )
     if len(parts) != declared:  # the binding leaves out a part that it cannot read
         raise InputError(
-            f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again"
+            f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy "
+            "it again"
         )
     if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
@@ -196,7 +224,10 @@ class _Part:
 
 
 def _planes(channels: Mapping[str, Any]) -> dict[str, tuple[NDArray[Any], int, int]]:
-    return {key: (channel.pixels, channel.xSampling, channel.ySampling) for key, channel in channels.items()}
+    return {
+        key: (channel.pixels, channel.xSampling, channel.ySampling)
+        for key, channel in channels.items()
+    }
 
 
 Window = tuple[int, int, int, int]  # first column and row, and those after the last
@@ -205,25 +236,40 @@ Window = tuple[int, int, int, int]  # first column and row, and those after the 
 def _channels_of(
     parts: list[_Part], path: str | os.PathLike[str]
 ) -> tuple[dict[str, NDArray[Any]], Window | None, list[str]]:
-    """Return the channels of all parts by name, in the frame of the first; which pixels have data; what was changed."""
+    """Return the channels of all parts by name, in the frame of the first; which pixels
+    have data; what was changed.
+    """
     channels: dict[str, NDArray[Any]] = {}
     frame, windows, notes = _window(parts[0].header["displayWindow"]), list[Window](), list[str]()
     for part in parts:
         if any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
-            raise InputError(f"{path} is stored as luminance and chroma (Y, RY, BY); convert it to R, G, B channels")
+            raise InputError(
+                f"{path} is stored as luminance and chroma (Y, RY, BY); convert it to R, G, B "
+                "channels"
+            )
         data = _window(part.header["dataWindow"])
-        inside = max(data[0], frame[0]), max(data[1], frame[1]), min(data[2], frame[2]), min(data[3], frame[3])
+        inside = (
+            max(data[0], frame[0]),
+            max(data[1], frame[1]),
+            min(data[2], frame[2]),
+            min(data[3], frame[3]),
+        )
         if inside[0] >= inside[2] or inside[1] >= inside[3]:
-            raise InputError(f"{path} holds no pixel of its frame: the data window {data} lies beside {frame}")
+            raise InputError(
+                f"{path} holds no pixel of its frame: the data window {data} lies beside {frame}"
+            )
         if inside != data and _CUT not in notes:
             notes.append(_CUT)
         windows.append(inside)
         prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
-        named = len(part.planes) == 1 and part.name.rpartition(".")[2].lower() in _COLOURS  # a part for each channel
+        # a part for each channel
+        named = len(part.planes) == 1 and part.name.rpartition(".")[2].lower() in _COLOURS
         for key, (pixels, across, down) in part.planes.items():
             name = part.name if named else key if "." in key else prefix + key
             if name in channels:
-                raise InputError(f"{path} has the channel '{name}' in two parts; save each layer once")
+                raise InputError(
+                    f"{path} has the channel '{name}' in two parts; save each layer once"
+                )
             if across * down != 1:
                 notes.append(f"'{name}' has a value for {across} x {down} pixels")
                 rows, columns = data[3] - data[1], data[2] - data[0]
@@ -233,8 +279,15 @@ def _channels_of(
     common = max(firsts_x), max(firsts_y), min(ends_x), min(ends_y)
     if common == frame:
         return channels, None, notes
-    left, top, right, bottom = common[0] - frame[0], common[1] - frame[1], common[2] - frame[0], common[3] - frame[1]
-    notes.append(f"data in columns {left} to {right - 1} and rows {top} to {bottom - 1} of the frame alone")
+    left, top, right, bottom = (
+        common[0] - frame[0],
+        common[1] - frame[1],
+        common[2] - frame[0],
+        common[3] - frame[1],
+    )
+    notes.append(
+        f"data in columns {left} to {right - 1} and rows {top} to {bottom - 1} of the frame alone"
+    )
     return channels, (left, top, right, bottom), notes
 
 
@@ -251,28 +304,46 @@ def _framed(pixels: NDArray[Any], data: Window, inside: Window, frame: Window) -
     if data == frame:
         return pixels
     whole = np.zeros((frame[3] - frame[1], frame[2] - frame[0]), pixels.dtype)
-    rows, columns = slice(inside[1] - frame[1], inside[3] - frame[1]), slice(inside[0] - frame[0], inside[2] - frame[0])
-    whole[rows, columns] = pixels[inside[1] - data[1] : inside[3] - data[1], inside[0] - data[0] : inside[2] - data[0]]
+    rows, columns = (
+        slice(inside[1] - frame[1], inside[3] - frame[1]),
+        slice(inside[0] - frame[0], inside[2] - frame[0]),
+    )
+    whole[rows, columns] = pixels[
+        inside[1] - data[1] : inside[3] - data[1], inside[0] - data[0] : inside[2] - data[0]
+    ]
     return whole
 
 
 def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     """Name the channels of an image, each contiguous in float32."""
     if not image.layers:
-        raise InputError("an image without layers cannot be written; give at least one, such as 'airlight'")
-    layers = {name or TOTAL: _float32(np.asarray(values), name) for name, values in image.layers.items()}
+        raise InputError(
+            "an image without layers cannot be written; give at least one, such as 'airlight'"
+        )
+    layers = {
+        name or TOTAL: _float32(np.asarray(values), name) for name, values in image.layers.items()
+    }
     first = next(iter(layers))
     for name, values in layers.items():
         if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
-            raise InputError(f"layer '{name}' has shape {values.shape}; expected (height, width, 3), none of them zero")
+            raise InputError(
+                f"layer '{name}' has shape {values.shape}; expected (height, width, 3), none of "
+                "them zero"
+            )
         if values.shape != layers[first].shape:
-            raise InputError(f"layers of two sizes: '{first}' {layers[first].shape}, '{name}' {values.shape}")
+            raise InputError(
+                f"layers of two sizes: '{first}' {layers[first].shape}, '{name}' {values.shape}"
+            )
     if "airlight" in layers:
-        total = layers["airlight"] + layers["surface"] if "surface" in layers else layers["airlight"]
+        total = (
+            layers["airlight"] + layers["surface"] if "surface" in layers else layers["airlight"]
+        )
         # A total read from a file is the same sum; one that is not is a stale or foreign one.
         given = layers.get(TOTAL, total)
         if not np.allclose(given, total, rtol=1e-5, atol=0, equal_nan=True):
-            raise InputError("layer 'total' is not airlight + surface; leave it out and it is written for you")
+            raise InputError(
+                "layer 'total' is not airlight + surface; leave it out and it is written for you"
+            )
         layers[TOTAL] = total
     channels = {}
     for name, values in layers.items():
@@ -282,7 +353,10 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     if image.depth is not None:
         depth = _float32(np.asarray(image.depth), "depth")
         if depth.shape != layers[first].shape[:2]:
-            raise InputError(f"depth has shape {depth.shape}; expected that of the layers, {layers[first].shape[:2]}")
+            raise InputError(
+                f"depth has shape {depth.shape}; expected that of the layers, "
+                f"{layers[first].shape[:2]}"
+            )
         channels["depth.Z"] = np.ascontiguousarray(depth)
     return channels
 
@@ -293,19 +367,28 @@ def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
         rounded = values.astype(np.float32)
     lost = int(np.count_nonzero(np.isinf(rounded) & np.isfinite(values)))
     if lost:
-        raise InputError(f"{lost} values of '{name}' exceed what float32 holds (3.4e38); scale the radiance down")
+        raise InputError(
+            f"{lost} values of '{name}' exceed what float32 holds (3.4e38); scale the radiance down"
+        )
     return rounded
 
 
 def _check_finite(image: Image) -> None:
-    """Refuse layers with NaN or infinity; of depths only NaN, where there is nothing they are infinite."""
-    depth = {} if image.depth is None else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
+    """Refuse layers with NaN or infinity; of depths only NaN, where there is
+    nothing they are infinite.
+    """
+    depth = (
+        {}
+        if image.depth is None
+        else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
+    )
     for name, values in (dict(image.layers) | depth).items():
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             raise InputError(
-                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first in column "
+                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first "
+                "in column "
                 f"{column} of row {row}; an image is written whole, or with finite=False as it is"
             )
 
@@ -313,19 +396,30 @@ def _check_finite(image: Image) -> None:
 def _attribute(key: str, value: Any) -> Attribute:
     """Turn an attribute into one of the three types that the format keeps."""
     if key in _STANDARD or not 0 < len(key.encode()) <= 255:
-        raise InputError(f"'{key}' cannot name a header attribute of ours; choose one such as 'airlight:{key[:40]}'")
+        raise InputError(
+            f"'{key}' cannot name a header attribute of ours; choose one such as "
+            f"'airlight:{key[:40]}'"
+        )
     if isinstance(value, str):
         return value
     if isinstance(value, int | np.integer):
         return int(value) if -(2**31) <= value < 2**31 else str(int(value))
     if isinstance(value, float | np.floating):
         number = float(value)
-        return str(number) if np.isfinite(number) and abs(number) > float(np.finfo(np.float32).max) else number
-    raise InputError(f"attribute '{key}' is a {type(value).__name__}; expected text, an integer or a float")
+        return (
+            str(number)
+            if np.isfinite(number) and abs(number) > float(np.finfo(np.float32).max)
+            else number
+        )
+    raise InputError(
+        f"attribute '{key}' is a {type(value).__name__}; expected text, an integer or a float"
+    )
 
 
 def _check_kind(path: str | os.PathLike[str]) -> None:
-    """Read the first two words: the library prints to the terminal, and names no reason, where these are wrong."""
+    """Read the first two words: the library prints to the terminal, and names no
+    reason, where these are wrong.
+    """
     try:
         with open(path, "rb") as stream:
             start = stream.read(8)
@@ -354,8 +448,14 @@ def _system_errors() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep what OpenEXR's C code prints about a broken file off the terminal; the exception says it once."""
-    with open(os.devnull, "w") as sink, contextlib.redirect_stdout(sink), contextlib.redirect_stderr(sink):
+    """Keep what OpenEXR's C code prints about a broken file off the terminal;
+    the exception says it once.
+    """
+    with (
+        open(os.devnull, "w") as sink,
+        contextlib.redirect_stdout(sink),
+        contextlib.redirect_stderr(sink),
+    ):
         saved = os.dup(2)
         try:
             os.dup2(sink.fileno(), 2)
@@ -365,9 +465,16 @@ def _quiet() -> Iterator[None]:
             os.close(saved)
 
 
-def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Window | None, notes: list[str]) -> Image:
+def _image(
+    channels: dict[str, NDArray[Any]],
+    header: dict[str, Any],
+    window: Window | None,
+    notes: list[str],
+) -> Image:
     """Group channels into layers; note what is changed or left out."""
-    floats = {k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"}
+    floats = {
+        k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"
+    }
     groups: dict[str, dict[str, str]] = {}
     for key in floats:
         name, _, suffix = key.rpartition(".")
@@ -375,7 +482,11 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Wi
     layers, used, grey = {}, set(), []
     for name, group in groups.items():
         # Some programs write r, g, b or Red, Green, Blue.
-        colours = {_COLOURS[suffix.lower()]: key for suffix, key in group.items() if suffix.lower() in _COLOURS} | group
+        colours = {
+            _COLOURS[suffix.lower()]: key
+            for suffix, key in group.items()
+            if suffix.lower() in _COLOURS
+        } | group
         if {"R", "G", "B"} <= colours.keys():
             keys = [colours[suffix] for suffix in "RGB"]
         elif (grey_key := group.get("Y", group.get("y"))) and group.keys() <= {"Y", "y", "A", "Z"}:
@@ -386,16 +497,31 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Wi
         layers[name or TOTAL] = np.stack([floats[key] for key in keys], axis=-1)
         used |= set(keys)
     # With an X it is a component of a vector.
-    depth_key = next((key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None)
+    depth_key = next(
+        (key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None
+    )
     used |= {depth_key} if depth_key else set()
     if grey:
         notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
     if any(channels[key].dtype == np.float16 for key in used):
         notes.append("half floats (relative rounding 5e-4)")
-    integers = {k for k, v in channels.items() if v.dtype.kind in "ui" and k.rpartition(".")[2].lower() in _WHOLE}
+    integers = {
+        k
+        for k, v in channels.items()
+        if v.dtype.kind in "ui" and k.rpartition(".")[2].lower() in _WHOLE
+    }
     if integers:
         notes.append(f"{_INTEGERS} left out: {', '.join(sorted(integers))}")
     if left := sorted(channels.keys() - used - integers):
         notes.append(f"channels left out: {', '.join(left)}")
-    kept = {k: v for k, v in header.items() if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE}
-    return Image(layers, floats.get(depth_key or ""), {**kept, NOTE: "; ".join(notes)} if notes else kept, window)
+    kept = {
+        k: v
+        for k, v in header.items()
+        if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE
+    }
+    return Image(
+        layers,
+        floats.get(depth_key or ""),
+        {**kept, NOTE: "; ".join(notes)} if notes else kept,
+        window,
+    )

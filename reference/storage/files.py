@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files written whole or not at all.
 
-A file is first written under a hidden name in the folder where it belongs, flushed to the disk, and then moved over its
-final name, which POSIX and Windows both do in one step. A process that is killed half-way leaves the old file as it
-was, and the hidden file beside it, which is removed when it is an hour old and something is written there again.
+A file is first written under a hidden name in the folder where it belongs, flushed to the disk, and
+then moved over its final name, which POSIX and Windows both do in one step. A process that is
+killed half-way leaves the old file as it was, and the hidden file beside it, which is removed when
+it is an hour old and something is written there again.
 """
 
 import errno
@@ -32,11 +33,12 @@ _STALE = 3600.0  # seconds after which an unfinished file belongs to nobody
 def ensure_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder with its parents, and prove that files can be written into it.
 
-    Call this before any work is done: it costs one empty temporary file. Permission bits are not asked, because they
-    say nothing about a read-only or full disk, nor about what the superuser may do.
+    Call this before any work is done: it costs one empty temporary file. Permission bits are not
+    asked, because they say nothing about a read-only or full disk, nor about what the superuser may
+    do.
 
-    `path`: the folder; it may exist already. Returns Path: the folder. Raises InputError if the path is not a folder,
-    or the folder cannot be made or written.
+    `path`: the folder; it may exist already. Returns Path: the folder. Raises InputError if the
+    path is not a folder, or the folder cannot be made or written.
     """
     folder = Path(path)
     try:
@@ -45,7 +47,8 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
             pass
     except (FileExistsError, NotADirectoryError) as error:
         raise InputError(
-            f"the output folder {folder} cannot be made: {_obstacle(folder)} is not a folder; give another place"
+            f"the output folder {folder} cannot be made: {_obstacle(folder)} is not a folder; give "
+            "another place"
         ) from error
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
@@ -59,8 +62,8 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
 def alone(folder: Path) -> Iterator[None]:
     """Let no other process write its results into a folder before the block ends.
 
-    The lock is the system's, on the folder itself: it leaves no file, and goes with a process that is killed. Raises
-    InputError if another process is writing there.
+    The lock is the system's, on the folder itself: it leaves no file, and goes with a process that
+    is killed. Raises InputError if another process is writing there.
     """
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -69,7 +72,8 @@ def alone(folder: Path) -> Iterator[None]:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InputError(
-                    f"output: another run is writing into {folder}; wait until it has ended, or give another folder"
+                    f"output: another run is writing into {folder}; wait until it has ended, or "
+                    "give another folder"
                 ) from None
         yield
     finally:
@@ -88,7 +92,8 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
         mode = target.stat().st_mode if target.exists() else stat.S_IFREG
     except (OSError, ValueError) as error:
         raise InputError(f"cannot write the file {path!r}: {error}; give another name") from error
-    # Moving a file over a device such as /dev/null replaces the device, if it is the superuser who does it.
+    # Moving a file over a device such as /dev/null replaces the device, if it is
+    # the superuser who does it.
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
         raise InputError(f"cannot write the file {path}: it is {kind}; give the name of a file")
@@ -98,15 +103,16 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[Path]:
-    """Give the name of a temporary file that becomes `path` when the block ends without an exception.
+    """Give the name of a temporary file that becomes `path` when the block
+    ends without an exception.
 
-    The temporary file lies in the same folder, so that the move is one step, and has the same suffix, so that a writer
-    that picks the format by the suffix works. Any exception, a KeyboardInterrupt too, removes it and leaves `path` as
-    it was.
+    The temporary file lies in the same folder, so that the move is one step, and has the same
+    suffix, so that a writer that picks the format by the suffix works. Any exception, a
+    KeyboardInterrupt too, removes it and leaves `path` as it was.
 
-    `path`: the file to write; its folder is made if needed; `flush`: wait for the disk, so that the file is whole after
-    a loss of power too. The block writes the file that is yielded. Raises InputError if `path` cannot be written, and
-    OSError, which names `path`, if the disk is full.
+    `path`: the file to write; its folder is made if needed; `flush`: wait for the disk, so that the
+    file is whole after a loss of power too. The block writes the file that is yielded. Raises
+    InputError if `path` cannot be written, and OSError, which names `path`, if the disk is full.
     """
     target = ensure_writable(path)
     sweep_hidden(target.parent)
@@ -128,7 +134,9 @@ def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Give a folder that is removed when the block ends; folders that killed processes left a day ago go first."""
+    """Give a folder that is removed when the block ends; folders that killed processes
+    left a day ago go first.
+    """
     for left in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
         if _age(left) > 24 * _STALE:
             shutil.rmtree(left, ignore_errors=True)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A digest of a scene: of every property of every object, every vertex, every value of every file.
 
-Mitsuba tells Python the parameters of its objects, their classes and a few properties beside them. That is everything
-where all classes are in `_WHOLE`. Others have properties that nobody can ask for once they are built: how a texture or
-a grid is filtered and what lies beyond it. A scene with such an object has a digest if it carries one of its
-description, the nodes of Mitsuba's parser and the files that they name, or the code that built it: those who load
-scenes leave that as the id of the scene, since Mitsuba's scenes take no other mark. Any other scene has none: results
-of it are not kept.
+Mitsuba tells Python the parameters of its objects, their classes and a few properties beside them.
+That is everything where all classes are in `_WHOLE`. Others have properties that nobody can ask for
+once they are built: how a texture or a grid is filtered and what lies beyond it. A scene with such
+an object has a digest if it carries one of its description, the nodes of Mitsuba's parser and the
+files that they name, or the code that built it: those who load scenes leave that as the id of the
+scene, since Mitsuba's scenes take no other mark. Any other scene has none: results of it are not
+kept.
 """
 
 import hashlib
@@ -23,13 +24,18 @@ from airlight.reference.storage.store import Content
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
-#: Classes of which parameters and `_beside` tell all. How a film filters and stores pixels, and samplers, count for
-#: nothing: no estimator and no method uses them.
+#: Classes of which parameters and `_beside` tell all. How a film filters and stores pixels, and
+#: samplers, count for nothing: no estimator and no method uses them.
 _WHOLE = {
     *("Scene", "PerspectiveCamera", "HDRFilm", "IndependentSampler", "BoxFilter", "GaussianFilter"),
     *("PointLight", "SpotLight", "DirectionalEmitter", "AreaLight", "ConstantBackgroundEmitter"),
     *("HomogeneousMedium", "ConstVolume", "UniformSpectrum", "SRGBReflectanceSpectrum"),
-    *("IsotropicPhaseFunction", "HGPhaseFunction", "RayleighPhaseFunction", "TabulatedPhaseFunction"),
+    *(
+        "IsotropicPhaseFunction",
+        "HGPhaseFunction",
+        "RayleighPhaseFunction",
+        "TabulatedPhaseFunction",
+    ),
     *("Null", "SmoothDiffuse", "TwoSidedBRDF", "SmoothConductor"),
     *("Sphere", "Disk", "Rectangle", "Cube", "Mesh", "OBJMesh", "PLYMesh"),
 }
@@ -41,7 +47,9 @@ class _UnknownError(Exception):
 
 
 def scene_digest(scene) -> str | None:
-    """Return a digest of a Mitsuba scene; None if it has properties that neither Mitsuba nor its description tells."""
+    """Return a digest of a Mitsuba scene; None if it has properties that neither Mitsuba
+    nor its description tells.
+    """
     described = scene.id() if scene.id().startswith(_DESCRIPTION) else ""
     try:
         digest = _built_digest(scene)
@@ -58,7 +66,9 @@ def scene_content(scene) -> Content:
 
 
 def build_scene(description: Mapping[str, Any]) -> Any:
-    """Return the Mitsuba scene of a dictionary, as `mi.load_dict`, with the digest of its description."""
+    """Return the Mitsuba scene of a dictionary, as `mi.load_dict`, with the
+    digest of its description.
+    """
     scene = mi.load_dict(dict(description))
     if isinstance(scene, mi.Scene) and not is_whole(scene):
         config = mi.parser.ParserConfig(mi.variant())
@@ -72,9 +82,11 @@ def give_description(scene, digest: str | None) -> None:
 
 
 def description_digest(state: Any) -> str | None:
-    """Return a digest of the nodes of a parsed scene and of the files that they name; None if a value has none.
+    """Return a digest of the nodes of a parsed scene and of the files that they name;
+    None if a value has none.
 
-    Call it before `mi.parser.instantiate`, which takes the nodes apart, with the file resolver of the scene.
+    Call it before `mi.parser.instantiate`, which takes the nodes apart, with the
+    file resolver of the scene.
     """
     digest = hashlib.sha256()
     try:
@@ -91,7 +103,9 @@ def description_digest(state: Any) -> str | None:
 
 
 def is_whole(scene) -> bool:
-    """Return whether Mitsuba tells every property of a scene, or of another object, that is built."""
+    """Return whether Mitsuba tells every property of a scene, or of
+    another object, that is built.
+    """
     return {part.class_name() for part in mi.traverse(scene).hierarchy} <= _WHOLE
 
 
@@ -109,7 +123,9 @@ def _built_digest(scene) -> str:
 
 
 def _beside(scene) -> Iterator[str]:
-    """Yield what decides the numbers but is no parameter: which way surfaces face, and which media are where."""
+    """Yield what decides the numbers but is no parameter: which way surfaces face,
+    and which media are where.
+    """
     for sensor in scene.sensors():
         yield _medium_words(sensor.get_medium())
     for emitter in scene.emitters():
@@ -132,7 +148,8 @@ def _property_bytes(value: Any) -> bytes:
         return str(value.index()).encode()
     if isinstance(value, mi.Properties.Reference):
         return value.id().encode()
-    if hasattr(value, "wavelengths"):  # a spectrum, whose type has no name of its own in every variant
+    # a spectrum, whose type has no name of its own in every variant
+    if hasattr(value, "wavelengths"):
         return _value_bytes(value.wavelengths) + b"|" + _value_bytes(value.values)
     if isinstance(value, str):
         path = Path(str(mi.file_resolver().resolve(value)))
@@ -153,7 +170,8 @@ def _value_bytes(value: Any) -> bytes:
     """Return the bytes of a number, a word, an array, or a transform."""
     if isinstance(value, str):
         return value.encode()
-    # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its
+    # first channel six times.
     matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:
         array = np.array(matrix, dtype=np.float64)

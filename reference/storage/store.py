@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results that are cached between runs: references, batches, rays, parts of reports.
 
-A frozen record of inputs is the only key of a result: a digest of each of its fields, and of the code that computes
-(`reference.storage.code`). There is no way around it: a field cannot be left out, and a field without content that is
-the same in every process, such as a set, a function or an object of a library, is a TypeError. A record may hold
-another one: the key of a row holds that of its reference. Arguments that say how and not what (a progress, other
-processes, patience) go to the function that computes and are no fields.
+A frozen record of inputs is the only key of a result: a digest of each of its fields, and of the
+code that computes (`reference.storage.code`). There is no way around it: a field cannot be left
+out, and a field without content that is the same in every process, such as a set, a function or an
+object of a library, is a TypeError. A record may hold another one: the key of a row holds that of
+its reference. Arguments that say how and not what (a progress, other processes, patience) go to the
+function that computes and are no fields.
 
-The time of a result is the time to compute it from nothing: when a result is loaded, its original time is added to the
-time of the result that is being computed from it.
+The time of a result is the time to compute it from nothing: when a result is loaded, its original
+time is added to the time of the result that is being computed from it.
 
-A value is made of numbers, words, arrays, lists, dictionaries and records of these, as a type says. Work that goes on
-where it was stopped keeps its parts by `store` and `load` under keys inside that of the whole: batches of a Monte Carlo
-estimator, of which eight become one file of a quarter the size, and images of area lights. Rows of a study lie in one
-database by the same keys (`validation/study/rows.py`): a study may have millions, and a row takes 0.5 ms of the
-processor and 1.4 kB there, where a file of its own takes 1.5 ms.
+A value is made of numbers, words, arrays, lists, dictionaries and records of these, as a type says.
+Work that goes on where it was stopped keeps its parts by `store` and `load` under keys inside that
+of the whole: batches of a Monte Carlo estimator, of which eight become one file of a quarter the
+size, and images of area lights. Rows of a study lie in one database by the same keys
+(`validation/study/rows.py`): a study may have millions, and a row takes 0.5 ms of the processor and
+1.4 kB there, where a file of its own takes 1.5 ms.
 """
 
 import hashlib
@@ -34,30 +36,44 @@ import msgspec
 import numpy as np
 
 from airlight.analytic.clock import Spent, stopwatch
-from airlight.reference.storage.cache import drop_arrays, drop_parts, is_stored, load_arrays, store_arrays
+from airlight.reference.storage.cache import (
+    drop_arrays,
+    drop_parts,
+    is_stored,
+    load_arrays,
+    store_arrays,
+)
 from airlight.reference.storage.code import source_digest
 
-_FORMAT = 2  # of keys and of what is stored under them: another one, and everything is computed again
-_FRESH = "AIRLIGHT_FRESH"  # results that are older count as missing [s since 1970]; child processes inherit it
+# of keys and of what is stored under them: another one, and everything is computed again
+_FORMAT = 2
+# results that are older count as missing [s since 1970]; child processes inherit it
+_FRESH = "AIRLIGHT_FRESH"
 _ABOUT = ("seconds", "processor", "made")  # what is stored beside the arrays of a result
-_DATA, _ARRAY = "data", "array number"  # the array of the JSON of a value, and what stands there for an array
+# the array of the JSON of a value, and what stands there for an array
+_DATA, _ARRAY = "data", "array number"
 
 T = TypeVar("T")
 
 
-# --- keys ------------------------------------------------------------------------------------------------------------
+# --- keys -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Content:
-    """A digest of something that is no number, word or array: a scene, a file, code of the user's."""
+    """A digest of something that is no number, word or array: a scene, a
+    file, code of the user's.
+    """
 
-    digest: str | None  #: None where nobody can tell it from another: what depends on it is not cached
+    #: None where nobody can tell it from another: what depends on it is not cached
+    digest: str | None
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs of a result: a subclass has a field for each, and the result is cached for these alone."""
+    """The inputs of a result: a subclass has a field for each, and the result
+    is cached for these alone.
+    """
 
     kind: ClassVar[str]  #: one or more words with dashes: names of files begin with it
     modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default that of the class
@@ -85,7 +101,11 @@ def _encoded(value: Any) -> Any:
     if isinstance(value, Content) and value.digest is None:
         raise _NoDigestError
     if is_dataclass(value) and not isinstance(value, type):
-        code = [source_digest(*(value.modules or (type(value).__module__,)))] if isinstance(value, Inputs) else []
+        code = (
+            [source_digest(*(value.modules or (type(value).__module__,)))]
+            if isinstance(value, Inputs)
+            else []
+        )
         return [
             type(value).__qualname__,
             *code,
@@ -101,11 +121,12 @@ def _encoded(value: Any) -> Any:
         data = np.ascontiguousarray(value).tobytes()
         return [value.dtype.str, value.shape, hashlib.sha256(data).hexdigest()]
     raise TypeError(
-        f"{type(value).__name__} cannot be part of a key: expected numbers, words, arrays or frozen records"
+        f"{type(value).__name__} cannot be part of a key: expected numbers, words, arrays or "
+        "frozen records"
     )
 
 
-# --- results ---------------------------------------------------------------------------------------------------------
+# --- results --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -129,7 +150,10 @@ class Kept(Generic[T]):
 
 
 def stored(
-    inputs: Inputs, compute: Callable[[], T], kind: Any, worth: Callable[[T], bool] = lambda value: True
+    inputs: Inputs,
+    compute: Callable[[], T],
+    kind: Any,
+    worth: Callable[[T], bool] = lambda value: True,
 ) -> Kept[T]:
     """Return the result of some inputs, from the cache or computed now and cached.
 
@@ -153,8 +177,16 @@ def stored(
     return keep(inputs, value, spent, kind, worth)
 
 
-def keep(inputs: Inputs, value: T, spent: Spent, kind: Any, worth: Callable[[T], bool] = lambda value: True) -> Kept[T]:
-    """Cache the result of some inputs that was computed, here or elsewhere, and return it as it will be loaded."""
+def keep(
+    inputs: Inputs,
+    value: T,
+    spent: Spent,
+    kind: Any,
+    worth: Callable[[T], bool] = lambda value: True,
+) -> Kept[T]:
+    """Cache the result of some inputs that was computed, here or elsewhere, and return
+    it as it will be loaded.
+    """
     kept = store(inputs.key if worth(value) else None, _packed(value), spent)
     if inputs.key is not None:
         drop_parts(inputs.key)
@@ -184,15 +216,19 @@ def _packed(value: Any) -> dict[str, Any]:
 def _unpacked(arrays: Mapping[str, Any], kind: Any) -> Any:
     """Return the value of a type that was packed."""
     text = np.asarray(arrays[_DATA]).tobytes()
-    tree = json.loads(text, object_hook=lambda each: arrays[each[_ARRAY]] if each.keys() == {_ARRAY} else each)
+    tree = json.loads(
+        text, object_hook=lambda each: arrays[each[_ARRAY]] if each.keys() == {_ARRAY} else each
+    )
     return msgspec.convert(tree, kind, dec_hook=lambda _, each: each)
 
 
-# --- arrays under a key, None for none -------------------------------------------------------------------------------
+# --- arrays under a key, None for none ------------------------------------------------------------
 
 
 def load(key: str | None) -> Kept[dict[str, Any]] | None:
-    """Return the arrays of a key; None if it is missing, damaged or, in a fresh run, older than the run."""
+    """Return the arrays of a key; None if it is missing, damaged or, in a fresh
+    run, older than the run.
+    """
     loading = stopwatch()
     arrays = load_arrays(key) if key is not None and is_kept(key) else None
     if arrays is None:
@@ -207,18 +243,25 @@ def store(key: str | None, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict
     """Cache arrays, and what they took; without a key they are returned alone."""
     made = time.time()
     if key is not None:
-        store_arrays(key, {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made), strict=True))})
+        store_arrays(
+            key,
+            {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made), strict=True))},
+        )
     return Kept(dict(arrays), spent, made, False)
 
 
 def is_kept(key: str | None) -> bool:
-    """Return whether there is a result under a key that `load` may return; damage is not looked for."""
+    """Return whether there is a result under a key that `load` may return;
+    damage is not looked for.
+    """
     about = None if key is None else load_arrays(key, ("made",))
     return about is not None and float(about["made"]) >= float(os.environ.get(_FRESH, 0))
 
 
 def is_damaged(key: str | None) -> bool:
-    """Return whether there is a file under a key that cannot be read, or is not what was written."""
+    """Return whether there is a file under a key that cannot be read, or
+    is not what was written.
+    """
     return key is not None and is_stored(key) and load_arrays(key) is None
 
 
@@ -228,11 +271,13 @@ def drop(key: str | None) -> None:
         drop_arrays(key)
 
 
-# --- times -----------------------------------------------------------------------------------------------------------
+# --- times ----------------------------------------------------------------------------------------
 
 
 class Ledger:
-    """The cost of computing from nothing: the time since now, and the original times of results that are loaded."""
+    """The cost of computing from nothing: the time since now, and the original times of
+    results that are loaded.
+    """
 
     def __init__(self) -> None:
         self._took, self.loaded = stopwatch(), Spent()
@@ -260,7 +305,9 @@ def counted() -> Iterator[Ledger]:
 
 
 def add_spent(spent: Spent) -> None:
-    """Count what another process spent, or what it once took to compute a result that was loaded."""
+    """Count what another process spent, or what it once took to compute
+    a result that was loaded.
+    """
     ledger = _LEDGER.get()
     if ledger is not None:
         ledger.loaded += spent
@@ -268,7 +315,8 @@ def add_spent(spent: Spent) -> None:
 
 @contextmanager
 def fresh_results(since: float | None) -> Iterator[None]:
-    """Within the block, results older than `since` [s since 1970] count as missing; None changes nothing.
+    """Within the block, results older than `since` [s since 1970] count as
+    missing; None changes nothing.
 
     Processes that start in the block do the same.
     """

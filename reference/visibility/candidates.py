@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Which shapes can stand in the light of which rays: one search for all lights.
 
-Shadow segments lead from a ball about the light, or from far away in its direction, to points of the rays, all of which
-begin at the camera: they lie in the convex hull of both. A shape beyond a plane that has the hull on one side is left
-out. For a unit vector m the hull reaches up to
+Shadow segments lead from a ball about the light, or from far away in its direction, to points of
+the rays, all of which begin at the camera: they lie in the convex hull of both. A shape beyond a
+plane that has the hull on one side is left out. For a unit vector m the hull reaches up to
 
     h(m) = max(0, m . (C - o) + R, max_i l_i m . d_i),
 
-o the camera, C and R the ball (a direction C towards the light: unbounded if m . C > 0), d_i and l_i the rays and their
-lengths; a shape is out if the ball around it is above h(m) along m. That holds whatever m is, so no case needs care.
+o the camera, C and R the ball (a direction C towards the light: unbounded if m . C > 0), d_i and
+l_i the rays and their lengths; a shape is out if the ball around it is above h(m) along m. That
+holds whatever m is, so no case needs care.
 
-Rays are taken in tiles: sorted by their azimuth about the axis from the camera to the light, cut in strips, and these
-by the angle from the axis. All planes of rays and a point light hold this axis, so the planes on both sides of a strip
-leave out all but the shapes that the planes of its rays meet. Other m lie in the plane of the tile's mean ray and the
-axis, and touch the ball beside it. Where rays are unbounded, m is leaned back until none of them rises along it. Rays
-are parted again and again, and each part looks through what the one that it is of has left, while that is much; for a
-area light, whose samples are many, down to single rays.
+Rays are taken in tiles: sorted by their azimuth about the axis from the camera to the light, cut in
+strips, and these by the angle from the axis. All planes of rays and a point light hold this axis,
+so the planes on both sides of a strip leave out all but the shapes that the planes of its rays
+meet. Other m lie in the plane of the tile's mean ray and the axis, and touch the ball beside it.
+Where rays are unbounded, m is leaned back until none of them rises along it. Rays are parted again
+and again, and each part looks through what the one that it is of has left, while that is much; for
+a area light, whose samples are many, down to single rays.
 """
 
 from collections.abc import Iterator
@@ -36,12 +38,16 @@ _FAN = np.arange(12) * np.pi / 6  # directions in the plane of a ray and the axi
 _LEVEL = 1e-12  # a rise of a vector along a ray below this is rounding
 _SLACK = 1e-9  # of the size of the scene: rounding
 _MANY = 300  # shapes: fewer are held against all planes at once
-_WORTH = 512  # pairs of rays and shapes: to look through fewer costs less than to part them, for 50 samples of a light
+# pairs of rays and shapes: to look through fewer costs less than to part them,
+# for 50 samples of a light
+_WORTH = 512
 
 
 @dataclass(frozen=True)
 class Ball:
-    """The bounds of a light: a ball about a place, or the direction towards it, with w as in `planes`."""
+    """The bounds of a light: a ball about a place, or the direction towards
+    it, with w as in `planes`.
+    """
 
     centre: Array  #: (3,) [m], or a unit vector
     radius: float = 0.0  #: [m]
@@ -57,27 +63,36 @@ class Near:
     disks: tuple[Index, Index, Index]
 
 
-def near_shapes(light: Ball, origin: Array, direction: Array, length: Array, shapes: Shapes) -> Near:
+def near_shapes(
+    light: Ball, origin: Array, direction: Array, length: Array, shapes: Shapes
+) -> Near:
     """Return the shapes that can stand between a light and rays.
 
-    `light`: what holds it; `origin`, `direction`, `length`: of the rays: where all begin, (3,) [m], unit vectors,
-    (rays, 3), and how far they go, (rays,) [m]; `shapes`: the shapes.
+    `light`: what holds it; `origin`, `direction`, `length`: of the rays: where all begin, (3,) [m],
+    unit vectors, (rays, 3), and how far they go, (rays,) [m]; `shapes`: the shapes.
     """
-    none = np.zeros(len(direction), np.int64), np.zeros(len(direction), np.int64), np.empty(0, np.int64)
+    none = (
+        np.zeros(len(direction), np.int64),
+        np.zeros(len(direction), np.int64),
+        np.empty(0, np.int64),
+    )
     if not shapes.count or not len(direction):
         return Near(none, none, none)
     middle = shapes.triangles.mean(axis=1)
     around = np.linalg.norm(shapes.triangles - middle[:, None], axis=2).max(axis=1)
     centres = np.concatenate([middle, shapes.centre, shapes.disks.centre]) - origin
     solids = centres, np.concatenate([around, shapes.radius, shapes.disks.radius])
-    lists: list[tuple[Index, Index]] = []  # of rays, and of solids, of which each tile has all pairs
+    # of rays, and of solids, of which each tile has all pairs
+    lists: list[tuple[Index, Index]] = []
     for rays, numbers in _tiles(light, origin, direction, length, solids):
         lists.append((rays, numbers))
     ends = np.cumsum([0, len(shapes.triangles), len(shapes.radius), len(shapes.disks.radius)])
     return Near(*(_of_kind(lists, len(direction), ends[k], ends[k + 1]) for k in range(3)))
 
 
-def _of_kind(lists: list[tuple[Index, Index]], count: int, first: int, last: int) -> tuple[Index, Index, Index]:
+def _of_kind(
+    lists: list[tuple[Index, Index]], count: int, first: int, last: int
+) -> tuple[Index, Index, Index]:
     """Return the lists of the solids from `first` up to `last`, which are ascending, by ray."""
     begin, end = np.zeros(count, np.int64), np.zeros(count, np.int64)
     parts, at = [np.empty(0, np.int64)], 0
@@ -122,7 +137,9 @@ def _tiles(
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return the cross product of two vectors: NumPy's, for many of them, takes fifty times as long for two."""
+    """Return the cross product of two vectors: NumPy's, for many of them, takes
+    fifty times as long for two.
+    """
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
@@ -131,7 +148,14 @@ class _Hull:
     """Half spaces that hold a light and some rays."""
 
     def __init__(
-        self, light: Ball, axis: Array, to_light: Array, direction: Array, length: Array, fan: Array, slack: float
+        self,
+        light: Ball,
+        axis: Array,
+        to_light: Array,
+        direction: Array,
+        length: Array,
+        fan: Array,
+        slack: float,
     ):
         mean = direction.mean(axis=0)
         size = np.linalg.norm(mean)
@@ -142,7 +166,8 @@ class _Hull:
         up /= np.linalg.norm(up)
         side = _cross(mean, up)
         vectors = []
-        # Both planes through the axis that hold the rays between them, and those that touch the ball as well.
+        # Both planes through the axis that hold the rays between them, and those
+        # that touch the ball as well.
         out = up - (up @ axis) * axis
         if np.linalg.norm(out) < 1e-9:
             out = mean - (mean @ axis) * axis
@@ -161,7 +186,11 @@ class _Hull:
         if np.isinf(length).any():
             forward = direction @ mean
             rise = (m @ direction.T) / np.maximum(forward, 1e-3)
-            m = m - np.where(forward.min() > 1e-3, np.maximum(rise.max(axis=1), 0.0), 0.0)[:, None] * mean
+            m = (
+                m
+                - np.where(forward.min() > 1e-3, np.maximum(rise.max(axis=1), 0.0), 0.0)[:, None]
+                * mean
+            )
         rise = m @ direction.T
         with np.errstate(invalid="ignore"):
             reach = np.where(rise > _LEVEL, rise * length, 0.0).max(axis=1)
@@ -176,9 +205,13 @@ class _Hull:
         """Return which balls of these numbers no half space leaves out."""
         centre, radius = solids
         for first in range(len(self.m)):
-            # One after the other while they are many: the planes beside the rays, which come first, leave few.
+            # One after the other while they are many: the planes beside the rays,
+            # which come first, leave few.
             m = slice(first, first + 1 if len(numbers) > _MANY else None)
-            beyond = centre[numbers] @ self.m[m].T - radius[numbers, None] * self.norm[m] > self.support[m]
+            beyond = (
+                centre[numbers] @ self.m[m].T - radius[numbers, None] * self.norm[m]
+                > self.support[m]
+            )
             numbers = numbers[~(beyond[:, 0] if m.stop else beyond.any(axis=1))]
             if not m.stop:
                 break

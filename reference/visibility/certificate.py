@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence that lit intervals are right: fresh random shadow rays, which share no code with them, and one judge.
+"""Evidence that lit intervals are right: fresh random shadow rays, which share no code
+with them, and one judge.
 
-Mitsuba casts the shadow rays in single precision. Within the rounding of an edge they decide nothing. Elsewhere a third
-route judges a contradiction: a float64 test of that one shadow segment against every triangle (Moeller and Trumbore
-1997, Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2(1)), sphere and disk. Segments that remain
-undecided are in doubt, and their largest effect goes into the bound of the image.
+Mitsuba casts the shadow rays in single precision. Within the rounding of an edge they decide
+nothing. Elsewhere a third route judges a contradiction: a float64 test of that one shadow segment
+against every triangle (Moeller and Trumbore 1997, Fast, minimum storage ray-triangle intersection,
+J. Graphics Tools 2(1)), sphere and disk. Segments that remain undecided are in doubt, and their
+largest effect goes into the bound of the image.
 """
 
 import hashlib
@@ -23,11 +25,15 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-ROUNDING = 1e-5  #: of the angle at a light, or of coordinates: shadow rays end 2e-6 early, and are rounded to 1e-7
-EXACT_EDGE = 1e-11  #: relative uncertainty of the distance of an edge from its light: rounding, a lost digit, merging
-JUDGED = 256  #: contradictions that are tested against every shape; more than a few mean that something is wrong
+#: of the angle at a light, or of coordinates: shadow rays end 2e-6 early, and are rounded to 1e-7
+ROUNDING = 1e-5
+#: relative uncertainty of the distance of an edge from its light: rounding, a lost digit, merging
+EXACT_EDGE = 1e-11
+#: contradictions that are tested against every shape; more than a few mean that something is wrong
+JUDGED = 256
 _SHORT = 2e-6  # relative: how far before its point a shadow ray ends
-_CLEAR = 1e-5  # of the largest coordinate: off the surface of a light, clear of float32 shapes in its plane
+# of the largest coordinate: off the surface of a light, clear of float32 shapes in its plane
+_CLEAR = 1e-5
 _CHUNK = 1 << 22  # rays cast at once
 _SLACK = 1e-9  # of how far away a triangle is: float64 rounding is 1e-15
 
@@ -37,7 +43,8 @@ class RandomChecks:
     """How often fresh random shadow rays contradicted lit intervals."""
 
     checked: int = 0  #: shadow rays cast
-    disagreements: int = 0  #: of these, how many contradicted the intervals further from an edge than rounding
+    #: of these, how many contradicted the intervals further from an edge than rounding
+    disagreements: int = 0
     refined: int = 0  #: disagreements that were settled by testing every shape in float64
     left: int = 0  #: disagreements that were not
     missed: float = 0.0  #: fraction of the shadow rays that contradicted the intervals
@@ -62,9 +69,11 @@ class LitIntervals:
     low: Array  #: distance at which the interval begins [m]
     high: Array  #: where it ends, may be infinite [m]
     transitions: int = 0  #: edges between light and shadow
-    edge: float = EXACT_EDGE  #: relative uncertainty of the distance of an edge from its light, or of coordinates
+    #: relative uncertainty of the distance of an edge from its light, or of coordinates
+    edge: float = EXACT_EDGE
     random_checks: RandomChecks = field(default_factory=RandomChecks)
-    #: what was left in doubt: rays, and what part of each, an angle at the light [rad] or a length [m]
+    #: what was left in doubt: rays, and what part of each, an angle at the
+    #: light [rad] or a length [m]
     doubt: tuple[Index, Array] = field(default_factory=lambda: (np.empty(0, np.int64), np.empty(0)))
 
 
@@ -81,26 +90,31 @@ def certified(
 ) -> LitIntervals:
     """Check lit intervals at random places.
 
-    `lit`, `rays`: the intervals, and the rays in their planes with the light; `ends`: between which distances the rays
-    were looked at, (rays,) each [m]; `occluders`, `shapes`: what stands in the light: as an `mi.Scene`, and as numbers;
-    `checks`, `every`: shadow rays to each of every so many rays: an odd number steps through all samples of a light;
-    `normal`: of the surface of the light at each position, unit, (rays, 3); None for lights that are points.
+    `lit`, `rays`: the intervals, and the rays in their planes with the light; `ends`: between which
+    distances the rays were looked at, (rays,) each [m]; `occluders`, `shapes`: what stands in the
+    light: as an `mi.Scene`, and as numbers; `checks`, `every`: shadow rays to each of every so many
+    rays: an odd number steps through all samples of a light; `normal`: of the surface of the light
+    at each position, unit, (rays, 3); None for lights that are points.
     """
     ray = np.arange(0, len(rays.foot), every)
     ray = ray[ends[1][ray] > ends[0][ray]]
     if not len(ray) or not shapes.count:
         return lit
     low, high = (_measure(rays, end, slice(None)) for end in ends)
-    fraction = (np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))) / checks
+    fraction = (
+        np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))
+    ) / checks
     ray, fraction = np.repeat(ray, checks), fraction.ravel()
     at = low[ray] + fraction * (high - low)[ray]
     x = at if rays.w == 0 else rays.distance(at, ray)
-    finite = np.isfinite(x)  # a light on the line of a ray sees all of it at one angle, which is endlessly far
+    # a light on the line of a ray sees all of it at one angle, which is endlessly far
+    finite = np.isfinite(x)
     ray, fraction, x = ray[finite], fraction[finite], x[finite]
     # Two a ray, and the fraction of it that comes before: one number orders all.
     width = np.where(high > low, high - low, 1.0)
     begin, end = (
-        np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1) for part in (lit.low, lit.high)
+        np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1)
+        for part in (lit.low, lit.high)
     )
     number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + fraction, side="right")
     count = len(lit.ray)
@@ -115,13 +129,21 @@ def certified(
         gap = np.where(same, np.minimum(gap, near), gap)
     rounding = ROUNDING * (1.0 if rays.w else coordinates(rays, shapes))
     start, target = _segments(rays, ray, x, shapes)
-    clear = start if normal is None else start + _CLEAR * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
+    clear = (
+        start
+        if normal is None
+        else start + _CLEAR * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
+    )
     seen = _cast(occluders, clear, target)
-    wrong = np.flatnonzero((seen != expected) & (gap * width[ray] > np.broadcast_to(rounding, len(low))[ray]))
+    wrong = np.flatnonzero(
+        (seen != expected) & (gap * width[ray] > np.broadcast_to(rounding, len(low))[ray])
+    )
     judged = wrong[:JUDGED]
     lit_there = ~segments_blocked(start[judged], target[judged], shapes)
     left = np.append(judged[lit_there != expected[judged]], wrong[JUDGED:])
-    found = RandomChecks(len(ray), len(wrong), len(wrong) - len(left), len(left), len(wrong) / len(ray))
+    found = RandomChecks(
+        len(ray), len(wrong), len(wrong) - len(left), len(left), len(wrong) / len(ray)
+    )
     return replace(lit, random_checks=found, doubt=(ray[left], width[ray[left]] / checks))
 
 
@@ -131,10 +153,11 @@ def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
 
 
 def coordinates(rays: Rays, shapes: Shapes) -> Array:
-    """Return the effect of the relative uncertainty of coordinates on each ray, by edges of shadows, (rays,) [m].
+    """Return the effect of the relative uncertainty of coordinates on each ray, by edges
+    of shadows, (rays,) [m].
 
-    That is, under a directional light: the largest distance between the camera and what is on shadow segments, over the
-    sine.
+    That is, under a directional light: the largest distance between the camera and what is on
+    shadow segments, over the sine.
     """
     return _reach(rays, shapes) / rays.height
 
@@ -155,7 +178,9 @@ def _box(centre: Array, radius: Array) -> Array:
 
 
 def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, Array]:
-    """Return both ends of shadow segments: at the light, or beyond all shapes, and at points of rays."""
+    """Return both ends of shadow segments: at the light, or beyond all
+    shapes, and at points of rays.
+    """
     target = rays.point(ray, x)
     if rays.w:
         return rays.position[ray], target
@@ -180,7 +205,8 @@ def _cast(occluders: Any, start: Array, target: Array) -> Bools:
 def _generator(*drawn_for: Array) -> np.random.Generator:
     """Return a generator whose seed is the digest of what numbers are drawn for.
 
-    Rays, lights and scenes are then checked at places of their own, and at the same ones in every run.
+    Rays, lights and scenes are then checked at places of their own, and at
+    the same ones in every run.
     """
     digest = hashlib.blake2b(digest_size=16)
     for array in drawn_for:
@@ -202,9 +228,15 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     for number, (point, towards) in enumerate(zip(start, way, strict=True)):
         away = corner - point
         length = np.linalg.norm(towards)
-        off = np.linalg.norm(np.cross(away, towards / length), axis=1) if length > 0 else np.zeros(len(away))
+        off = (
+            np.linalg.norm(np.cross(away, towards / length), axis=1)
+            if length > 0
+            else np.zeros(len(away))
+        )
         near = np.flatnonzero(off <= longest + _SLACK * (1 + np.abs(away).max(axis=1, initial=0)))
-        blocked[number] = _meets_triangle(point, towards, corner[near], (edges[0][near], edges[1][near])).any()
+        blocked[number] = _meets_triangle(
+            point, towards, corner[near], (edges[0][near], edges[1][near])
+        ).any()
     for centre, radius in zip(shapes.centre, shapes.radius, strict=True):
         blocked |= _meets_sphere(start - centre, way, radius)
     disks = shapes.disks
@@ -217,7 +249,9 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
 
 
 def _meets_triangle(start: Array, way: Array, corner: Array, edges: tuple[Array, Array]) -> Bools:
-    """Solve start + s way = corner + u e1 + v e2 for every triangle; the scalar products share the determinant."""
+    """Solve start + s way = corner + u e1 + v e2 for every triangle; the scalar
+    products share the determinant.
+    """
     first_edge, second_edge = edges
     across = np.cross(way, second_edge)
     determinant = np.sum(first_edge * across, axis=-1)
@@ -242,20 +276,23 @@ def _meets_sphere(from_centre: Array, way: Array, radius: float) -> Bools:
         return (discriminant > 0) & (((near > 0) & (near < 1)) | ((far > 0) & (far < 1)))
 
 
-def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, scene: Any, shapes: Shapes) -> Bools:
+def reached_by_shadow_rays(
+    interaction: Any, light: Array, reached: Bools, *, scene: Any, shapes: Shapes
+) -> Bools:
     """Return which surfaces a light reaches from where Mitsuba starts its shadow rays.
 
-    A shadow ray must not hit the surface that it leaves, so `SurfaceInteraction.spawn_ray_to` starts it some way off
-    the surface, along its normal: in single precision 1e-4 (1 + the largest coordinate) (Mitsuba 3.9, `offset_p` in
-    `include/mitsuba/render/interaction.h`). A point whose own shadow ray just clears an edge may then lie in the
-    shadow, and the other way round: shadow edges move by about that length, and a renderer that starts its rays so
-    converges to the moved edges, as it does to the shortened segment of `reference.scene.shadow_epsilon`. Where
-    Mitsuba's ray and the exact lit intervals differ, what the judge says of the ray from Mitsuba's start holds: so a
-    fault of the lit intervals is still found by the comparison.
+    A shadow ray must not hit the surface that it leaves, so `SurfaceInteraction.spawn_ray_to`
+    starts it some way off the surface, along its normal: in single precision 1e-4 (1 + the largest
+    coordinate) (Mitsuba 3.9, `offset_p` in `include/mitsuba/render/interaction.h`). A point whose
+    own shadow ray just clears an edge may then lie in the shadow, and the other way round: shadow
+    edges move by about that length, and a renderer that starts its rays so converges to the moved
+    edges, as it does to the shortened segment of `reference.scene.shadow_epsilon`. Where Mitsuba's
+    ray and the exact lit intervals differ, what the judge says of the ray from Mitsuba's start
+    holds: so a fault of the lit intervals is still found by the comparison.
 
-    `interaction`: Mitsuba's surface interactions, one for each ray; `light`: position of the light (3,) [m]; `reached`:
-    whether it reaches the surface points themselves, by exact geometry, (rays,); `scene`, `shapes`: the `mi.Scene` of
-    the occluders, and the same as numbers.
+    `interaction`: Mitsuba's surface interactions, one for each ray; `light`: position of the light
+    (3,) [m]; `reached`: whether it reaches the surface points themselves, by exact geometry,
+    (rays,); `scene`, `shapes`: the `mi.Scene` of the occluders, and the same as numbers.
     """
     ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
     valid = np.array(interaction.is_valid(), dtype=bool)
@@ -264,7 +301,10 @@ def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, sc
     start = np.array(ray.o, dtype=np.float64).T[differs]
     way = light - start
     length = np.linalg.norm(way, axis=1)
-    fraction = np.minimum(np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny), 1.0)
+    fraction = np.minimum(
+        np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny),
+        1.0,
+    )
     confirmed = reached.copy()
     confirmed[differs] = ~segments_blocked(start, start + way * fraction[:, None], shapes)
     return confirmed

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Distances along straight lines in float64: to convex bounds without cancellation, and to the visible surface.
+"""Distances along straight lines in float64: to convex bounds without cancellation,
+and to the visible surface.
 
 The visible surface is the triangle or sphere that a ray cast in float32 has met.
 """
@@ -24,20 +25,26 @@ _BLOCK = 1 << 21  # numbers in one block of rays and facets
 def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return where rays enter and leave a body.
 
-    `bounds`: the body; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3). Returns
-    `enter`, `leave`: distances along the whole straight line, (n,) [m]; leave <= enter where it misses the body.
+    `bounds`: the body; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit
+    vectors, (n, 3). Returns `enter`, `leave`: distances along the whole straight line, (n,) [m];
+    leave <= enter where it misses the body.
     """
     if isinstance(bounds, Sphere):
-        return sphere_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
+        return sphere_crossings(
+            np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin)
+        )
     return crossed_facets(bounds, origin, direction)[2:]
 
 
-def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
-    """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does.
+def crossed_facets(
+    bounds: Polyhedron, origin: Array, direction: Array
+) -> tuple[Index, Index, Array, Array]:
+    """Return the facets at which rays enter and leave a polyhedron, and the
+    distances, as `crossings` does.
 
-    `bounds`: the polyhedron; `origin`, `direction`: as in `crossings`. Returns `entered`, `left`: numbers of the
-    facets, (n,) each. Returns `enter`, `leave`: distances along the whole straight line, (n,) each [m]; leave <= enter
-    where it misses the polyhedron.
+    `bounds`: the polyhedron; `origin`, `direction`: as in `crossings`. Returns `entered`, `left`:
+    numbers of the facets, (n,) each. Returns `enter`, `leave`: distances along the whole straight
+    line, (n,) each [m]; leave <= enter where it misses the polyhedron.
     """
     origin = np.atleast_2d(origin)
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
@@ -58,12 +65,15 @@ def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple
 
 
 def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
-    """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power, +-inf where they miss it [m].
+    """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power,
+    +-inf where they miss it [m].
 
-    The smaller root in size is taken from the product of both, which is the power, so that nothing cancels.
+    The smaller root in size is taken from the product of both, which is the power,
+    so that nothing cancels.
 
-    `along`: direction . (centre - origin), (n,) [m], for a unit direction. `power`: |centre - origin|^2 - radius^2, the
-    power of the origin, (n,) or a scalar [m^2]. Returns `low`, `high`: (n,) each [m].
+    `along`: direction . (centre - origin), (n,) [m], for a unit direction. `power`: |centre -
+    origin|^2 - radius^2, the power of the origin, (n,) or a scalar [m^2]. Returns `low`, `high`:
+    (n,) each [m].
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
@@ -79,23 +89,27 @@ def _power(sphere: Sphere, origin: Array) -> Array:
 
 
 def half_chord(radius: Array | float, distance: Array) -> Array:
-    """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 - distance^2); 0 beyond the radius.
+    """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 -
+    distance^2); 0 beyond the radius.
 
-    `radius`: of the disk, (n,) or a scalar [m]; `distance`: of the chord from the centre, (n,) [m], at least 0. Returns
-    (n,) [m], without cancellation where both are alike.
+    `radius`: of the disk, (n,) or a scalar [m]; `distance`: of the chord from the centre, (n,) [m],
+    at least 0. Returns (n,) [m], without cancellation where both are alike.
     """
     return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))
 
 
-def exact_distance(reference: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
+def exact_distance(
+    reference: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None
+) -> Array:
     """Return the distances to the visible surface again in float64, where that is flat or a sphere.
 
-    `reference`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface interactions: which
-    triangle each ray met; `distance`: the distances that were found, (rays,), infinite where nothing is hit [m];
-    `shapes`: what `read_shapes` returned, if known.
+    `reference`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface
+    interactions: which triangle each ray met; `distance`: the distances that were found, (rays,),
+    infinite where nothing is hit [m]; `shapes`: what `read_shapes` returned, if known.
 
-    Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
-    distance stays what it was. It also stays on spheres that a ray misses in float64, which happens at tangents.
+    Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on
+    triangles seen edge-on, the distance stays what it was. It also stays on spheres that a ray
+    misses in float64, which happens at tangents.
     """
     hit = np.isfinite(distance)
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
@@ -107,25 +121,39 @@ def exact_distance(reference: ReferenceScene, interaction: Any, distance: Array,
         if not len(mine):
             continue
         if isinstance(part, Sphere):
-            refined[mine] = _to_sphere(part, reference.origin, reference.direction[mine], distance[mine])
+            refined[mine] = _to_sphere(
+                part, reference.origin, reference.direction[mine], distance[mine]
+            )
             continue
         if isinstance(part, Disks):
             refined[mine] = _along(
-                part.centre - reference.origin, part.normal, reference.direction[mine], distance[mine]
+                part.centre - reference.origin,
+                part.normal,
+                reference.direction[mine],
+                distance[mine],
             )
             continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
         number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
-        refined[mine] = to_plane(part[number_in_shape] - reference.origin, reference.direction[mine], distance[mine])
+        refined[mine] = to_plane(
+            part[number_in_shape] - reference.origin, reference.direction[mine], distance[mine]
+        )
     return refined
 
 
 def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
-    """Return how far rays from the origin go to the planes of triangles, (rays, 3, 3) [m]; where they graze, as given.
+    """Return how far rays from the origin go to the planes of triangles, (rays, 3, 3) [m];
+    where they graze, as given.
 
-    `corner`: from where rays start; `direction`: unit vectors, (rays, 3); `distance`: as it was cast, (rays,) [m].
+    `corner`: from where rays start; `direction`: unit vectors, (rays, 3); `distance`: as
+    it was cast, (rays,) [m].
     """
-    return _along(corner[:, 0], np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), direction, distance)
+    return _along(
+        corner[:, 0],
+        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]),
+        direction,
+        distance,
+    )
 
 
 def _along(place: Array, normal: Array, direction: Array, distance: Array) -> Array:

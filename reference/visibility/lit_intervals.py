@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit parts of camera rays up to the visible surface, exact, and checked by random shadow rays."""
+"""The lit parts of camera rays up to the visible surface, exact, and
+checked by random shadow rays.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,8 +22,12 @@ from airlight.reference.visibility.shadows import lit_parts
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a light counts as in it; float32 corners
-_END = 1e-6  # of a distance: an interval that ends this close to the surface, met in float32 if need be, reaches it
+#: of the largest coordinate: what is closer to the plane of a light counts
+#: as in it; float32 corners
+IN_PLANE = 1e-7
+# of a distance: an interval that ends this close to the surface, met in
+# float32 if need be, reaches it
+_END = 1e-6
 
 
 @dataclass(frozen=True)
@@ -34,26 +40,31 @@ class Obstacles:
     light: Ball  #: what holds the light
 
 
-def obstacles(reference: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
+def obstacles(
+    reference: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None
+) -> Obstacles:
     """Return the possible occluders between a light and the rays of a scene.
 
-    `reference`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite
-    [m]; `shapes`: what `reference.scene.shapes.read_shapes` returned for its occluders, if known.
+    `reference`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,),
+    may be infinite [m]; `shapes`: what `reference.scene.shapes.read_shapes` returned for its
+    occluders, if known.
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     near = near_shapes(light, reference.origin, reference.direction, distance, shapes)
     return Obstacles(reference.occluders, shapes, near, light)
 
 
-def before_light(reference: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
+def before_light(
+    reference: ReferenceScene, light: ReferenceAreaLight
+) -> tuple[ReferenceScene, Shapes]:
     """Return the scene and the shapes that can shadow an area light.
 
     `reference`, `light`: the scene and one of its area lights.
 
-    A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: a light's own
-    shape therefore never shadows it, nor do shapes in or behind the plane of a rectangle or a disk. They are left out:
-    in float64 a shape in the plane would be in front of it or behind it by chance. Another mesh stays, a hair behind
-    where its light starts.
+    A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides
+    itself: a light's own shape therefore never shadows it, nor do shapes in or behind the plane of
+    a rectangle or a disk. They are left out: in float64 a shape in the plane would be in front of
+    it or behind it by chance. Another mesh stays, a hair behind where its light starts.
     """
     shapes = reference.occluders.shapes()
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
@@ -61,7 +72,9 @@ def before_light(reference: ReferenceScene, light: ReferenceAreaLight) -> tuple[
         reference = replace(reference, occluders=scene_of(others, reference.scene))
     known = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
-        largest = max(1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max()))
+        largest = max(
+            1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max())
+        )
         before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
         known = replace(known, triangles=known.triangles[before.any(axis=1)])
     return reference, known
@@ -79,10 +92,10 @@ def lit_intervals(
 ) -> LitIntervals:
     """Find the lit intervals of rays between two distances, and have them checked.
 
-    `rays`: the rays in their planes with the light, or with samples of it; `ends`: distances between which a ray is
-    looked at, (rays,) each [m]; the second may be infinite; `known`: what can stand in the light; `of`: by ray its
-    number in `known`, (rays,); by default its own; `checks`, `every`, `normal`: see
-    `reference.visibility.certificate.certified`; no checks if 0.
+    `rays`: the rays in their planes with the light, or with samples of it; `ends`: distances
+    between which a ray is looked at, (rays,) each [m]; the second may be infinite; `known`: what
+    can stand in the light; `of`: by ray its number in `known`, (rays,); by default its own;
+    `checks`, `every`, `normal`: see `reference.visibility.certificate.certified`; no checks if 0.
 
     Valid for opaque meshes, rectangles, spheres and disks, wherever they are.
     """
@@ -96,7 +109,13 @@ def lit_intervals(
         lit = replace(lit, edge=0.0)
     if not checks:
         return lit
-    how = {"occluders": known.scene, "shapes": known.shapes, "checks": checks, "every": every, "normal": normal}
+    how = {
+        "occluders": known.scene,
+        "shapes": known.shapes,
+        "checks": checks,
+        "every": every,
+        "normal": normal,
+    }
     return certified(lit, rays, ends, **how)
 
 

@@ -11,19 +11,20 @@ An occluder at (z, y) is on the shadow segment of one point of the ray,
 
     x = (z y_P - y z_P) / (y_P - w y),      where 0 <= y and w y < y_P,
 
-which for a direction is z - y cos/sin. At y = y_P a place sends light along the ray: x goes to infinity, on the side on
-which it stands. For a direction -cos is the cosine of the angle between the light's way and the ray; the scattering
-angle has the cosine cos.
+which for a direction is z - y cos/sin. At y = y_P a place sends light along the ray: x goes to
+infinity, on the side on which it stands. For a direction -cos is the cosine of the angle between
+the light's way and the ray; the scattering angle has the cosine cos.
 
-With theta, the angle at a light at a place from the foot point, x = z_P + y_P tan(theta). The cosine between an axis of
-the light and the way to the point at theta is
+With theta, the angle at a light at a place from the foot point, x = z_P + y_P tan(theta). The
+cosine between an axis of the light and the way to the point at theta is
 
     c(theta) = axial sin(theta) + across cos(theta) = m cos(theta - theta_m),
     m = sqrt(axial^2 + across^2),   theta_m = atan2(axial, across),
 
-`axial` and `across` the components of the axis along d and along n, the unit vector from the light to the foot point. A
-cone of half angle b is therefore one interval, |theta - theta_m| <= acos(cos b / m), nothing if m < cos b: no nappes,
-no cases. (`realtime.rays` solves a quadratic equation in the distance instead.)
+`axial` and `across` the components of the axis along d and along n, the unit vector from the light
+to the foot point. A cone of half angle b is therefore one interval, |theta - theta_m| <= acos(cos
+b / m), nothing if m < cos b: no nappes, no cases. (`realtime.rays` solves a quadratic equation in
+the distance instead.)
 """
 
 from dataclasses import dataclass, fields
@@ -36,7 +37,8 @@ from airlight.reference.scene.read import ReferenceLight
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_SMALLEST_SINE = 1e-12  # a ray this close to the direction of a light [rad] is as good as one beside it
+# a ray this close to the direction of a light [rad] is as good as one beside it
+_SMALLEST_SINE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,10 @@ class Rays:
 
     origin: Array  #: where all begin [m], (3,), or each, (n, 3)
     direction: Array  #: unit, (n, 3)
-    position: Array  #: p: where the light of each ray is [m], or the unit direction towards it, (n, 3)
-    normal: Array  #: unit vector across the ray, from the light to the foot point or along the light, (n, 3)
+    #: p: where the light of each ray is [m], or the unit direction towards it, (n, 3)
+    position: Array
+    #: unit vector across the ray, from the light to the foot point or along the light, (n, 3)
+    normal: Array
     foot: Array  #: z_P: distance along the ray [m], or the cosine, (n,)
     height: Array  #: y_P: distance from the ray [m], or the sine, (n,)
     w: int = 1  #: 1: p is a place, 0: a direction
@@ -54,7 +58,9 @@ class Rays:
     def __getitem__(self, rows) -> "Rays":
         changed = {f.name: getattr(self, f.name) for f in fields(self)}
         same = ("origin", "w") if self.origin.ndim == 1 else ("w",)
-        return Rays(**{name: part if name in same else part[rows] for name, part in changed.items()})
+        return Rays(
+            **{name: part if name in same else part[rows] for name, part in changed.items()}
+        )
 
     def point(self, ray: Index, x: Array) -> Array:
         """Return the points at distances along rays of these numbers, (k, 3) [m]."""
@@ -74,9 +80,9 @@ class Rays:
 def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Rays:
     """Return rays in their planes with a light.
 
-    `origin`: where all rays begin [m], (3,), or each, (n, 3); `direction`: unit vectors, (n, 3); `position`: of the
-    light, (3,), or of the light of each ray, (n, 3): places [m] or unit directions; `w`: 1 for places, 0 for
-    directions.
+    `origin`: where all rays begin [m], (3,), or each, (n, 3); `direction`: unit vectors, (n, 3);
+    `position`: of the light, (3,), or of the light of each ray, (n, 3): places [m] or unit
+    directions; `w`: 1 for places, 0 for directions.
 
     Valid for all rays. One that meets the light lies in many planes: any is as good.
     """
@@ -87,19 +93,23 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
     away -= np.sum(away * direction, axis=1)[:, None] * direction
     height = np.linalg.norm(away, axis=1)
     least = np.finfo(float).tiny if w else _SMALLEST_SINE
-    helper = np.cross(direction, np.where(np.abs(direction[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    helper = np.cross(
+        direction, np.where(np.abs(direction[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    )
     helper /= np.linalg.norm(helper, axis=1)[:, None]
     beside = height > least
     normal = np.where(beside[:, None], away / np.maximum(height, least)[:, None], helper)
-    return Rays(origin, direction, position, normal, foot, height if w else np.maximum(height, least), w)
+    return Rays(
+        origin, direction, position, normal, foot, height if w else np.maximum(height, least), w
+    )
 
 
 def cone_interval(rays: Rays, light: ReferenceLight, angle: float) -> tuple[Array, Array]:
     """Return the interval of theta inside a cone about the light's axis.
 
-    `rays`, `light`: the rays in their planes with the light; for a point light the interval is that of the whole line;
-    `angle`: half angle of the cone [rad]. Returns `low`, `high`: (rays,) each [rad]; low > high where the ray misses
-    the cone.
+    `rays`, `light`: the rays in their planes with the light; for a point light the interval is that
+    of the whole line; `angle`: half angle of the cone [rad]. Returns `low`, `high`: (rays,) each
+    [rad]; low > high where the ray misses the cone.
     """
     if light.axis is None:
         half_pi = np.full(len(rays.foot), 0.5 * np.pi)
@@ -113,9 +123,11 @@ def cone_interval(rays: Rays, light: ReferenceLight, angle: float) -> tuple[Arra
 
 
 def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
-    """Return intensity over that on the axis [1]: Mitsuba's spot profile, linear behind the beam, or a cosine.
+    """Return intensity over that on the axis [1]: Mitsuba's spot profile, linear
+    behind the beam, or a cosine.
 
-    `theta`: angles at the light, (rays, angles) [rad]; `rays`, `light`: the rays in their planes with the light.
+    `theta`: angles at the light, (rays, angles) [rad]; `rays`, `light`: the rays in
+    their planes with the light.
     """
     if not light.is_soft or light.axis is None:
         return np.ones_like(theta)
@@ -127,7 +139,8 @@ def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
 
 
 def before(rays: Rays, normal: Array) -> tuple[Array, Array]:
-    """Return between which distances rays are before the planes through their lights with unit normals, (n, 3).
+    """Return between which distances rays are before the planes through their lights
+    with unit normals, (n, 3).
 
     low >= high where they are not.
     """

@@ -1,32 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The shadows of triangles, disks and spheres on rays, and the lit rest: compiled loops, a ray in each lane.
+r"""The shadows of triangles, disks and spheres on rays, and the lit rest: compiled
+loops, a ray in each lane.
 
-In the plane of a ray and its light (`reference.visibility.planes`) a triangle and a disk are segments, a sphere is a
-disk of centre (c_z, c_y) and radius rho. Occluders lie in the strip 0 <= y, w y < y_P, and each convex part of them
-hides one interval of the ray, since the map
+In the plane of a ray and its light (`reference.visibility.planes`) a triangle and a disk are
+segments, a sphere is a disk of centre (c_z, c_y) and radius rho. Occluders lie in the strip 0 <= y,
+w y < y_P, and each convex part of them hides one interval of the ray, since the map
 
     x = (z y_P - y z_P) / (y_P - w y)
 
-takes lines to lines and keeps the order of points. No sampling, no rays cast, everything in float64: however thin a
-shadow, it is found.
+takes lines to lines and keeps the order of points. No sampling, no rays cast, everything in
+float64: however thin a shadow, it is found.
 
 **Segments** are clipped to the strip and hide what lies between the images of both ends.
 
-**Spheres.** The tangents from the light touch the disk at C + rho n. With e the unit vector along w C - P, from the
-light to the centre, or along the light,
+**Spheres.** The tangents from the light touch the disk at C + rho n. With e the unit vector along w
+C - P, from the light to the centre, or along the light,
 
     n = -s e +- sqrt(1 - s^2) e',      s = w rho / |w C - P|,      e' across e,
 
-and the shadow ends at the images of both, unless one is touched at w y >= y_P: the disk then reaches beyond the line
-through the light along the ray, and the shadow is unbounded on that side; or at y < 0: then it ends where the ray
-itself meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A light inside of a sphere sees what is inside and nothing else,
-and the range in which a ray is looked at is cut to that before (`reference.visibility.lit_intervals`).
+and the shadow ends at the images of both, unless one is touched at w y >= y_P: the disk then
+reaches beyond the line through the light along the ray, and the shadow is unbounded on that side;
+or at y < 0: then it ends where the ray itself meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A
+light inside of a sphere sees what is inside and nothing else, and the range in which a ray is
+looked at is cut to that before (`reference.visibility.lit_intervals`).
 
-**The lit rest.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
-becomes part of it as it is found. Then t begins at the beginning of a ray: shadows that begin before t and end after it
-move t to their end, until none does; the ray is lit from t to where the next shadow begins, and t moves there. The list
-is gone through forwards and backwards in turn, since shadows of a mesh mostly come in one order or the other. Nothing
-is sorted. Gaps below 1e-12 of a distance are rounding: touching triangles share the coordinates of their vertices.
+**The lit rest.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches
+the one before it becomes part of it as it is found. Then t begins at the beginning of a ray:
+shadows that begin before t and end after it move t to their end, until none does; the ray is lit
+from t to where the next shadow begins, and t moves there. The list is gone through forwards and
+backwards in turn, since shadows of a mesh mostly come in one order or the other. Nothing is sorted.
+Gaps below 1e-12 of a distance are rounding: touching triangles share the coordinates of their
+vertices.
 """
 
 from dataclasses import dataclass
@@ -71,10 +75,10 @@ def lit_parts(
 ) -> tuple[Index, Array, Array]:
     """Return the lit parts of rays between two distances.
 
-    `rays`: the rays; `ends`: between which distances they are looked at, (rays,) each [m]; nowhere if the first is not
-    below the second; `near`: lists of the shapes that can stand in the light; `shapes`: all shapes; `of`: by ray, the
-    number of its lists in `near`, (rays,). Returns `ray`, `low`, `high`: of every lit part, ascending, (parts,) each;
-    distances [m].
+    `rays`: the rays; `ends`: between which distances they are looked at, (rays,) each [m]; nowhere
+    if the first is not below the second; `near`: lists of the shapes that can stand in the light;
+    `shapes`: all shapes; `of`: by ray, the number of its lists in `near`, (rays,). Returns `ray`,
+    `low`, `high`: of every lit part, ascending, (parts,) each; distances [m].
     """
     if not shapes.count:
         ray = np.flatnonzero(ends[1] > ends[0])
@@ -94,7 +98,9 @@ def lit_parts(
     while first < len(of):
         block = slice(first, min(len(of), first + max(1, _STORED // shadows)))
         spans = [(begin[block], end[block]) for begin, end in ranges]
-        found = _compiled(rays[block], (ends[0][block], ends[1][block]), (data, lists, spans), (shadows, slots))
+        found = _compiled(
+            rays[block], (ends[0][block], ends[1][block]), (data, lists, spans), (shadows, slots)
+        )
         used = found[0]
         if used.max(initial=0) > slots:
             slots = 1 << (int(used.max()) - 1).bit_length()
@@ -108,7 +114,9 @@ def lit_parts(
     return ray, low, high
 
 
-def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> tuple[Index, Array, Array]:
+def _compiled(
+    rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]
+) -> tuple[Index, Array, Array]:
     """Return how many lit parts each lane has, and where they begin and end."""
     shadows, slots = sizes
     count = len(rays.foot)
@@ -127,9 +135,15 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
         dr.scatter(highs, finish, number * stride + lane, active)
 
     # The shadow that was found last is held back: the next one may go on from it.
-    state = (dr.zeros(mi.UInt32, count), dr.full(mi.Float64, dr.inf, count), dr.full(mi.Float64, -dr.inf, count))
+    state = (
+        dr.zeros(mi.UInt32, count),
+        dr.full(mi.Float64, dr.inf, count),
+        dr.full(mi.Float64, -dr.inf, count),
+    )
     data, numbers, spans = lists
-    for shadow, values, number, (begin, end) in zip((_triangle, _sphere, _disk), data, numbers, spans, strict=True):
+    for shadow, values, number, (begin, end) in zip(
+        (_triangle, _sphere, _disk), data, numbers, spans, strict=True
+    ):
         if not len(number):
             continue
         last = on_device(mi.UInt32, end)
@@ -137,7 +151,9 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
         def look(j, known, held0, held1, shadow=shadow, values=values, number=number):
             start, finish = shadow(lanes, values, dr.gather(mi.UInt32, number, j))
             casts = (start < finish) & (start < high) & (finish > low)
-            touches = (start <= held1 + MERGE * (1 + dr.abs(held1))) & (held0 <= finish + MERGE * (1 + dr.abs(finish)))
+            touches = (start <= held1 + MERGE * (1 + dr.abs(held1))) & (
+                held0 <= finish + MERGE * (1 + dr.abs(finish))
+            )
             new = casts & ~touches & (held0 < held1)
             store(known, held0, held1, new)
             known += dr.select(new, mi.UInt32(1), mi.UInt32(0))
@@ -145,7 +161,9 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
             held1 = dr.select(casts, dr.select(touches, dr.maximum(held1, finish), finish), held1)
             return j + 1, known, held0, held1
 
-        _, *state = dr.while_loop((on_device(mi.UInt32, begin), *state), lambda j, *others, last=last: j < last, look)
+        _, *state = dr.while_loop(
+            (on_device(mi.UInt32, begin), *state), lambda j, *others, last=last: j < last, look
+        )
     known, held0, held1 = state
     casts = held0 < held1
     store(known, held0, held1, casts)
@@ -157,7 +175,9 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
     def body(t, used, back):
         def turn(j, t, after, moved):
             number = dr.select(back, known - 1 - j, j)
-            start, finish = (dr.gather(mi.Float64, column, number * stride + lane) for column in (lows, highs))
+            start, finish = (
+                dr.gather(mi.Float64, column, number * stride + lane) for column in (lows, highs)
+            )
             limit = t + MERGE * (1 + dr.abs(t))
             covers = (start <= limit) & (finish > t)
             after = dr.select(start > limit, dr.minimum(after, start), after)
@@ -182,11 +202,16 @@ def _compiled(rays: Rays, ends: tuple, lists: tuple, sizes: tuple[int, int]) -> 
 
 
 def _triangle(lanes: _Lanes, corners: Any, number: Any) -> tuple[Any, Any]:
-    """Return where the shadow of a triangle on the ray begins and ends; the first above the second if there is none."""
+    """Return where the shadow of a triangle on the ray begins and ends; the first above the
+    second if there is none.
+    """
     side, y, z = [], [], []
     for k in range(3):
         base = number * 9 + 3 * k
-        corner = mi.Vector3d(*(dr.gather(mi.Float64, corners, base + c) for c in range(3))) - lanes.origin
+        corner = (
+            mi.Vector3d(*(dr.gather(mi.Float64, corners, base + c) for c in range(3)))
+            - lanes.origin
+        )
         side.append(dr.dot(corner, lanes.normal))
         y.append(dr.dot(corner, lanes.across))
         z.append(dr.dot(corner, lanes.direction))
@@ -219,16 +244,24 @@ def _segment(lanes: _Lanes, first: tuple, second: tuple, cut: Any) -> tuple[Any,
     keep = cut & (y1 >= 0) & (w * y0 < top)
     slope = dr.select(y1 > y0, (z1 - z0) / (y1 - y0), 0.0)
     begin = dr.select(y0 < 0, z0 - y0 * slope, lanes.project(z0, y0))
-    beyond = dr.select(z0 + (top - y0) * slope > lanes.foot, mi.Float64(dr.inf), mi.Float64(-dr.inf))
+    beyond = dr.select(
+        z0 + (top - y0) * slope > lanes.foot, mi.Float64(dr.inf), mi.Float64(-dr.inf)
+    )
     end = dr.select(w * y1 >= top, beyond, lanes.project(z1, y1))
-    return dr.select(keep, dr.minimum(begin, end), dr.inf), dr.select(keep, dr.maximum(begin, end), -dr.inf)
+    return dr.select(keep, dr.minimum(begin, end), dr.inf), dr.select(
+        keep, dr.maximum(begin, end), -dr.inf
+    )
 
 
 def _sphere(lanes: _Lanes, spheres: Any, number: Any) -> tuple[Any, Any]:
     """Return the part of the ray that a sphere hides."""
     parts = [dr.gather(mi.Float64, spheres, number * 4 + k) for k in range(4)]
     centre, radius = mi.Vector3d(*parts[:3]) - lanes.origin, parts[3]
-    beside, c_y, c_z = dr.dot(centre, lanes.normal), dr.dot(centre, lanes.across), dr.dot(centre, lanes.direction)
+    beside, c_y, c_z = (
+        dr.dot(centre, lanes.normal),
+        dr.dot(centre, lanes.across),
+        dr.dot(centre, lanes.direction),
+    )
     disk = _half_chord(radius, dr.abs(beside))
     e_z, e_y = lanes.w * c_z - lanes.foot, lanes.w * c_y - lanes.height
     far = dr.maximum(dr.norm(mi.Vector2d(e_z, e_y)), 1e-290)
@@ -239,26 +272,38 @@ def _sphere(lanes: _Lanes, spheres: Any, number: Any) -> tuple[Any, Any]:
     chord = _half_chord(disk, dr.abs(c_y))
     ends = []
     for sign in (-1.0, 1.0):
-        # e' = (-e_y, e_z) has a positive z where the light is over the ray: the sign is that of the end.
+        # e' = (-e_y, e_z) has a positive z where the light is over the ray: the
+        # sign is that of the end.
         z = c_z + disk * (-sine * e_z - sign * level * e_y)
         y = c_y + disk * (-sine * e_y + sign * level * e_z)
         end = dr.select(y < 0, c_z + sign * chord, lanes.project(z, y))
         ends.append(dr.select(lanes.w * y >= lanes.height, sign * dr.inf, end))
-    dark = outside & (dr.abs(beside) < radius) & (c_y + disk > 0) & (lanes.w * (c_y - disk) < lanes.height)
+    dark = (
+        outside
+        & (dr.abs(beside) < radius)
+        & (c_y + disk > 0)
+        & (lanes.w * (c_y - disk) < lanes.height)
+    )
     return dr.select(dark, ends[0], dr.inf), dr.select(dark, ends[1], -dr.inf)
 
 
 def _disk(lanes: _Lanes, disks: Any, number: Any) -> tuple[Any, Any]:
-    """Return the part of the ray that a flat disk hides, by the segment in which the plane cuts it."""
+    """Return the part of the ray that a flat disk hides, by the segment in
+    which the plane cuts it.
+    """
     parts = [dr.gather(mi.Float64, disks, number * 7 + k) for k in range(7)]
     centre, n, radius = mi.Vector3d(*parts[:3]) - lanes.origin, mi.Vector3d(*parts[3:6]), parts[6]
     along = dr.cross(n, lanes.normal)
     within = dr.maximum(dr.norm(along), 1e-290)
-    away = dr.cross(along, n) / within  # in the disk, across the section, towards the plane's normal
+    # in the disk, across the section, towards the plane's normal
+    away = dr.cross(along, n) / within
     beside = dr.dot(centre, lanes.normal) / within
     middle = centre - beside * away
     half = _half_chord(radius, dr.abs(beside)) / within * along
-    ends = [(dr.dot(point, lanes.direction), dr.dot(point, lanes.across)) for point in (middle - half, middle + half)]
+    ends = [
+        (dr.dot(point, lanes.direction), dr.dot(point, lanes.across))
+        for point in (middle - half, middle + half)
+    ]
     return _segment(lanes, ends[0], ends[1], dr.abs(beside) < radius)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.compare`: how far an image is from another or from a scene, what is wrong with it, which fog fits."""
+"""`airlight.compare`: how far an image is from another or from a scene, what is wrong
+with it, which fog fits.
+"""
 
 import dataclasses
 import os
@@ -51,15 +53,16 @@ def compare(
 ) -> "ImageComparison | SceneComparison | Fitted | Said":
     """Compare an image with another, or with the reference of a scene.
 
-    The result has the bias and quantiles of the error, and statistics if there are standard errors. With a scene it
-    also has the best-fitting factor, what may be wrong with the image as a whole, where most of the error lies, and
-    whether the image is right. The exit status is 1 if the image has values that are negative or not finite, or if the
-    bias is not shown to be within the margin.
+    The result has the bias and quantiles of the error, and statistics if there are standard errors.
+    With a scene it also has the best-fitting factor, what may be wrong with the image as a whole,
+    where most of the error lies, and whether the image is right. The exit status is 1 if the image
+    has values that are negative or not finite, or if the bias is not shown to be within the margin.
 
-    `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights, camera and encoding,
-    and ranks them by evidence. `--fit` finds the parameters of the fog that explain the image, each with its 95 %
-    interval. `--frames` compares all frames of a scene that changes with the reference of each: flicker, lag, ghosts.
-    Independent renders of one frame tell bias from noise. See docs/your-engine.md.
+    `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights,
+    camera and encoding, and ranks them by evidence. `--fit` finds the parameters of the fog that
+    explain the image, each with its 95 % interval. `--frames` compares all frames of a scene that
+    changes with the reference of each: flicker, lag, ghosts. Independent renders of one frame tell
+    bias from noise. See docs/your-engine.md.
 
     Parameters
     ----------
@@ -67,19 +70,21 @@ def compare(
         The image to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also a result
         of `reference` or `render`, or an array (height, width, 3) [W/(m^2 sr)].
     test
-        The image to judge, an EXR file; from Python also a result or an array. With a scene also several files, # for
-        each digit of their number, such as frames/####.exr: the frames of `--frames`, or independent renders.
+        The image to judge, an EXR file; from Python also a result or an array. With a scene also
+        several files, # for each digit of their number, such as frames/####.exr: the frames of
+        `--frames`, or independent renders.
     layer
         Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight. With a scene NAME=airlight,
         =surface or =total says what it contains; by default what its name says.
     pixel
-        With a scene: whether pixels are values at their centre or means over their area. By default both are tried,
-        which takes several times as long.
+        With a scene: whether pixels are values at their centre or means over their area. By default
+        both are tried, which takes several times as long.
     mask
-        An EXR file that is 0 in pixels to leave out; from Python also truth values, (height, width).
+        An EXR file that is 0 in pixels to leave out; from Python also truth
+        values, (height, width).
     margin
-        Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it, or the
-        bound that a reference states.
+        Largest relative bias that counts as agreement, such as 0.005; two images need standard
+        errors for it, or the bound that a reference states.
     all_metrics
         Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
@@ -91,15 +96,16 @@ def compare(
     frames
         With a scene: the file frames.json that says what each frame shows.
     output
-        Write the difference: a .png file shows the signed relative error of each pixel in false colours, an .exr file
-        has the values.
+        Write the difference: a .png file shows the signed relative error of each pixel in false
+        colours, an .exr file has the values.
     progress
         Called with (fraction done, what); True shows a bar.
 
     Raises
     ------
     InputError
-        If a layer is missing, sizes differ, a margin is given without errors, or options do not go together.
+        If a layer is missing, sizes differ, a margin is given without errors, or
+        options do not go together.
 
     Examples
     --------
@@ -117,30 +123,52 @@ def compare(
     """
     layer, _, holds = (layer or "").partition("=") if "=" in (layer or "") else (layer, "", None)
     if holds not in (None, "airlight", "surface", "total"):
-        raise InputError(f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total")
+        raise InputError(
+            f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total"
+        )
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and (_is_xml(test) or not Path(str(test)).is_file()):
-        raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
-    about: dict[str, Any] = {"output": several(output), "margin": margin, "all_metrics": all_metrics}
+        raise InputError(
+            f"compare: the scene stands first: airlight compare {test!s} {reference!s}"
+        )
+    about: dict[str, Any] = {
+        "output": several(output),
+        "margin": margin,
+        "all_metrics": all_metrics,
+    }
     if scene is None:
-        of_scenes = {"the content of the layer": holds, "pixel": pixel, "diagnose": diagnose, "fit": fit}
+        of_scenes = {
+            "the content of the layer": holds,
+            "pixel": pixel,
+            "diagnose": diagnose,
+            "fit": fit,
+        }
         exclude("compare", "two images have no scene", {**of_scenes, "frames": frames})
     if diagnose:
-        exclude("diagnose", "asks about all pixels of one image", {"fit": fit, "mask": mask, "frames": frames, **about})
+        exclude(
+            "diagnose",
+            "asks about all pixels of one image",
+            {"fit": fit, "mask": mask, "frames": frames, **about},
+        )
     if fit is not None:
         exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
     if frames is not None or (scene is not None and _are_several(test)):
         if diagnose or fit is not None:
             option = "diagnose" if diagnose else "fit"
             raise InputError(
-                f"{option}: got {test!s}, which stands for several files; expected one image: name one of the files"
+                f"{option}: got {test!s}, which stands for several files; expected one image: name "
+                "one of the files"
             )
-        exclude("compare", "several files are judged together", about | {"mask": mask, "margin": None})
+        exclude(
+            "compare", "several files are judged together", about | {"mask": mask, "margin": None}
+        )
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         return _several(str(scene), test, frames, progress=progress, **how)
     files = output_files(output, ".exr (values)", ".png (a picture)")
     if fit is not None:
-        return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress)
+        return _fit(
+            scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress
+        )
     options: dict[str, Any] = {"mask": mask, "margin": margin, "all_metrics": all_metrics}
     if scene is None:
         return _two_images(reference, test, layer, files=files, **options)
@@ -164,7 +192,10 @@ def _are_several(test: Any) -> bool:
 def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "Said":
     """Compare frames that `frames` tells of, or independent renders."""
     if not isinstance(test, str | os.PathLike):
-        raise InputError("frames: expected the files of all frames, such as 'frames/####.exr'; save the images first")
+        raise InputError(
+            "frames: expected the files of all frames, such as 'frames/####.exr'; save the images "
+            "first"
+        )
     from airlight.reports.api.comparisons import frames_comparison
     from airlight.reports.machine.environment import activate
     from airlight.validation.motion.judge import compare_frames
@@ -173,12 +204,18 @@ def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -
     activate()
     with telling(progress, "the files") as tell:
         how["progress"] = tell
-        compared = compare_runs(scene, test, **how) if frames is None else compare_frames(scene, test, frames, **how)
+        compared = (
+            compare_runs(scene, test, **how)
+            if frames is None
+            else compare_frames(scene, test, frames, **how)
+        )
     return frames_comparison(compared)
 
 
 def _is_scene(word: Any) -> bool:
-    """Return whether a word is meant as a scene: a built-in or random one, an XML file, or a name that no file has."""
+    """Return whether a word is meant as a scene: a built-in or random one, an XML file, or
+    a name that no file has.
+    """
     if not isinstance(word, str | os.PathLike):
         return False
     path, name = Path(word), str(word)
@@ -192,7 +229,9 @@ def _is_xml(word: Any) -> bool:
 
 @contextmanager
 def _as_file(image: Any) -> Iterator[tuple[Path, str]]:
-    """Give the path of an image, which is written to a file for this if it is none, and what to call it."""
+    """Give the path of an image, which is written to a file for this if it is
+    none, and what to call it.
+    """
     if isinstance(image, str | os.PathLike):
         yield Path(image), str(image)
         return
@@ -228,7 +267,8 @@ def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     values = np.asarray(image)
     if values.dtype.kind not in "fiu":
         raise InputError(
-            f"{name}: got {type(image).__name__}, expected what render or reference return, a path, or numbers "
+            f"{name}: got {type(image).__name__}, expected what render or reference return, a "
+            "path, or numbers "
             "(height, width, 3)"
         )
     return Image({layer or "airlight": values}), name
@@ -255,22 +295,45 @@ def _two_images(
     exact, exact_name = as_image(reference, layer, "the reference")
     tested, test_name = as_image(test, layer, "the test image")
     chosen, names = _mask(mask), (exact_name, test_name)
-    paths = [str(each) if isinstance(each, str | os.PathLike) else name for each, name in zip((reference, test), names)]
-    comparison = compare_images(exact, tested, layer=layer, mask=chosen, names=(paths[0], paths[1]), **options)
-    kept: dict[str, Any] = {field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)}
-    kept |= {each: image_layer(image, comparison.layer) for each, image in (("reference", exact), ("test", tested))}
-    said = tuple((str(path), write_difference(path, kept["reference"], kept["test"], kept=chosen)) for path in files)
+    paths = [
+        str(each) if isinstance(each, str | os.PathLike) else name
+        for each, name in zip((reference, test), names)
+    ]
+    comparison = compare_images(
+        exact, tested, layer=layer, mask=chosen, names=(paths[0], paths[1]), **options
+    )
+    kept: dict[str, Any] = {
+        field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)
+    }
+    kept |= {
+        each: image_layer(image, comparison.layer)
+        for each, image in (("reference", exact), ("test", tested))
+    }
+    said = tuple(
+        (str(path), write_difference(path, kept["reference"], kept["test"], kept=chosen))
+        for path in files
+    )
     return ImageComparison(**kept, names=names, files=said)
 
 
 def _with_scene(
-    scene: str, path: Path, name: str, *, mask: Any, files: list[Path], progress: Any, **options: Any
+    scene: str,
+    path: Path,
+    name: str,
+    *,
+    mask: Any,
+    files: list[Path],
+    progress: Any,
+    **options: Any,
 ) -> "SceneComparison":
     from airlight.reports.api.comparisons import scene_comparison, write_difference
     from airlight.validation.engine.judge import compare_scene
 
     if mask is not None and not isinstance(mask, str | os.PathLike):
-        raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
+        raise InputError(
+            "mask: an image is compared with a scene under a mask that is an EXR file; save it "
+            "first"
+        )
     with telling(progress, "the reference") as tell:
         found = compare_scene(scene, path, mask=mask, progress=tell, **options)
     compared = dataclasses.replace(found, path=name)
@@ -289,12 +352,22 @@ def _diagnose(scene: str, path: Path, name: str, *, progress: Any, **how: Any) -
 
 
 def _fit(
-    scene: Any, image: Any, parameters: Any, *, layer: str | None, mask: Any, progress: Any, **how: Any
+    scene: Any,
+    image: Any,
+    parameters: Any,
+    *,
+    layer: str | None,
+    mask: Any,
+    progress: Any,
+    **how: Any,
 ) -> "Fitted":
     words = listed("fit", parameters)
     names = [word.partition("=")[0].strip() for word in words]
     starts = named_values(
-        "fit", [word for word in words if "=" in word], float, "NAME or NAME=VALUE, such as sigma_t=0.1"
+        "fit",
+        [word for word in words if "=" in word],
+        float,
+        "NAME or NAME=VALUE, such as sigma_t=0.1",
     )
     layers, name = as_image(image, layer, "the image")  # before Mitsuba starts
     from airlight.reports.machine.environment import activate
@@ -308,6 +381,14 @@ def _fit(
     loaded = scene_of_size(str(scene), size, name)
     with telling(progress, "fit") as tell:
         found = fit_image(
-            layers, loaded, names, path=name, layer=layer, mask=_mask(mask), starts=starts, progress=tell, **how
+            layers,
+            loaded,
+            names,
+            path=name,
+            layer=layer,
+            mask=_mask(mask),
+            starts=starts,
+            progress=tell,
+            **how,
         )
     return fitted(found)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Comparisons as results: two images, an image with the reference of its scene, its diagnosis, its fit."""
+"""Comparisons as results: two images, an image with the reference of its
+scene, its diagnosis, its fit.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -51,8 +53,12 @@ class ImageComparison(Comparison, Pictured):
 
     @cached_property
     def error(self) -> Array:
-        """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of the shape of the images."""
-        reference, test = (np.asarray(values, dtype=np.float64) for values in (self.reference, self.test))
+        """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of
+        the shape of the images.
+        """
+        reference, test = (
+            np.asarray(values, dtype=np.float64) for values in (self.reference, self.test)
+        )
         return read_only(relative_error(reference, test))
 
     def to_dict(self) -> dict[str, Any]:
@@ -69,15 +75,17 @@ class ImageComparison(Comparison, Pictured):
         return as_array(self.error, dtype, copy)
 
     def picture(self) -> NDArray[np.uint8]:
-        """Return the map of the signed relative error, see `reports.plotting.pictures.error_map`, (height, width,
-        3).
+        """Return the map of the signed relative error, see
+        `reports.plotting.pictures.error_map`, (height, width, 3).
         """
         reference, test = self._colours()
         return error_map(reference, test)
 
     def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         shape = (*self.reference.shape[:2], -1)
-        reference, test = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
+        reference, test = (
+            np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test)
+        )
         return colours(reference), colours(test)
 
     def _repr_html_(self) -> str:
@@ -86,11 +94,20 @@ class ImageComparison(Comparison, Pictured):
         reference, test = self._colours()
         factor, width = exposure(reference), reference.shape[1]
         shown = [
-            picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
+            picture(
+                png_bytes(tone_mapped(values, factor)),
+                width,
+                alt=f"{name}, {self.layer}",
+                caption=name,
+            )
             for name, values in zip(self.names, (reference, test))
         ]
         scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
-        shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
+        shown.append(
+            picture(
+                self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale
+            )
+        )
         return block(self.title, *shown, bullets(self.lines))
 
     @property
@@ -117,8 +134,12 @@ class SceneComparison(Said):
         return compared.comparison.metrics
 
 
-def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]] = ()) -> SceneComparison:
-    """Return a comparison as a result; `files` are differences that were written, and what they show."""
+def scene_comparison(
+    compared: EngineComparison, files: Sequence[tuple[str, str]] = ()
+) -> SceneComparison:
+    """Return a comparison as a result; `files` are differences that were
+    written, and what they show.
+    """
     return SceneComparison(
         name=f"{compared.comparison.layer} of {compared.path} against {compared.scene}",
         data=plain(compared) | _differences(files),
@@ -129,7 +150,9 @@ def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]
 
 
 def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
-    """Return what is wrong with an image: with each of airlight and surfaces where it has both as layers."""
+    """Return what is wrong with an image: with each of airlight and surfaces
+    where it has both as layers.
+    """
     several = plain(diagnoses)
     first, *others = (diagnosis.lines for diagnosis in diagnoses)
     return Said(
@@ -155,7 +178,9 @@ class Fitted(Said):
     """The parameters of the fog that explain an image; `of` has every number."""
 
     def __getitem__(self, name: str) -> FittedParameter:
-        """Return a parameter, or a channel of it such as 'sigma_t.r': its value, low, high and scene."""
+        """Return a parameter, or a channel of it such as 'sigma_t.r': its
+        value, low, high and scene.
+        """
         fit: Fit = self.of
         return {each.name: each for each in fit.parameters}[name]
 
@@ -163,11 +188,18 @@ class Fitted(Said):
 def fitted(fit: Fit) -> Fitted:
     """Return a fit as a result."""
     values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
-    columns = numbers(value="value", interval="95 % interval", scene="in the scene", how={"digits": 6})
-    rows = [(each.name, each.value, Interval.of((each.low, each.high)), each.scene) for each in fit.parameters]
+    columns = numbers(
+        value="value", interval="95 % interval", scene="in the scene", how={"digits": 6}
+    )
+    rows = [
+        (each.name, each.value, Interval.of((each.low, each.high)), each.scene)
+        for each in fit.parameters
+    ]
     return Fitted(
         name=f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}",
-        tables=(table("Parameters that explain the image", (*words(name="parameter"), *columns), rows),),
+        tables=(
+            table("Parameters that explain the image", (*words(name="parameter"), *columns), rows),
+        ),
         lines=fit.lines,
         good=not fit.failures,
         of=fit,
@@ -175,19 +207,21 @@ def fitted(fit: Fit) -> Fitted:
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:
-    """Write how a test image differs from a reference, whole or not at all; return in words what the file shows.
+    """Write how a test image differs from a reference, whole or not at all; return in
+    words what the file shows.
 
-    An .exr file has test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) / max(reference, 0.001
-    mean(reference)) in the layer `relative`; a .png file has the latter in false colours, `error_map`. Images are
-    (height, width, 3). Pixels outside of `kept`, (height, width), and in EXR files those that are not finite, have no
-    difference.
+    An .exr file has test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) /
+    max(reference, 0.001 mean(reference)) in the layer `relative`; a .png file has the latter in
+    false colours, `error_map`. Images are (height, width, 3). Pixels outside of `kept`, (height,
+    width), and in EXR files those that are not finite, have no difference.
     """
     reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
     seen = np.ones_like(reference, dtype=bool) if kept is None else np.asarray(kept)[..., None]
     if path.suffix.lower() == ".png":
         write_png(path, error_map(reference, np.where(seen, test, reference)))
         return (
-            f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
+            "signed relative error, blue too dark, red too bright, "
+            f"from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
         )
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped

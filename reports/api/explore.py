@@ -26,22 +26,25 @@ from airlight.reports.tables.record import Said
 
 
 @one_error
-def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None) -> Said:
+def describe(
+    scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None
+) -> Said:
     """Describe everything that another renderer needs to render a scene.
 
-    The description has the camera, media, lights and surfaces, what the pixels contain and which file to write.
-    `airlight compare SCENE IMAGE.exr` then judges the image. The glTF file has the same camera, lights and meshes, with
-    the media in its extras.
+    The description has the camera, media, lights and surfaces, what the pixels contain and which
+    file to write. `airlight compare SCENE IMAGE.exr` then judges the image. The glTF file has the
+    same camera, lights and meshes, with the media in its extras.
 
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        `load_scene` takes or returns.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
-        Write the scene as binary glTF 2.0, a .glb file, or its height fog or density grid as a grid of Mitsuba, a .vol
-        file.
+        Write the scene as binary glTF 2.0, a .glb file, or its height fog or density grid as a grid
+        of Mitsuba, a .vol file.
     progress
         True prints notes on the scene on the error stream.
 
@@ -68,7 +71,9 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
 
 
 def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid: str) -> Said:
-    """Return a description, with the glTF file and the medium that reads the volume file, as XML."""
+    """Return a description, with the glTF file and the medium that reads
+    the volume file, as XML.
+    """
     from airlight.reports.interchange.words import description_table
 
     command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
@@ -91,7 +96,8 @@ def _write_grid(path: Path, scene: Any) -> str:
     medium = read_reference(scene).medium
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
-            f"output: got {path}, and the medium is no height fog and no grid; expected a name that ends in .glb"
+            f"output: got {path}, and the medium is no height fog and no grid; expected a name "
+            "that ends in .glb"
         )
     return write_fog_grid(path, medium)
 
@@ -109,19 +115,21 @@ def view(
 ) -> None:
     """Show a scene live in the browser.
 
-    The mouse moves the camera; widgets change method, kernel, parameters, lights and media. The page shows what a frame
-    costs, stage by stage, and its error against the reference, which is computed while nothing moves. It also shows the
-    command that renders the same frame. Ctrl-C ends the view.
+    The mouse moves the camera; widgets change method, kernel, parameters, lights and media. The
+    page shows what a frame costs, stage by stage, and its error against the reference, which is
+    computed while nothing moves. It also shows the command that renders the same frame. Ctrl-C ends
+    the view.
 
-    The address has a token: anyone who knows it may use the page, but can choose only built-in methods and kernels and
-    those that are named here. Beyond 127.0.0.1 it travels in clear text.
+    The address has a token: anyone who knows it may use the page, but can choose only built-in
+    methods and kernels and those that are named here. Beyond 127.0.0.1 it travels in clear text.
 
     Parameters
     ----------
     scene
         A built-in scene, random:SEED or a Mitsuba XML file.
     method
-        A method of `airlight list methods`, or a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl.
+        A method of `airlight list methods`, or a user's as MODULE:FUNCTION,
+        FILE.py:FUNCTION or FILE.glsl.
     kernel
         Airlight kernel, see `airlight list kernels`.
     change
@@ -138,7 +146,9 @@ def view(
     require("websockets", "view", "the live view")
     host, _, digits = address.rpartition(":")
     if not host or not digits.isdecimal() or not (port := int(digits)) <= 65535:
-        raise InputError(f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535")
+        raise InputError(
+            f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535"
+        )
     chosen = configuration_of(method, kernel, parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
@@ -150,10 +160,13 @@ def view(
     session = Session(ViewState(str(scene), pixels, chosen, changes), variant)
     try:
         try:
-            server = Server(host, port, opened=session.opened, told=session.told, closed=session.closed)
+            server = Server(
+                host, port, opened=session.opened, told=session.told, closed=session.closed
+            )
         except OSError as error:
             raise InputError(
-                f"address: cannot listen at {host}, port {port}: {error.strerror}; expected an address of this "
+                f"address: cannot listen at {host}, port {port}: {error.strerror}; expected an "
+                "address of this "
                 "machine, and a port that is free: 0 finds one"
             ) from error
         server.start()

@@ -51,10 +51,10 @@ def export(
 ) -> Exported:
     """Print an airlight kernel as shader code, to paste into an engine.
 
-    The functions are `al_integral`, the airlight integral J [1/m]; `al_ray`, foot and height of a light over a ray; and
-    `al_airlight`, the radiance. The head of the text says what they take, and the largest error and where it was
-    measured. The text may be used without a notice (MIT-0). GLSL is for 4.30 and ES 3.00 with `precision highp float`
-    and `precision highp int`.
+    The functions are `al_integral`, the airlight integral J [1/m]; `al_ray`, foot and height of a
+    light over a ray; and `al_airlight`, the radiance. The head of the text says what they take, and
+    the largest error and where it was measured. The text may be used without a notice (MIT-0). GLSL
+    is for 4.30 and ES 3.00 with `precision highp float` and `precision highp int`.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def export(
     language
         glsl, hlsl, wgsl or slang.
     phase
-        isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D, D the diameter of droplets [um].
+        isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D, D the
+        diameter of droplets [um].
     test
         Add `al_test`, the largest relative error over eight rays whose integral is known.
     output
@@ -86,7 +87,8 @@ def export(
 
     if phase.startswith(("hg:", "tabulated", "mie")):
         raise InputError(
-            f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D"
+            f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg (g is an "
+            "argument) or hg-draine:D"
         )
     files = output_files(output)
     rows = _rows(phase) if test else ()
@@ -117,7 +119,11 @@ def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
     data = json.loads(MEASURED.read_text(encoding="utf-8"))
     entry = data["errors"].get(kernel, {}).get(phase)
     if entry is None:
-        return None, "Largest relative error of J: not measured for this kernel and phase function; see al_test."
+        return (
+            None,
+            "Largest relative error of J: not measured for this kernel and phase function; see "
+            "al_test.",
+        )
     error, count = entry["error"], entry["rays"]
     words = f"Largest relative error of J: {error:.1e} on {count} certified rays, GLSL on {data['device']}"
     if kernel == "exact":
@@ -126,7 +132,9 @@ def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
 
 
 def _rows(phase: str) -> list[tuple[float, ...]]:
-    """Return eight certified rays; of a phase function without any, rays with the integral to 1e-10."""
+    """Return eight certified rays; of a phase function without any, rays
+    with the integral to 1e-10.
+    """
     import numpy as np
 
     from airlight.analytic.panels import airlight_segments
@@ -138,7 +146,8 @@ def _rows(phase: str) -> list[tuple[float, ...]]:
     assert cases.tag is not None
     assert cases.value is not None
     own = phase if phase in cases.phase else "isotropic"
-    # Values that float32 holds well: those beyond 60 optical depths are close to its smallest number.
+    # Values that float32 holds well: those beyond 60 optical depths are
+    # close to its smallest number.
     picked = np.array(cases.phase) == own
     picked &= cases.value > 1e-20
     at = [np.flatnonzero(picked & (np.array(cases.tag) == kind))[0] for kind in _KINDS]
@@ -147,4 +156,8 @@ def _rows(phase: str) -> list[tuple[float, ...]]:
     )
     if own != phase:
         values, _ = airlight_segments(foot, height, x0, x1, sigma_t, phase_from_words(phase))
-    return list(zip(*(column.tolist() for column in (foot, height, x0, x1, sigma_t, g, values)), strict=True))
+    return list(
+        zip(
+            *(column.tolist() for column in (foot, height, x0, x1, sigma_t, g, values)), strict=True
+        )
+    )

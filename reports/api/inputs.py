@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arguments of the public functions, from Python and from the command line, and the one exception that they raise.
+"""Arguments of the public functions, from Python and from the command line, and the one
+exception that they raise.
 
-A type has two meanings. For a reader and for mypy it describes arguments from Python. At run time it describes
-arguments of a command line, a word or several, from which `reports.commands.main` makes the command of a function.
+A type has two meanings. For a reader and for mypy it describes arguments from Python. At run time
+it describes arguments of a command line, a word or several, from which `reports.commands.main`
+makes the command of a function.
 """
 
 import functools
@@ -26,11 +28,12 @@ if TYPE_CHECKING:
     from airlight.validation.scenes.loading import LoadedScene
     from airlight.validation.study.configuration import Configuration
 
-    #: A built-in name, random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, an `mi.Scene`, or what
-    #: `load_scene` returned.
+    #: A built-in name, random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, an
+    #: `mi.Scene`, or what `load_scene` returned.
     SceneLike: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | LoadedScene | Any
     Scenes: TypeAlias = SceneLike | Sequence[SceneLike]
-    #: A name, 'module:function', 'file.py:function', a function, or a method with its kernel and parameters.
+    #: A name, 'module:function', 'file.py:function', a function, or a method with
+    #: its kernel and parameters.
     MethodLike: TypeAlias = str | Callable[..., Any] | Configuration
     Methods: TypeAlias = MethodLike | Sequence[MethodLike]
     #: A name, such a name with '-N', 'module:function', or a function at the top of a module.
@@ -40,9 +43,11 @@ if TYPE_CHECKING:
     Size: TypeAlias = tuple[int, int] | str
     #: Called with (fraction done, what); True shows a bar on the error stream, None nothing.
     Progress: TypeAlias = Callable[[float, str], None] | bool | None
-    #: A result of `render` or `reference`, the path of an EXR file, layers that were read from one, or an array.
+    #: A result of `render` or `reference`, the path of an EXR file, layers that were
+    #: read from one, or an array.
     ImageLike: TypeAlias = LayeredImage | Image | str | os.PathLike[str] | ArrayLike
-    #: Pixels that may take part, (height, width) of truth values, or an EXR file that is 0 in those to leave out.
+    #: Pixels that may take part, (height, width) of truth values, or an EXR file that is
+    #: 0 in those to leave out.
     Mask: TypeAlias = ArrayLike | str | os.PathLike[str]
     #: Values by name, or words NAME=VALUE.
     Values: TypeAlias = Mapping[str, Any] | Sequence[str] | str
@@ -61,7 +66,9 @@ _R = TypeVar("_R")
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function raise MissingError, which says what to install, where no driver draws shaders."""
+    """Let a function raise MissingError, which says what to install, where
+    no driver draws shaders.
+    """
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
@@ -92,8 +99,11 @@ def with_kernels(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def scene_names() -> tuple[str, ...]:
     """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""
     files = (Path(__file__).resolve().parents[2] / "validation" / "scenes").glob("*.toml")
-    tables = (item for file in files for item in tomllib.loads(file.read_text(encoding="utf-8")).items())
-    return tuple(sorted(name for name, table in tables if "purpose" in table))  # parameters of engines have none
+    tables = (
+        item for file in files for item in tomllib.loads(file.read_text(encoding="utf-8")).items()
+    )
+    # parameters of engines have none
+    return tuple(sorted(name for name, table in tables if "purpose" in table))
 
 
 def several(things: Any) -> list[Any]:
@@ -111,18 +121,28 @@ def exclude(option: str, why: str, beside: Mapping[str, Any]) -> None:
 
 
 def _is_given(value: Any) -> bool:
-    """Return whether an option has a value other than None, False and an empty list; arrays have no truth value."""
-    return value is not None and value is not False and not (isinstance(value, list | tuple) and not value)
+    """Return whether an option has a value other than None, False and an empty list;
+    arrays have no truth value.
+    """
+    return (
+        value is not None
+        and value is not False
+        and not (isinstance(value, list | tuple) and not value)
+    )
 
 
 def output_files(output: Any, *endings: str) -> list[Path]:
-    """Return the files to write, once each is known to have an ending, such as '.png (a picture)', and a place."""
+    """Return the files to write, once each is known to have an ending, such as '.png
+    (a picture)', and a place.
+    """
     from airlight.reference.storage.files import ensure_writable
 
     files = [Path(path) for path in several(output)]
     for path in files:
         if endings and path.suffix.lower() not in [words.split()[0] for words in endings]:
-            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {' or '.join(endings)}")
+            raise InputError(
+                f"output: got {str(path)!r}, expected a name that ends in {' or '.join(endings)}"
+            )
         ensure_writable(path)
     return files
 
@@ -132,7 +152,9 @@ def listed(name: str, words: Any) -> list[str]:
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]
     parts = [part.strip() for part in parts]
     if not all(parts):
-        raise InputError(f"{name}: got {words!r}, expected names with commas between them, none of them empty")
+        raise InputError(
+            f"{name}: got {words!r}, expected names with commas between them, none of them empty"
+        )
     return parts
 
 
@@ -147,7 +169,9 @@ def pixels_of(size: Any) -> tuple[int, int] | None:
         if not (int(width) == width and int(height) == height):
             raise ValueError
     except (TypeError, ValueError):
-        raise InputError(f"size: got {size!r}, expected (width, height) in pixels, for example (800, 600)") from None
+        raise InputError(
+            f"size: got {size!r}, expected (width, height) in pixels, for example (800, 600)"
+        ) from None
     return int(width), int(height)
 
 
@@ -165,19 +189,24 @@ def _numbers(value: Any) -> str:
 
 
 def kernel_name(kernel: Any) -> str | None:
-    """Return the name of a kernel; of a function at the top of a module 'module:function', which imports it again."""
+    """Return the name of a kernel; of a function at the top of a module
+    'module:function', which imports it again.
+    """
     if kernel is None or isinstance(kernel, str):
         return kernel
     module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")
     if not callable(kernel) or getattr(sys.modules.get(module), name, None) is not kernel:
         raise InputError(
-            f"kernel: got {kernel!r}, expected a name or a function at the top of a module: give it a name there"
+            f"kernel: got {kernel!r}, expected a name or a function at the top of a module: give "
+            "it a name there"
         )
     return f"{module}:{name}"
 
 
 def configuration_of(method: Any, kernel: Any, parameters: Any) -> "Configuration":
-    """Return a configuration of a method, or the one that is given, which excludes a kernel and parameters."""
+    """Return a configuration of a method, or the one that is given, which excludes
+    a kernel and parameters.
+    """
     from airlight.validation.study.configuration import Configuration, configuration
 
     if not isinstance(method, Configuration):
@@ -189,7 +218,9 @@ def configuration_of(method: Any, kernel: Any, parameters: Any) -> "Configuratio
 
 @contextmanager
 def telling(progress: Any, title: str) -> Iterator[Callable[[float, str], None]]:
-    """Yield a function (fraction done, what) that calls `progress`, shows a bar for True, or does nothing for None."""
+    """Yield a function (fraction done, what) that calls `progress`, shows a bar for True,
+    or does nothing for None.
+    """
     if progress is True:
         with progress_bar(title) as callback:
             yield callback
@@ -198,7 +229,9 @@ def telling(progress: Any, title: str) -> Iterator[Callable[[float, str], None]]
 
 
 def note(progress: Any, notes: Sequence[str]) -> None:
-    """Say on the error stream what a user should know before the work begins, where a bar may be shown too."""
+    """Say on the error stream what a user should know before the work begins,
+    where a bar may be shown too.
+    """
     if progress is True:
         for words in notes:
             print(f"airlight: note: {words}", file=sys.stderr)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.reference`: the reference of a scene, by the certified integral or by samples, here or on workers."""
+"""`airlight.reference`: the reference of a scene, by the certified integral or by
+samples, here or on workers.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -52,17 +54,19 @@ def reference(
 ) -> "Reference":
     """Compute the reference of a scene, with its error.
 
-    The file is a layered EXR. Finished batches are cached: a Monte Carlo run continues from them, after an interruption
-    or with more samples. `--cluster` spreads batches over workers; the file has the same bytes. The exit status is 1 if
-    the run did not reach the `--error` that it was given.
+    The file is a layered EXR. Finished batches are cached: a Monte Carlo run continues from them,
+    after an interruption or with more samples. `--cluster` spreads batches over workers; the file
+    has the same bytes. The exit status is 1 if the run did not reach the `--error` that it was
+    given.
 
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        `load_scene` takes or returns.
     estimator
-        quadrature has an error bound in every pixel. single-scatter and volpath use random samples and have standard
-        errors. cloud-paths is for clouds, in which light scatters many times.
+        quadrature has an error bound in every pixel. single-scatter and volpath use random samples
+        and have standard errors. cloud-paths is for clouds, in which light scatters many times.
     change
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
@@ -70,23 +74,26 @@ def reference(
     pixel
         For quadrature: the radiance at the centre of a pixel, or its mean over the area.
     samples
-        For an estimator that samples: samples per pixel, at least 64; 2048 by default, 256 for clouds.
+        For an estimator that samples: samples per pixel, at least 64; 2048 by
+        default, 256 for clouds.
     error
-        For an estimator that samples: stop at this relative standard error of the image, such as 0.001.
+        For an estimator that samples: stop at this relative standard error of
+        the image, such as 0.001.
     seconds
         For an estimator that samples: stop after this time [s].
     seed
         Seed of the first batch of samples; the next batches count up from it.
     orders
-        For clouds, by cloud-paths or volpath: layers by order of scattering, such as 1,2,3-4,5-inf. 'sets', the default
-        of cloud-paths, are the orders of Bouthors 2008; 'all' writes no layers.
+        For clouds, by cloud-paths or volpath: layers by order of scattering, such as 1,2,3-4,5-inf.
+        'sets', the default of cloud-paths, are the orders of Bouthors 2008; 'all' writes no layers.
     merge
-        Trace nothing, and merge the samples of these files: Monte Carlo references of the scene by one estimator, with
-        different seeds; may be given several times.
+        Trace nothing, and merge the samples of these files: Monte Carlo references of the scene by
+        one estimator, with different seeds; may be given several times.
     cluster
-        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
-        scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
-        network that you trust; tls takes the certificates of Dask's configuration.
+        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask
+        scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run
+        what they are sent: use it only on a network that you trust; tls takes the certificates of
+        Dask's configuration.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -108,22 +115,34 @@ def reference(
     files = [Path(path) for path in several(merge)]
     budgets = {"samples": samples, "error": error, "seconds": seconds}
     if files:
-        of_tracing = {"size": size, "seed": seed or None, "orders": orders, "cluster": cluster, "change": change}
+        of_tracing = {
+            "size": size,
+            "seed": seed or None,
+            "orders": orders,
+            "cluster": cluster,
+            "change": change,
+        }
         others = {"pixel": pixel != "centre", "estimator": estimator != "quadrature"}
         exclude("merge", "traces nothing", budgets | of_tracing | others)
         return _merged(str(scene), files)
     if estimator not in _ESTIMATORS:
         raise InputError(
-            f"estimator: got {estimator!r}, expected one of {', '.join(_ESTIMATORS)}" + nearest(estimator, _ESTIMATORS)
+            f"estimator: got {estimator!r}, expected one of {', '.join(_ESTIMATORS)}"
+            + nearest(estimator, _ESTIMATORS)
         )
     if orders is not None and estimator not in ("volpath", "cloud-paths"):
-        raise InputError(f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath")
+        raise InputError(
+            f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath"
+        )
     place = None
     if cluster is not None:
         from airlight.reports.cluster.connect import parse_place
 
         if seconds is not None:
-            raise InputError("seconds: how many batches workers trace in a time is chance; give samples with a cluster")
+            raise InputError(
+                "seconds: how many batches workers trace in a time is chance; give samples with a "
+                "cluster"
+            )
         if not isinstance(scene, str):
             raise InputError("cluster: workers load a scene by its name or path; give that")
         place = parse_place(cluster)
@@ -132,7 +151,8 @@ def reference(
     if estimator != "quadrature":
         if pixel != "centre":
             raise InputError(
-                f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take quadrature"
+                f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take "
+                "quadrature"
             )
         budget = _budget(budgets, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
     else:
@@ -151,10 +171,14 @@ def reference(
     def compute(tell: Callable[[float, str], None], workers: "Client | None" = None) -> "Reference":
         elsewhere = None
         if workers is not None:
-            elsewhere = _elsewhere(workers, loaded, changes, estimator, pixel=pixel, budget=budget, orders=wanted)
+            elsewhere = _elsewhere(
+                workers, loaded, changes, estimator, pixel=pixel, budget=budget, orders=wanted
+            )
         if budget is None:
             return _quadrature(loaded, pixel, tell)
-        return _sampled(loaded, estimator, budget, seed=seed, orders=wanted, tell=tell, elsewhere=elsewhere)
+        return _sampled(
+            loaded, estimator, budget, seed=seed, orders=wanted, tell=tell, elsewhere=elsewhere
+        )
 
     with telling(progress, f"{loaded.name}: {estimator}") as tell:
         if place is None:
@@ -165,7 +189,9 @@ def reference(
             return compute(tell, workers)
 
 
-def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> tuple[str, ...]:
+def _check_work(
+    loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool
+) -> tuple[str, ...]:
     """Refuse what takes too long, and return what a user should know of the time."""
     from airlight.validation.study.cost import check_work, reference_work, sampled_work
 
@@ -173,7 +199,9 @@ def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None"
     if budget is None:
         emitters = loaded.scene.emitters()
         area_lights = sum(emitter.class_name() == "AreaLight" for emitter in emitters)
-        work = reference_work(size, lights=len(emitters) - area_lights, area_lights=area_lights, pixel=pixel)
+        work = reference_work(
+            size, lights=len(emitters) - area_lights, area_lights=area_lights, pixel=pixel
+        )
     else:
         work = sampled_work(size, budget.samples or 64, clouds=clouds)
     kind = f"{estimator} of areas" if pixel == "area" else estimator
@@ -190,7 +218,9 @@ def _elsewhere(
     budget: "Budget | None",
     orders: str | None,
 ) -> Any:
-    """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
+    """Let workers compute what is not in the cache: a quadrature at once,
+    batches as they are asked for.
+    """
     from airlight.reports.cluster.references import bring_references, image_of, tracing
     from airlight.validation.estimates.images import batch_plan, cloud_orders
 
@@ -205,13 +235,17 @@ def _elsewhere(
     return tracing(workers, image, estimator, samples=samples, batches=known, orders=chosen)
 
 
-def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":
+def _quadrature(
+    loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]
+) -> "Reference":
     from airlight.reports.api.results import Reference, sealed
     from airlight.reports.report.scene import reference_record
     from airlight.validation.estimates.images import layered_reference
     from airlight.validation.estimates.quadrature import reference_image
 
-    found = reference_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    found = reference_image(
+        loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what)
+    )
     said = reference_record(found)
     return Reference(
         scene=loaded.name,
@@ -237,7 +271,13 @@ def _sampled(
 
     chosen = cloud_orders(orders) if orders else None
     found = monte_carlo_reference(
-        loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=tell, elsewhere=elsewhere
+        loaded,
+        estimator,
+        budget=budget,
+        seed=seed,
+        orders=chosen,
+        progress=tell,
+        elsewhere=elsewhere,
     )
     found = replace(found, image=sealed(found.image))
     return Reference(
@@ -270,4 +310,6 @@ def _merged(scene: str, files: list[Path]) -> "Reference":
 def _budget(given: dict[str, Any], *, usual: int) -> "Budget":
     from airlight.validation.estimates.images import Budget
 
-    return Budget(**({"samples": usual} if all(value is None for value in given.values()) else given))
+    return Budget(
+        **({"samples": usual} if all(value is None for value in given.values()) else given)
+    )

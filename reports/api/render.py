@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.load_scene` and `airlight.render`: a frame or an animation by a real-time method, and what it costs.
+"""`airlight.load_scene` and `airlight.render`: a frame or an animation by a real-time
+method, and what it costs.
 
-A user's method that is named, 'module:function' or 'file.py:function', runs in a separate process, which it may end
-or never leave. A function that Python gives runs here.
+A user's method that is named, 'module:function' or 'file.py:function', runs in a separate process,
+which it may end or never leave. A function that Python gives runs here.
 """
 
 import operator
@@ -50,8 +51,8 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     Parameters
     ----------
     scene
-        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, or a
-        Mitsuba scene.
+        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML file, a Mitsuba
+        dictionary, or a Mitsuba scene.
     size
         Width and height of its image [pixels], or 'WxH'; the scene's own by default.
 
@@ -96,13 +97,14 @@ def render(
 ) -> "Rendering | RenderedFrames | Said":
     """Render a frame or an animation; say what a frame costs.
 
-    An animation is one turn: lights circle, objects turn, the medium's density swings, colours rotate. Each frame
-    recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours
+    rotate. Each frame recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
 
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        `load_scene` takes or returns.
     method
         A method of `airlight list methods`, or a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python
         also a function itself, ``method(view, *, kernel=None, **parameters)``, from a module or a notebook.
@@ -115,19 +117,22 @@ def render(
     precision
         Whether the method computes in float32 (single) or float64 (double).
     samples
-        Camera rays per pixel. More than one gives a picture without aliasing; errors are measured at pixel centres.
+        Camera rays per pixel. More than one gives a picture without aliasing; errors are
+        measured at pixel centres.
     frames
-        Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the changes of lights,
-        colours or a homogeneous medium, for `compare --frames`.
+        Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the
+        changes of lights, colours or a homogeneous medium, for `compare --frames`.
     animate
-        The motion: light, objects, medium, colour, or several with commas; the scene's animation by default.
+        The motion: light, objects, medium, colour, or several with commas; the
+        scene's animation by default.
     run
-        Number of the run. A noisy method draws different random numbers in each run, and the same ones when a run is
-        repeated.
+        Number of the run. A noisy method draws different random numbers in each run, and the same
+        ones when a run is repeated.
     frame
         Number of the frame in its run; of an animation, number of its first frame.
     output
-        A file to write: .exr for all layers, .png for a tone-mapped picture; may be given several times.
+        A file to write: .exr for all layers, .png for a tone-mapped picture;
+        may be given several times.
     plan
         Say what the scene needs from the method, and render nothing.
     timed
@@ -155,7 +160,9 @@ def render(
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:
-            raise InputError(f"{name}: got {number}, expected a whole number from 0 up to, but not, {2**31}")
+            raise InputError(
+                f"{name}: got {number}, expected a whole number from 0 up to, but not, {2**31}"
+            )
     from airlight.reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
@@ -180,7 +187,11 @@ def render(
     rendered: Rendering = call(_frame, asked, samples, timed, progress)
     for path in files:
         rendered.save(path)
-    curve = tone_curve(rendered.total).words if any(path.suffix.lower() == ".png" for path in files) else None
+    curve = (
+        tone_curve(rendered.total).words
+        if any(path.suffix.lower() == ".png" for path in files)
+        else None
+    )
     return replace(rendered, files=tuple(map(str, files)), tone_curve=curve)
 
 
@@ -211,7 +222,13 @@ class _Asked:
 
 
 def _check(
-    files: list[Path], *, samples: int, frames: int | None, animate: str | None, plan: bool, timed: bool
+    files: list[Path],
+    *,
+    samples: int,
+    frames: int | None,
+    animate: str | None,
+    plan: bool,
+    timed: bool,
 ) -> None:
     """Refuse options that do not go together before any work."""
     for name, value in (("samples", samples), ("frames", frames)):
@@ -223,13 +240,17 @@ def _check(
     if animate is not None and frames is None:
         raise InputError("animate: got no number of frames; add frames, such as --frames 24")
     if frames is not None and not files:
-        raise InputError("frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png")
+        raise InputError(
+            "frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png"
+        )
     if frames is not None:
         single = {"samples": samples > 1, "timed": timed}
         exclude("frames", "an animation has one ray a pixel and says what its frames cost", single)
 
 
-def checked_configuration(method: Any, kernel: Any = None, parameters: Any = None) -> "tuple[Configuration, bool]":
+def checked_configuration(
+    method: Any, kernel: Any = None, parameters: Any = None
+) -> "tuple[Configuration, bool]":
     """Return a configuration, checked, and whether its code is a user's that is named.
 
     Such code is imported in a separate process, never here.
@@ -242,16 +263,24 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
         return configuration_of(method, kernel, parameters), method.own
     if isinstance(method, str) and is_shader(method):
         require_opengl()
-    apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
+    apart = (isinstance(method, str) and ":" in method) or (
+        isinstance(kernel, str) and ":" in kernel
+    )
     if not apart:
         return configuration_of(method, kernel, parameters), False
     from airlight.reports.machine.own_process import in_own_process
 
-    return in_own_process(configuration, method, kernel_name(kernel), parameters or {}, name=method), True
+    return in_own_process(
+        configuration, method, kernel_name(kernel), parameters or {}, name=method
+    ), True
 
 
-def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tuple[Any, Any, Any, bool]:
-    """Return a scene, loaded and read, what renders it, and whether with the further layers of the method."""
+def _ready(
+    asked: _Asked, frames: int, layers: bool, progress: Progress
+) -> tuple[Any, Any, Any, bool]:
+    """Return a scene, loaded and read, what renders it, and whether with the
+    further layers of the method.
+    """
     from airlight.realtime.methods.registry import find_method
     from airlight.validation.study.configuration import prepared
 
@@ -279,7 +308,9 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     from airlight.validation.study.turns import time_alone
 
     variant, chosen = activate(), asked.chosen
-    loaded, read, renderer, layered = _ready(asked, samples + (TIMED if timed else 0), samples == 1, progress)
+    loaded, read, renderer, layered = _ready(
+        asked, samples + (TIMED if timed else 0), samples == 1, progress
+    )
     warnings = _warnings(renderer)
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
@@ -318,7 +349,13 @@ def _animation(
     from airlight.reports.api.results import RenderedFrames, write_image
     from airlight.reports.machine.environment import activate
     from airlight.reports.plotting.pictures import tone_curve
-    from airlight.validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
+    from airlight.validation.scenes.animation import (
+        animate,
+        frame_changes,
+        frame_objects,
+        moved_parts,
+        parse_moves,
+    )
     from airlight.validation.study.frame_times import timed_image
     from airlight.validation.study.run import layered_frame
 
@@ -330,7 +367,8 @@ def _animation(
     _warnings(renderer)
     costs: list[tuple[float, float]] = []
     changes_by_frame: list[dict[str, tuple[float, ...]] | None] = []
-    kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
+    # all frames share the tone curve of the first, so that a light that fades looks it
+    kept = curve = None
     shapes = frame_objects(renderer.scene, animation, frames)
     moving = stopwatch()
     with telling(progress, f"{loaded.name}: {frames} frames") as tell:
@@ -341,7 +379,11 @@ def _animation(
             changes_by_frame.append(frame_changes(moved, animation))
             curve = curve or tone_curve(frame.airlight + frame.surface)
             for path in files:
-                write_image(_numbered(path, number, frames), layered_frame(loaded.name, chosen, frame), curve)
+                write_image(
+                    _numbered(path, number, frames),
+                    layered_frame(loaded.name, chosen, frame),
+                    curve,
+                )
             del frame  # the next one needs its room
             tell(number / frames, f"frame {number} of {frames}")
             moving = stopwatch()
@@ -361,16 +403,30 @@ def _animation(
         move_ms=move_ms,
         render_ms=render_ms,
         frame_ms=move_ms + render_ms,
-        recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES},
+        recordings={
+            stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES
+        },
         device=variant,
-        files=(*(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)), *about),
+        files=(
+            *(
+                str(_numbered(path, number, frames))
+                for path in files
+                for number in range(1, frames + 1)
+            ),
+            *about,
+        ),
     )
 
 
 def _write_frames(
-    path: Path, scene: str, changes: list[dict[str, tuple[float, ...]] | None], objects: dict[str, Any]
+    path: Path,
+    scene: str,
+    changes: list[dict[str, tuple[float, ...]] | None],
+    objects: dict[str, Any],
 ) -> tuple[str, ...]:
-    """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads, where changes have names."""
+    """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads,
+    where changes have names.
+    """
     from airlight.reference.storage.files import write_text
     from airlight.validation.motion.frames_file import FramesRecord
 
@@ -378,7 +434,9 @@ def _write_frames(
     if len(named) < max(len(changes), 2):
         return ()
     by_name = {name: tuple(each[name] for each in named) for name in named[0]}
-    record = FramesRecord(len(named), scene=scene, pixel="centre", layer="airlight", changes=by_name, objects=objects)
+    record = FramesRecord(
+        len(named), scene=scene, pixel="centre", layer="airlight", changes=by_name, objects=objects
+    )
     write_text(path.with_suffix(".json"), record.text() + "\n")
     return (str(path.with_suffix(".json")),)
 
@@ -407,7 +465,9 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
     from airlight.realtime.methods.published.biri2006.method import PaperPreparation
 
     preparation = renderer.stages.prepare
-    warnings: tuple[str, ...] = preparation.warnings if isinstance(preparation, PaperPreparation) else ()
+    warnings: tuple[str, ...] = (
+        preparation.warnings if isinstance(preparation, PaperPreparation) else ()
+    )
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
     return warnings
@@ -427,11 +487,13 @@ _KERNEL = "kernel="  # begins a setting that names a kernel
 def asked_configurations(
     methods: Any, kernels: Any, settings: Any, *, usual: Any = None
 ) -> "tuple[list[Configuration], bool]":
-    """Return the configurations to measure, and whether all user code is named: it can then run in other processes.
+    """Return the configurations to measure, and whether all user code is named: it can
+    then run in other processes.
 
-    A method is a name, a function or a configuration. A name without kernel and settings stands for its standard
-    configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
-    with each kernel and with all settings, given by name or as NAME=VALUE; kernel=NAME is one more kernel.
+    A method is a name, a function or a configuration. A name without kernel and settings stands for
+    its standard configurations; 'all', the default, for `usual`, or those of every built-in method
+    for fog. Every method is measured with each kernel and with all settings, given by name or as
+    NAME=VALUE; kernel=NAME is one more kernel.
     """
     from airlight.realtime.methods.shader.source import is_users
     from airlight.validation.study.configuration import (
@@ -445,7 +507,9 @@ def asked_configurations(
     if isinstance(settings, Mapping):
         given = dict(settings)
     else:
-        named_kernels += [word.removeprefix(_KERNEL) for word in several(settings) if word.startswith(_KERNEL)]
+        named_kernels += [
+            word.removeprefix(_KERNEL) for word in several(settings) if word.startswith(_KERNEL)
+        ]
         given = parse_settings([word for word in several(settings) if not word.startswith(_KERNEL)])
     option = "set" if given else "kernel" if named_kernels else ""
     chosen: list[Configuration] = []
@@ -453,15 +517,22 @@ def asked_configurations(
     for method in several(methods) or ["all"]:
         if method == "all":
             if option:
-                raise InputError(f"{option}: got no single method that it is for; name methods by --method")
+                raise InputError(
+                    f"{option}: got no single method that it is for; name methods by --method"
+                )
             chosen += chosen_configurations() if usual is None else usual
         elif isinstance(method, Configuration):
             chosen.append(method)
         elif not isinstance(method, str):
-            chosen += [configuration(method, kernel_name(kernel), given) for kernel in named_kernels or (None,)]
+            chosen += [
+                configuration(method, kernel_name(kernel), given)
+                for kernel in named_kernels or (None,)
+            ]
             apart = False
         elif option or is_users(method):
             chosen += [checked_configuration(method, k, given)[0] for k in named_kernels or (None,)]
         else:
             chosen += chosen_configurations([method])
-    return list(dict.fromkeys(chosen)), apart and not any(callable(kernel) for kernel in named_kernels)
+    return list(dict.fromkeys(chosen)), apart and not any(
+        callable(kernel) for kernel in named_kernels
+    )

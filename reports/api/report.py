@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.report`, `airlight.diff` and `airlight.paper`: the error report, two of them compared, claims of papers."""
+"""`airlight.report`, `airlight.diff` and `airlight.paper`: the error report, two of them
+compared, claims of papers.
+"""
 
 import math
 import os
@@ -106,7 +108,9 @@ class Report(Result):
 
 
 def _address(page: Path) -> str:
-    """Return the address of a page, relative inside the current folder: a notebook shows only files below it."""
+    """Return the address of a page, relative inside the current folder: a notebook
+    shows only files below it.
+    """
     try:
         return page.resolve().relative_to(Path(os.getcwd()).resolve()).as_posix()
     except ValueError:
@@ -134,41 +138,45 @@ def report(
 
     The page is report.html, next to report.json and each image as EXR and PNG.
 
-    Results that this machine measured before, with the same code and scenes, come from the cache; the times of a scene
-    are of one run of all its methods, and are measured again if any of these is new. The exit status is 1
-    if single-scatter or volpath does not confirm the reference within the margin, or if a user method fails: the report
-    says how.
+    Results that this machine measured before, with the same code and scenes, come from the cache;
+    the times of a scene are of one run of all its methods, and are measured again if any of these
+    is new. The exit status is 1 if single-scatter or volpath does not confirm the reference within
+    the margin, or if a user method fails: the report says how.
 
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; four with `--quick`, eleven by default. Or a study, a TOML
-        file as for `airlight sweep`.
+        Built-in scenes, random:SEED and Mitsuba XML files; four with `--quick`, eleven by default.
+        Or a study, a TOML file as for `airlight sweep`.
     quick
         Few scenes and small images, for a first look in some minutes.
     full
         Large images, many samples and all tables, in about an hour.
     method
-        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl, or 'all', the
-        default; may be given several times. From Python also functions and `airlight.configuration(...)`.
+        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or
+        FILE.glsl, or 'all', the default; may be given several times. From Python also functions and
+        `airlight.configuration(...)`.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
         NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     images
-        Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to compare with the reference.
+        Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to
+        compare with the reference.
     output
         Folder for the report; airlight-report by default.
     from_
-        Draw the page of this report.json again and measure nothing; `--method` names what the strip shows.
+        Draw the page of this report.json again and measure nothing; `--method`
+        names what the strip shows.
     figures
-        Also write figures and a LaTeX table for a paper, with the width of a single or a double column.
+        Also write figures and a LaTeX table for a paper, with the width of a
+        single or a double column.
     fresh
         Measure again what earlier runs have cached.
     cluster
-        Let workers compute references and their checks: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a
-        Dask scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run what they are
-        sent: use it only on a network that you trust.
+        Let workers compute references and their checks: local[:N] processes, tcp://HOST:PORT or
+        tls://HOST:PORT of a Dask scheduler, or its scheduler file. A tcp scheduler authenticates
+        nobody and its workers run what they are sent: use it only on a network that you trust.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -185,10 +193,19 @@ def report(
     'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
     if from_ is not None:
-        beside = {"quick": quick, "full": full, "kernel": kernel, "set": settings, "images": images, "fresh": fresh}
+        beside = {
+            "quick": quick,
+            "full": full,
+            "kernel": kernel,
+            "set": settings,
+            "images": images,
+            "fresh": fresh,
+        }
         shown = {"a scene": scenes, "method": method} if figures is None else {}
         exclude("from", "the report is drawn again", {**beside, "cluster": cluster, **shown})
-        return _redrawn(Path(from_), output, figures, several(scenes), [str(each) for each in several(method)])
+        return _redrawn(
+            Path(from_), output, figures, several(scenes), [str(each) for each in several(method)]
+        )
     if quick:
         exclude("quick", "names the effort", {"full": full})
     effort = "quick" if quick else "full" if full else "default"
@@ -197,26 +214,50 @@ def report(
     places = {"images": images, "output": output, "figures": figures, "cluster": cluster}
     command = _command(*asked, {"quick": quick, "full": full, "fresh": fresh, **places})
     data = _measured(
-        target, effort, *asked, images=images, fresh=fresh, cluster=cluster, command=command, progress=progress
+        target,
+        effort,
+        *asked,
+        images=images,
+        fresh=fresh,
+        cluster=cluster,
+        command=command,
+        progress=progress,
     )
     written = _figures(target, figures, [], []) if figures else ()
     return Report(folder=target, data=data, done=_done(data), figures=written)
 
 
 def _command(
-    scenes: Sequence[Any], methods: Sequence[Any], kernels: Sequence[Any], settings: Any, options: Mapping[str, Any]
+    scenes: Sequence[Any],
+    methods: Sequence[Any],
+    kernels: Sequence[Any],
+    settings: Any,
+    options: Mapping[str, Any],
 ) -> str:
-    """Return what makes a report again: a command where all has a name, else the call from Python."""
-    values = [f"{name}={value}" for name, value in settings.items()] if isinstance(settings, Mapping) else settings
+    """Return what makes a report again: a command where all has a name,
+    else the call from Python.
+    """
+    values = (
+        [f"{name}={value}" for name, value in settings.items()]
+        if isinstance(settings, Mapping)
+        else settings
+    )
     named = {"method": methods, "kernel": kernels, "set": several(values)}
     given = {name: value for name, value in options.items() if value}
     if all(isinstance(each, str | os.PathLike) for each in (*scenes, *methods, *kernels)):
         words = ["airlight", "report", *map(str, scenes)]
-        words += [word for name, each in named.items() for value in each for word in (f"--{name}", str(value))]
+        words += [
+            word
+            for name, each in named.items()
+            for value in each
+            for word in (f"--{name}", str(value))
+        ]
         for name, value in given.items():
             words += [f"--{name}"] if value is True else [f"--{name}", str(value)]
         return shlex.join(words)
-    listed = {"settings" if name == "set" else name: value for name, value in named.items() if value}
+    listed = {
+        "settings" if name == "set" else name: value for name, value in named.items() if value
+    }
     parts = [_python(scenes)] if scenes else []
     parts += [f"{name}={_python(value)}" for name, value in (listed | given).items()]
     return f"airlight.report({', '.join(parts)})"
@@ -237,8 +278,12 @@ def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) ->
     return write_figures(folder, column, scene=scenes[0] if scenes else None, labels=labels or None)
 
 
-def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
-    """Draw the page of a report again, into its own folder or as a whole report into another, and its figures."""
+def _redrawn(
+    path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]
+) -> Report:
+    """Draw the page of a report again, into its own folder or as a whole report into
+    another, and its figures.
+    """
     from airlight.reference.storage.files import alone, ensure_folder, write_bytes, write_text
     from airlight.reports.data.records import load_report, named_files
     from airlight.reports.page.render import render_page
@@ -295,7 +340,10 @@ def _measured(
     names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
     if methods and all(isinstance(name, str) and is_users(name) for name in methods):
-        note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
+        note(
+            progress,
+            ["what --method names is measured alone; --method all adds the built-in methods"],
+        )
     if shown:  # the sizes of an effort are known to be right; those of images are the user's
         from airlight.validation.engine.images import images_size
 
@@ -303,11 +351,15 @@ def _measured(
         works = [reference_work(size) for size in sizes]
         works += [frame_work(size, steps=100, frames=TIMED * len(chosen)) for size in sizes]
         check_work("report --images", works)
-    gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
+    # modules live as long as the process: what looks for garbage before each
+    # frame need not look there
+    gc.freeze()
     with ExitStack() as stack, telling(progress, "report") as tell:
         return write_report(
             target,
-            replace(study, scenes=tuple(names), random=RandomScenes(), configurations=tuple(chosen)),
+            replace(
+                study, scenes=tuple(names), random=RandomScenes(), configurations=tuple(chosen)
+            ),
             images=shown,
             command=command,
             fresh=fresh,
@@ -323,7 +375,8 @@ def _scenes_of_images(
 ) -> "tuple[list[str], dict[str, tuple[EngineImage, ...]]]":
     """Return the scenes to study and the images by scene, from a folder of images or None.
 
-    Scenes are those `asked` for; without any those of the images, or the `usual` ones without images.
+    Scenes are those `asked` for; without any those of the images, or the
+    `usual` ones without images.
     """
     if images is None:
         return list(asked or usual), {}
@@ -335,7 +388,10 @@ def _scenes_of_images(
     names = list(asked or shown)
     wanted = {scene_stem(name) for name in names}
     if not wanted & set(shown):
-        raise InputError(f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}")
+        raise InputError(
+            f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of "
+            f"{', '.join(shown)}"
+        )
     return names, {name: several for name, several in shown.items() if name in wanted}
 
 
@@ -358,10 +414,11 @@ def diff(
 
     The result also has what got better, what is new and what is gone.
 
-    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding. Times have more noise:
-    the quartiles of both reports say how busy the machine was, and a change must appear in all stages that share it.
-    Times of two machines are compared relative to the median of all. The exit status is 1 if anything is worse, gone,
-    newly refused or no longer finite, or if the reference is no longer confirmed.
+    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding.
+    Times have more noise: the quartiles of both reports say how busy the machine was, and a change
+    must appear in all stages that share it. Times of two machines are compared relative to the
+    median of all. The exit status is 1 if anything is worse, gone, newly refused or no longer
+    finite, or if the reference is no longer confirmed.
 
     Parameters
     ----------
@@ -397,17 +454,19 @@ def paper(
 ) -> Said:
     """Give a verdict on every claim of the papers.
 
-    Equations, figures, tables and sentences stand next to what was measured. A verdict is reproduced, not reproduced,
-    differs (it depends on the machine or on a scene of ours) or impossible. This command measures what a verdict needs,
-    or takes it from the cache; all verdicts take about an hour.
+    Equations, figures, tables and sentences stand next to what was measured. A verdict is
+    reproduced, not reproduced, differs (it depends on the machine or on a scene of ours) or
+    impossible. This command measures what a verdict needs, or takes it from the cache; all verdicts
+    take about an hour.
 
     Parameters
     ----------
     name
-        biri, billeter, ali or bouthors: also the numbers of the paper that have no verdict, such as frame rates of
-        graphics cards. By default the verdicts of all papers.
+        biri, billeter, ali or bouthors: also the numbers of the paper that have no verdict, such as
+        frame rates of graphics cards. By default the verdicts of all papers.
     figures
-        Also draw the pictures of the papers in our scenes into this folder, as PDF and PNG with their data.
+        Also draw the pictures of the papers in our scenes into this folder, as PDF
+        and PNG with their data.
     quick
         Only the claims that need no image, and small figures.
     progress
@@ -426,7 +485,9 @@ def paper(
     from airlight.validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():
-        raise InputError(f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers()))
+        raise InputError(
+            f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers())
+        )
     chosen = [claim for claim in claims() if name in (None, claim.paper)]
     activate()
     with telling(progress, "paper") as tell:
@@ -439,7 +500,16 @@ def paper(
             written = write_figures(Path(figures), name, quick=quick, progress=tell)
     left_out = len(chosen) - len(rows)
     counted = count_words([row for row in rows if row.verdict is not None])
-    lines = [f"{counted}.", *([f"{left_out} more rows need images: leave out --quick."] if left_out else []), *written]
-    data = {"measured": date(), "environment": describe_environment(), "papers": plain(rows), "left_out": left_out}
+    lines = [
+        f"{counted}.",
+        *([f"{left_out} more rows need images: leave out --quick."] if left_out else []),
+        *written,
+    ]
+    data = {
+        "measured": date(),
+        "environment": describe_environment(),
+        "papers": plain(rows),
+        "left_out": left_out,
+    }
     tables = paper_tables(rows, plain=name is not None)
     return Said(name=counted, data=data, tables=tables, lines=lines, of=tuple(rows))

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images as results: frozen, NumPy arrays where one is wanted, pictures in a notebook, words on a terminal.
+"""Images as results: frozen, NumPy arrays where one is wanted, pictures in a
+notebook, words on a terminal.
 
-Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
-the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
-reference, whose error is far below what float32 can hold.
+Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and
+read-only. They keep the precision of what made them: float32 from a method in single precision,
+float64 from one in double and from the reference, whose error is far below what float32 can hold.
 """
 
 import os
@@ -75,7 +76,8 @@ class LayeredImage(Pictured):
     """Layers of radiance and the depth, shared by renderings and references; see the module."""
 
     scene: str  #: name of the scene
-    image: Image = field(repr=False)  #: the layers as they are written to a file, with what made them
+    #: the layers as they are written to a file, with what made them
+    image: Image = field(repr=False)
 
     @property
     def airlight(self) -> Array:
@@ -105,7 +107,9 @@ class LayeredImage(Pictured):
 
     @property
     def depth(self) -> Array:
-        """The distance along the ray to the visible surface, infinite where there is none [m], (height, width)."""
+        """The distance along the ray to the visible surface, infinite where there is
+        none [m], (height, width).
+        """
         assert self.image.depth is not None
         return self.image.depth
 
@@ -127,12 +131,15 @@ class LayeredImage(Pictured):
         return replace(self.image, layers=dict(self.image.layers) | {TOTAL: self.total})
 
     def picture(self, layer: str = TOTAL) -> NDArray[np.uint8]:
-        """Return a layer, such as 'airlight' or 'surface', in the exposure of the total, (height, width, 3)."""
+        """Return a layer, such as 'airlight' or 'surface', in the exposure of the
+        total, (height, width, 3).
+        """
         radiance = np.asarray(image_layer(self.with_total(), layer), dtype=np.float64)
         return tone_mapped(radiance, exposure(np.asarray(self.total, dtype=np.float64)))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the layers as EXR or a picture of the total as PNG, by the suffix of the path; return the path.
+        """Write the layers as EXR or a picture of the total as PNG, by the suffix of
+        the path; return the path.
 
         Parameters
         ----------
@@ -154,7 +161,9 @@ class LayeredImage(Pictured):
         shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
         if np.any(self.surface):
             png = png_bytes(self.picture("airlight"))
-            shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
+            shown.append(
+                picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight")
+            )
         said = [line for line in self.lines[1:] if not line.startswith(_NOTHING)]
         return block(title, *shown, bullets(said))
 
@@ -191,15 +200,20 @@ class Rendering(LayeredImage):
                 if self.times.surface is None
                 else [
                     f"{whole}: surface {ms['surface']}, airlight {ms['airlight']}",
-                    f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after objects moved",
-                    f"  camera rays cached: {ms['light_moved_camera_cached']} after the light moved, "
+                    f"  {ms['light_moved']} after the light moved, {ms['objects_moved']} after "
+                    "objects moved",
+                    f"  camera rays cached: {ms['light_moved_camera_cached']} after the light "
+                    "moved, "
                     f"{ms['colours_changed']} after only medium or colours changed",
                     f"  {self.device}",
                 ]
             )
         lines += [f"  picture: {self.tone_curve}"] if self.tone_curve else []
         if self.samples > 1:
-            lines.append(f"  {self.samples} rays a pixel: a picture; a method's error is measured at pixel centres")
+            lines.append(
+                f"  {self.samples} rays a pixel: a picture; a method's error is measured at pixel "
+                "centres"
+            )
         return [*lines, *_written(self.files, self.size)]
 
     @property
@@ -213,8 +227,10 @@ class Reference(LayeredImage):
     """The reference of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
-    relative_error: float  #: the mean error of the airlight over its mean, or the relative standard error of the image
-    #: Shadow rays that checked the quadrature, or batches of an estimator that samples; None of merged files.
+    #: the mean error of the airlight over its mean, or the relative standard error of the image
+    relative_error: float
+    #: Shadow rays that checked the quadrature, or batches of an estimator that
+    #: samples; None of merged files.
     how: QuadratureReference | MonteCarloReference | None = None
 
     @property
@@ -227,16 +243,22 @@ class Reference(LayeredImage):
 
     @property
     def standard_error(self) -> Array | None:
-        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3);
+        None for the quadrature.
+        """
         return self.image.layers.get("airlight_se")
 
     @property
     def surface_standard_error(self) -> Array | None:
-        """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        """The standard error of the surface [W/(m^2 sr)], (height, width, 3);
+        None for the quadrature.
+        """
         return self.image.layers.get("surface_se")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields of the record, the means of the layers, and what the header says of the samples."""
+        """Return the fields of the record, the means of the layers, and what the
+        header says of the samples.
+        """
         means = {name: layer.mean(axis=(0, 1)) for name, layer in self.image.layers.items()}
         said = {name: self.image.attributes.get(f"airlight:{name}") for name in _MADE}
         known = {name: value for name, value in said.items() if value is not None}
@@ -260,17 +282,24 @@ class Reference(LayeredImage):
         if "batches" not in made:
             return lines
         batches = int(made["batches"])
-        # A quadrature traces nothing: it has batches only where there are area lights, and they have no seeds.
+        # A quadrature traces nothing: it has batches only where there are area
+        # lights, and they have no seeds.
         if "spp" in made:
             kind = "batches"
-            lines.append(f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}")
+            lines.append(
+                f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}"
+            )
         else:
             kind = "sets"
             lines.append(f"  standard errors from {batches} independent sets of light samples")
         if isinstance(how, MonteCarloReference):
             lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []
             files = "file" if how.damaged == 1 else "files"
-            lines += [f"  {how.damaged} damaged {files} of the cache traced again"] if how.damaged else []
+            lines += (
+                [f"  {how.damaged} damaged {files} of the cache traced again"]
+                if how.damaged
+                else []
+            )
             lines.append(f"  standard error {_error_words(how)}")
         if batches < 32:
             known = 100 / (2 * (batches - 1)) ** 0.5
@@ -310,25 +339,34 @@ class RenderedFrames(Result):
     @property
     def title(self) -> str:
         """The scene, the method, and what moves."""
-        return f"{self.scene}, {self.method}: {self.frames} frames, {' and '.join(self.moves)} moving"
+        return (
+            f"{self.scene}, {self.method}: {self.frames} frames, {' and '.join(self.moves)} moving"
+        )
 
     @property
     def lines(self) -> Sequence[str]:
         """The cost of a frame, and the files that were written."""
         lines = [
             self.title,
-            f"  {self.frame_ms:.3g} ms a frame ({rate_words(self.frame_ms)}): {self.move_ms:.3g} ms to move, "
+            f"  {self.frame_ms:.3g} ms a frame ({rate_words(self.frame_ms)}): {self.move_ms:.3g} "
+            "ms to move, "
             f"{self.render_ms:.3g} ms to render, reusing what stood still; {self.device}",
         ]
         for ending in dict.fromkeys(Path(path).suffix for path in self.files):
             own = [path for path in self.files if path.endswith(ending)]
-            pixels = f"{own[0]} to {own[-1]}: {len(own)} files, {' x '.join(map(str, self.size))} pixels"
+            pixels = (
+                f"{own[0]} to {own[-1]}: {len(own)} files, {' x '.join(map(str, self.size))} pixels"
+            )
             lines.append(f"wrote {f'{own[0]}: what changes' if ending == '.json' else pixels}")
         return lines
 
 
-def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:
-    """Write layers as .exr, or their total as .png through a tone curve; by default one that suits it."""
+def write_image(
+    path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None
+) -> None:
+    """Write layers as .exr, or their total as .png through a tone curve; by
+    default one that suits it.
+    """
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped
 
@@ -338,18 +376,25 @@ def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, tot
         light = image.layers["airlight"] + image.layers["surface"] if total is None else total
         write_png(path, preview(np.asarray(light, dtype=np.float64), curve or tone_curve(light)))
     else:
-        raise InputError(f"save: got {str(path)!r}, expected a path that ends with .exr (all layers) or .png (picture)")
+        raise InputError(
+            f"save: got {str(path)!r}, expected a path that ends with .exr (all layers) or .png "
+            "(picture)"
+        )
 
 
 def _written(files: Sequence[str], size: tuple[int, int]) -> list[str]:
     shown = " x ".join(map(str, size))
     what = {True: "airlight, surface, their sum, depth", False: "a picture"}
-    lines = [f"wrote {path}: {what[path.lower().endswith('.exr')]}, {shown} pixels" for path in files]
+    lines = [
+        f"wrote {path}: {what[path.lower().endswith('.exr')]}, {shown} pixels" for path in files
+    ]
     return lines or [f"{_NOTHING}: -o NAME.png writes a picture, -o NAME.exr the layers"]
 
 
 def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
-    """Answer NumPy's protocol: a view, or a copy for another type; raises ValueError if a needed copy is forbidden."""
+    """Answer NumPy's protocol: a view, or a copy for another type; raises ValueError if a
+    needed copy is forbidden.
+    """
     if dtype is not None and np.dtype(dtype) != values.dtype:
         if copy is False:
             raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")

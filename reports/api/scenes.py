@@ -27,7 +27,9 @@ class OpenScene(LoadedScene):
         return int(width), int(height)
 
     def plan(self) -> dict[str, str]:
-        """Return the features that the scene needs, in words; raises InputError if no method can render it."""
+        """Return the features that the scene needs, in words; raises InputError if
+        no method can render it.
+        """
         return dict(_described(self)[0])
 
     def _repr_html_(self) -> str:
@@ -46,8 +48,12 @@ class OpenScene(LoadedScene):
         return "OpenScene({}, {} x {})".format(self.name, *self.size)
 
 
-def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None) -> OpenScene:
-    """Return a scene at a size, its own by default; a scene that was loaded before is left as it is."""
+def opened(
+    scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None
+) -> OpenScene:
+    """Return a scene at a size, its own by default; a scene that was loaded
+    before is left as it is.
+    """
     from airlight.reports.machine.environment import activate
 
     activate()
@@ -55,14 +61,17 @@ def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]
     if isinstance(scene, str | os.PathLike):
         return _as_open(load_scene(os.fspath(scene), pixels, changes or {}))
     if changes:
-        raise InputError("change: is for a scene by name or path; change the scene that you have loaded yourself")
+        raise InputError(
+            "change: is for a scene by name or path; change the scene that you have loaded yourself"
+        )
     if isinstance(scene, Mapping):
         return _from_dictionary(scene, pixels)
     loaded = _as_open(scene) if isinstance(scene, LoadedScene) else _from_mitsuba(scene)
     if pixels not in (None, loaded.size):
         # The user may have changed the scene since; loading it again in silence would undo that.
         raise InputError(
-            "size: got {}x{} for a scene that is loaded already, at {}x{}; give its name, path or dictionary with the "
+            "size: got {}x{} for a scene that is loaded already, at {}x{}; give its name, path or "
+            "dictionary with the "
             "size, or load it at that size".format(*pixels, *loaded.size)
         )
     return loaded
@@ -71,14 +80,19 @@ def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]
 def _as_open(loaded: LoadedScene) -> OpenScene:
     if isinstance(loaded, OpenScene):
         return loaded
-    return OpenScene(loaded.name, loaded.scene, loaded.purpose, loaded.published, loaded.path, loaded.animation)
+    return OpenScene(
+        loaded.name, loaded.scene, loaded.purpose, loaded.published, loaded.path, loaded.animation
+    )
 
 
 def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:
     try:
         built = build_scene(scene)
-    except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
-        raise InputError(f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}") from error
+    # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
+    except Exception as error:
+        raise InputError(
+            f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}"
+        ) from error
     loaded = _from_mitsuba(built)
     if pixels is not None:
         resize(built, pixels)
@@ -90,11 +104,13 @@ def _from_mitsuba(scene: Any) -> OpenScene:
         kind = type(scene)
         if kind.__name__ == "Scene" and kind.__module__.split(".")[0] == "mitsuba":
             raise InputError(
-                f"scene: got a Mitsuba scene of another variant than {mi.variant()}; call airlight.activate() before "
+                f"scene: got a Mitsuba scene of another variant than {mi.variant()}; call "
+                "airlight.activate() before "
                 "you build it"
             )
         raise InputError(
-            f"scene: got {kind.__name__}, expected a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
+            f"scene: got {kind.__name__}, expected a name, the path of a Mitsuba XML file, a "
+            "Mitsuba dictionary of the "
             "type 'scene', or a scene that is loaded"
         )
     if not scene.sensors():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.sweep`: many scenes, every method, on one machine or on a Dask cluster; and what the rows say."""
+"""`airlight.sweep`: many scenes, every method, on one machine or on a Dask
+cluster; and what the rows say.
+"""
 
 import time
 from collections import Counter
@@ -61,12 +63,20 @@ class SweepRun(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The counts, the problems and what to do next."""
-        lines = [self.title, f"  {self.cached} were there, {self.computed} computed, {self.left} left"]
+        lines = [
+            self.title,
+            f"  {self.cached} were there, {self.computed} computed, {self.left} left",
+        ]
         lines += [f"  {self.timed_alone} timed alone"] if self.timed_alone else []
         lines += [f"  {status}: {number}" for status, number in sorted(self.counts.items())]
-        lines += [f"  {each.status}: {each.scene}, {each.label}: {each.reason}" for each in self.problems]
+        lines += [
+            f"  {each.status}: {each.scene}, {each.label}: {each.reason}" for each in self.problems
+        ]
         if self.parquet:
-            lines += [f"  rows in {self.parquet}", f"  what they say: airlight sweep --from {self.output}"]
+            lines += [
+                f"  rows in {self.parquet}",
+                f"  what they say: airlight sweep --from {self.output}",
+            ]
         return lines
 
 
@@ -81,30 +91,33 @@ def sweep(
 ) -> SweepRun | Said:
     """Run every method over many scenes: a row of numbers each.
 
-    A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
-    row of DIR/sweep.parquet and DIR/sweep.jsonl. A process for each processor computes them unless `--cluster` says
-    otherwise.
+    A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell
+    and becomes one row of DIR/sweep.parquet and DIR/sweep.jsonl. A process for each processor
+    computes them unless `--cluster` says otherwise.
 
-    Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing
-    but cells that failed, hung or aborted.
+    Finished rows are kept: a run that was interrupted goes on where it was, and the same study
+    twice computes nothing but cells that failed, hung or aborted.
 
-    `--from DIR` writes the findings: DIR/sweep.html, figures, and claims with their confidence as JSON; -o names
-    another folder.
+    `--from DIR` writes the findings: DIR/sweep.html, figures, and claims with their confidence as
+    JSON; -o names another folder.
 
     The exit status is 1 if a cell failed, hung or aborted, or was left undone.
 
     Parameters
     ----------
     study
-        A TOML file: what to sweep over, see docs/many-scenes.md; or a number of random scenes, 100 by default.
+        A TOML file: what to sweep over, see docs/many-scenes.md; or a number of
+        random scenes, 100 by default.
     cluster
-        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
-        scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
-        network that you trust; tls takes the certificates of Dask's configuration.
+        Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask
+        scheduler, or its scheduler file. A tcp scheduler authenticates nobody and its workers run
+        what they are sent: use it only on a network that you trust; tls takes the certificates of
+        Dask's configuration.
     output
         Folder of the rows; sweep-NAME by default.
     from_
-        Write the page, figures and claims of this sweep from its Parquet file, without computing cells.
+        Write the page, figures and claims of this sweep from its Parquet file,
+        without computing cells.
     progress
         Called with (fraction done, what); True shows a bar.
     """
@@ -147,7 +160,9 @@ def _findings(source: Path, target: Path | None) -> Said:
     )
 
 
-def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> SweepRun:
+def _run(
+    study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any
+) -> SweepRun:
     """Compute what is missing, add it to the store, and return what came of it."""
     from airlight import __version__
     from airlight.reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
@@ -162,7 +177,9 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
         return [row | {"study": study.name, "attempts": outcome.attempts}]
 
     def with_times(outcome: Any) -> list[dict[str, Any]]:
-        """Return the rows of an image with their times; without a process that timed them they are as they were."""
+        """Return the rows of an image with their times; without a process that timed
+        them they are as they were.
+        """
         columns = outcome.value if outcome.status == "done" else {}
         return [store.row(key) | values for key, values in columns.items()]
 
@@ -171,8 +188,11 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
     quick = study.measure.times not in ("with", "stages")
     groups = list(cell_groups(study, made, store=store, scenes=scenes))
     counts = _part(study, store, place, groups, with_errors, quick=quick, **how)
-    groups = list(timing_groups(study, made, store=store, scenes=scenes))  # of rows that are there by now
-    timed = _part(study, store, 1 if isinstance(place, int) else place, groups, with_times, quick=False, **how)
+    # of rows that are there by now
+    groups = list(timing_groups(study, made, store=store, scenes=scenes))
+    timed = _part(
+        study, store, 1 if isinstance(place, int) else place, groups, with_times, quick=False, **how
+    )
     total = study.scene_count * study.cells_by_scene
     return SweepRun(
         study=study.name,
@@ -219,7 +239,9 @@ def _part(
             if not rows:
                 counts[outcome.status] += len(cells)
             if outcome.status not in ("done", "refused"):
-                what = cells[0].chosen.label if len(cells) == 1 else f"times of {len(cells)} methods"
+                what = (
+                    cells[0].chosen.label if len(cells) == 1 else f"times of {len(cells)} methods"
+                )
                 problems.append(Problem(cells[0].scene, what, outcome.status, outcome.reason))
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()

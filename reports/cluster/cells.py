@@ -55,7 +55,8 @@ def row_of(reference: Reference, cell: Cell, key: str) -> dict[str, Any]:
 
 
 def times_of(cells: Mapping[str, Cell]) -> dict[str, dict[str, Any]]:
-    """Return the columns of the times of cells of one image, by their keys, of a worker that is alone on its host.
+    """Return the columns of the times of cells of one image, by their keys, of a worker
+    that is alone on its host.
 
     They are of one run, in which the cells take turns.
     """
@@ -64,15 +65,20 @@ def times_of(cells: Mapping[str, Cell]) -> dict[str, dict[str, Any]]:
     image = next(iter(cells.values())).image
     scene, alone = _opened(image)[1], is_alone(get_worker())
     columns = {}
-    for (key, cell), timed in zip(cells.items(), time_cells(list(cells.values()), lambda cell: scene), strict=True):
+    for (key, cell), timed in zip(
+        cells.items(), time_cells(list(cells.values()), lambda cell: scene), strict=True
+    ):
         values = row_values(cell_row(cell, times=timed.times))
         columns[key] = {name: value for name, value in values.items() if name.startswith("times.")}
         columns[key] |= {"cost.prepare_ms": timed.prepare_ms, "cost.alone": alone}
     return columns
 
 
-def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
-    """Yield a task for each image of a study that is timed alone, if times are missing of rows that were done.
+def timing_groups(
+    study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
+) -> Iterator[Group]:
+    """Yield a task for each image of a study that is timed alone, if times are
+    missing of rows that were done.
 
     Then all cells of the image are timed: they are compared with one another.
     """
@@ -80,10 +86,22 @@ def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
         if any(store.row(key)[FRAME_MS] is None for key in wanted):
             first = next(iter(wanted))
-            yield Group((Task(f"times, {first}", times_of, (wanted,), study.limit * len(wanted), alone=True),))
+            yield Group(
+                (
+                    Task(
+                        f"times, {first}",
+                        times_of,
+                        (wanted,),
+                        study.limit * len(wanted),
+                        alone=True,
+                    ),
+                )
+            )
 
 
-def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
+def cell_groups(
+    study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]
+) -> Iterator[Group]:
     """Yield the tasks of every image that lacks rows, or whose cells failed, hung or aborted.
 
     A task is named by the key of its row and begins its arguments with the cell.
@@ -93,24 +111,34 @@ def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, 
         if missing:
             image = next(iter(missing.values())).image
             words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
-            tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in missing.items())
+            tasks = tuple(
+                Task(key, row_of, (cell, key), study.limit) for key, cell in missing.items()
+            )
             yield Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit))
 
 
-def _keyed(images: Iterable[Iterable[Cell]], made: Made, scenes: dict[str, str]) -> Iterator[dict[str, Cell]]:
-    """Yield the cells of each image by their keys; `scenes` are digests of files, see `validation.study.keys`."""
+def _keyed(
+    images: Iterable[Iterable[Cell]], made: Made, scenes: dict[str, str]
+) -> Iterator[dict[str, Cell]]:
+    """Yield the cells of each image by their keys; `scenes` are digests of files, see
+    `validation.study.keys`.
+    """
     return ({cell_key(cell, made, scenes): cell for cell in cells} for cells in images)
 
 
 def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a cell that came to nothing: the outcome says why."""
     origin = Origin(**asdict(build()), source=row_source()[:12])
-    return row_values(cell_row(cell, status=outcome.status, reason=outcome.reason, key=key, origin=origin))
+    return row_values(
+        cell_row(cell, status=outcome.status, reason=outcome.reason, key=key, origin=origin)
+    )
 
 
 @lru_cache(maxsize=1)
 def _opened(image: Cell) -> tuple[LoadedScene, Scene]:
-    """Return the scene of an image, loaded and as methods read it; that of the last cell is there already."""
+    """Return the scene of an image, loaded and as methods read it; that of the
+    last cell is there already.
+    """
     loaded = load_cell(image)
     return loaded, read_scene(loaded.scene)
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a command's work runs: processes of this machine, or a Dask scheduler with workers of any machines."""
+"""Where a command's work runs: processes of this machine, or a Dask scheduler with
+workers of any machines.
+"""
 
 import logging
 import re
@@ -14,7 +16,8 @@ from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.environment import require, threads
 
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
-_KEPT = 2**28  # of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
+# of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
+_KEPT = 2**28
 _PATIENCE = 10.0  # until a scheduler has answered [s]
 _WORKERS = 30.0  # until a worker has come [s]
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
@@ -23,7 +26,9 @@ _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
 Client = Any  #: `distributed.Client`
 
 
-Place = int | str  #: what `--cluster` names: processes of this machine, or a scheduler's address, or a file that has it
+#: what `--cluster` names: processes of this machine, or a scheduler's
+#: address, or a file that has it
+Place = int | str
 
 
 def parse_place(word: str | None) -> Place:
@@ -39,14 +44,17 @@ def parse_place(word: str | None) -> Place:
     if _ADDRESS.fullmatch(word) or Path(word).is_file():
         return word
     raise InputError(
-        f"--cluster: got {word!r}, expected local, local:N with up to 9999 processes, tcp://HOST:PORT, or the file "
+        f"--cluster: got {word!r}, expected local, local:N with up to 9999 processes, "
+        "tcp://HOST:PORT, or the file "
         "that `dask scheduler --scheduler-file` writes"
     )
 
 
 @contextmanager
 def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
-    """Give the connection to a place; `quick` compiles kernels quickly in its processes, where nothing is timed."""
+    """Give the connection to a place; `quick` compiles kernels quickly in its
+    processes, where nothing is timed.
+    """
     _quiet()
     with _local(place, quick=quick) if isinstance(place, int) else _remote(place) as client:
         yield client
@@ -54,7 +62,9 @@ def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
 
 @contextmanager
 def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
-    """Give the client of processes of this machine, one thread each; a single one has all threads and is alone."""
+    """Give the client of processes of this machine, one thread each; a single one has
+    all threads and is alone.
+    """
     import dask
     from distributed import Client, LocalCluster
 
@@ -62,19 +72,21 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
 
     alone = workers == 1
     settings: dict[str, object] = {
-        # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
+        # Dask would pause a worker near its limit, and wait for memory that only
+        # the next task gives back.
         **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
         # `reports.cluster.run` decides about a group whose process died.
         "distributed.scheduler.allowed-failures": 0,
         # No group waits behind another that takes minutes while a worker has nothing to do.
         "distributed.scheduler.worker-saturation": 1.0,
-        # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
-        # quarter of a sweep's time was the kernel's.
+        # Dask lets the C library give every freed block back, and arrays of a frame's size come as
+        # new, zeroed pages: a quarter of a sweep's time was the kernel's.
         "distributed.nanny.pre-spawn-environ": {
             **{f"MALLOC_{name}_THRESHOLD_": _KEPT for name in ("TRIM", "MMAP")},
             "OMP_NUM_THREADS": 1,
         },
-        # A cluster that is told of a death waits so long and then forgets the worker, though another stands in.
+        # A cluster that is told of a death waits so long and then forgets the worker,
+        # though another stands in.
         "distributed.deploy.lost-worker-timeout": 86400,
     }
     with temporary_folder() as folder, dask.config.set(settings), ExitStack() as stack:
@@ -86,7 +98,8 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
                     threads_per_worker=threads() if alone else 1,
                     processes=True,
                     host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",  # None is port 8787 on all interfaces, which may be taken
+                    # None is port 8787 on all interfaces, which may be taken
+                    dashboard_address="127.0.0.1:0",
                     scheduler_kwargs={"dashboard": False},
                     memory_limit=MEMORY,
                     local_directory=str(folder),
@@ -100,7 +113,9 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
 
 
 def _start_quiet_tracker() -> None:
-    """Start the process that frees semaphores of a process that was ended, without its words on that."""
+    """Start the process that frees semaphores of a process that was ended,
+    without its words on that.
+    """
     from multiprocessing import resource_tracker
 
     sys.warnoptions.append("ignore::UserWarning:multiprocessing.resource_tracker")
@@ -132,14 +147,16 @@ def _remote(scheduler: str) -> Iterator[Client]:
     except (OSError, TimeoutError, ValueError, KeyError) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(
-            f"--cluster: no scheduler answers at {scheduler} ({words}): start `dask scheduler`, or give its address"
+            f"--cluster: no scheduler answers at {scheduler} ({words}): start `dask scheduler`, or "
+            "give its address"
         ) from None
     try:
         client.wait_for_workers(1, timeout=_WORKERS)
         yield client
     except TimeoutError:
         raise InputError(
-            f"--cluster: the scheduler at {scheduler} has no worker: start `dask worker` with its address, in an "
+            f"--cluster: the scheduler at {scheduler} has no worker: start `dask worker` with its "
+            "address, in an "
             "environment that has airlight"
         ) from None
     finally:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""References and batches of references from a cluster: the cache of this machine gets them, and the rest is as without.
+"""References and batches of references from a cluster: the cache of this machine gets them,
+and the rest is as without.
 
-The bytes of a file therefore do not depend on the machine that computed its numbers. Results that workers did not
-deliver, for any reason, are computed here.
+The bytes of a file therefore do not depend on the machine that computed its numbers. Results that
+workers did not deliver, for any reason, are computed here.
 """
 
 import pickle
@@ -34,28 +35,43 @@ _WAVE = 8  # batches that are asked for at once by worker, where their number is
 
 
 def image_of(
-    loaded: LoadedScene, size: tuple[int, int], changes: Mapping[str, Sequence[float]] = MappingProxyType({})
+    loaded: LoadedScene,
+    size: tuple[int, int],
+    changes: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> Cell:
-    """Return the image of a scene as a cell, which workers load by the name or path of the scene."""
+    """Return the image of a scene as a cell, which workers load by the
+    name or path of the scene.
+    """
     name = str(loaded.path.resolve()) if loaded.path else loaded.name
     return Cell(name, size, tuple(change_words(changes)), Configuration("reference"))
 
 
 def bring_references(cluster: Client, images: Sequence[Cell], **how: Any) -> None:
-    """Let workers compute the quadrature references of images that are not in the cache, and keep them here.
+    """Let workers compute the quadrature references of images that are not in the
+    cache, and keep them here.
 
     `how`: arguments of `validation.estimates.quadrature.reference_inputs`.
     """
-    lacking = [image for image in images if not is_kept(reference_inputs(load_cell(image).scene, **how).key)]
+    lacking = [
+        image
+        for image in images
+        if not is_kept(reference_inputs(load_cell(image).scene, **how).key)
+    ]
     named = {f"reference {number}": image for number, image in enumerate(lacking)}
     given = how, fresh_since()
-    groups = [Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()]
+    groups = [
+        Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()
+    ]
     for name, (reference, spent) in _done(cluster, groups):
-        keep(reference_inputs(load_cell(named[name]).scene, **how), reference, spent, ReferenceImage)
+        keep(
+            reference_inputs(load_cell(named[name]).scene, **how), reference, spent, ReferenceImage
+        )
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
-    """Yield the names and values of tasks that were done; the first that was refused ends the run."""
+    """Yield the names and values of tasks that were done; the first that
+    was refused ends the run.
+    """
     for outcome in run_groups(cluster, groups, made=facts()):
         if outcome.status == "refused":
             raise InputError(outcome.reason or "")
@@ -73,12 +89,15 @@ def tracing(
     orders: tuple[str, ...] | None = None,
     counts: NDArray[np.integer] | None = None,
 ) -> Elsewhere:
-    """Return the function that lets workers trace `batches` batches of an estimator, None if an error decides how many.
+    """Return the function that lets workers trace `batches` batches of an estimator, None if
+    an error decides how many.
 
     The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
     # As bytes, by which a worker knows again what it has prepared.
-    kind = pickle.dumps((image, estimator, {"samples": samples, "orders": orders, "counts": counts}))
+    kind = pickle.dumps(
+        (image, estimator, {"samples": samples, "orders": orders, "counts": counts})
+    )
 
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
@@ -91,10 +110,14 @@ def tracing(
 
 def spread(cluster: Client, image: Cell) -> ElsewhereFor:
     """Return the function that lets workers trace the batches that check a reference."""
-    return lambda estimator, samples, counts: tracing(cluster, image, estimator, samples=samples, counts=counts)
+    return lambda estimator, samples, counts: tracing(
+        cluster, image, estimator, samples=samples, counts=counts
+    )
 
 
-def _reference(image: Cell, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
+def _reference(
+    image: Cell, how: Mapping[str, Any], since: float | None
+) -> tuple[ReferenceImage, Spent]:
     with fresh_results(since):
         scene = load_cell(image).scene
         found = reference_result(scene, reference_inputs(scene, **how))

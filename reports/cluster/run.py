@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Groups of tasks as Dask futures: every task ends in one outcome, whatever happens to its process.
 
-A group is tasks that share what a process loads and compiles, and the value of one first task, such as the reference of
-a scene: it is one future, done by one worker.
+A group is tasks that share what a process loads and compiles, and the value of one first task, such
+as the reference of a scene: it is one future, done by one worker.
 
-There is one rule for a process that dies under its work: a group is split into its tasks, and a task that is alone is
-tried again `retries` times, then it is 'aborted'. A task that takes longer than its limit ends its own process by a
-timer of the C library's, which needs no help from Python, and is 'hung'. A scheduler that disappears leaves the rest
-'lost': the same command goes on from there.
+There is one rule for a process that dies under its work: a group is split into its tasks, and a
+task that is alone is tried again `retries` times, then it is 'aborted'. A task that takes longer
+than its limit ends its own process by a timer of the C library's, which needs no help from Python,
+and is 'hung'. A scheduler that disappears leaves the rest 'lost': the same command goes on from
+there.
 """
 
 import faulthandler
@@ -26,7 +27,8 @@ from airlight.reports.cluster.connect import Client, facts
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 
 _SENT = 0.004  # until what a worker says is on its way, twice the interval of Dask's batches [s]
-_FREE, _RETIRE = 1.2 * 2**30, 1.6 * 2**30  # memory from which a worker gives some back, starts again [bytes]
+# memory from which a worker gives some back, starts again [bytes]
+_FREE, _RETIRE = 1.2 * 2**30, 1.6 * 2**30
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Outcome:
     """How a task ended."""
 
     task: Task
-    status: str  #: 'done', 'refused', 'failed', 'hung', 'aborted' or, where the cluster was lost, 'lost'
+    #: 'done', 'refused', 'failed', 'hung', 'aborted' or, where the cluster was lost, 'lost'
+    status: str
     value: Any = None
     reason: str | None = None
     attempts: int = 1  #: how often it was begun
@@ -63,11 +66,14 @@ class _Refused(Exception):
     """A worker cannot do the work or has another version; the message says which."""
 
 
-def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, retries: int = 3) -> Iterator[Outcome]:
-    """Yield the outcome of every task of the groups; a first task that failed is the outcome of all its tasks.
+def run_groups(
+    client: Client, groups: Iterable[Group], *, made: Any = None, retries: int = 3
+) -> Iterator[Outcome]:
+    """Yield the outcome of every task of the groups; a first task that failed is the
+    outcome of all its tasks.
 
-    Workers must be made of `made`, `validation.study.keys.Made`; another version is refused by name. None takes any. A
-    task whose process died is begun again `retries` times.
+    Workers must be made of `made`, `validation.study.keys.Made`; another version is refused by
+    name. None takes any. A task whose process died is begun again `retries` times.
     """
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
@@ -78,12 +84,16 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
     begun: dict[str, tuple[str, float]] = {}  # by future: which task began last, and when [s]
     flying: dict[Any, tuple[Group, int]] = {}  # groups that were sent, and how often
     ended = as_completed(loop=client.loop)
-    client.subscribe_topic(topic, lambda event: begun.update({event[1]["key"]: (event[1]["task"], time.monotonic())}))
+    client.subscribe_topic(
+        topic, lambda event: begun.update({event[1]["key"]: (event[1]["task"], time.monotonic())})
+    )
 
     def send(group: Group, attempts: int = 1) -> None:
         key = f"{topic}-{uuid.uuid4().hex}"
         resources = {ALONE: 1} if group.tasks[0].alone else None
-        future = client.submit(do_group, group, made, topic, key, key=key, pure=False, resources=resources)
+        future = client.submit(
+            do_group, group, made, topic, key, key=key, pure=False, resources=resources
+        )
         flying[future] = group, attempts
         ended.add(future)
 
@@ -94,7 +104,8 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
             group, attempts = flying.pop(future)
             try:
                 yield from (replace(outcome, attempts=attempts) for outcome in future.result())
-            except (_Refused, ImportError) as error:  # the latter is what a worker without airlight raises
+            # the latter is what a worker without airlight raises
+            except (_Refused, ImportError) as error:
                 raise InputError(f"{error}: install the same airlight there, or stop it") from None
             except KilledWorker:
                 name, since = begun.pop(future.key, ("", time.monotonic()))
@@ -107,17 +118,29 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
                 elif not hung and attempts <= retries:
                     send(group, attempts + 1)
                 else:
-                    words = f"stopped after {guilty.limit:g} s" if hung else "its process ended {} times while it ran"
+                    words = (
+                        f"stopped after {guilty.limit:g} s"
+                        if hung
+                        else "its process ended {} times while it ran"
+                    )
                     reason = f"{guilty.name}: {words}" if in_first else words
-                    yield from _all(group, "hung" if hung else "aborted", reason.format(attempts), attempts)
-            except Exception as error:  # what a task or the scheduler raises ends a row, not the run
+                    yield from _all(
+                        group, "hung" if hung else "aborted", reason.format(attempts), attempts
+                    )
+            # what a task or the scheduler raises ends a row, not the run
+            except Exception as error:
                 if client.status != "running":
                     yield from _all(group, "lost", "the scheduler went away", attempts)
                     continue
                 if future.cancelled():
                     send(group, attempts)
                 else:
-                    yield from _all(group, "failed", " ".join(f"{type(error).__name__}: {error}".split()), attempts)
+                    yield from _all(
+                        group,
+                        "failed",
+                        " ".join(f"{type(error).__name__}: {error}".split()),
+                        attempts,
+                    )
     finally:
         with suppress(Exception):  # the scheduler may be gone
             client.cancel(list(flying), force=True)
@@ -136,7 +159,8 @@ def do_group(group: Group, made: Any, topic: str, key: str) -> list[Outcome]:
     from distributed import get_worker
 
     worker = get_worker()
-    # A worker with several threads would run several groups at once: kernels have the threads, groups take turns.
+    # A worker with several threads would run several groups at once: kernels have the
+    # threads, groups take turns.
     with worker.__dict__.setdefault("airlight_lock", threading.Lock()):
         if made is not None:
             _check(worker, made)
@@ -170,7 +194,9 @@ def _check(worker: Any, made: Any) -> None:
         try:
             worker.airlight_made = facts()
         except Exception as error:  # it lacks a library or cannot compile kernels
-            raise _Refused(f"worker {worker.address} cannot do the work ({type(error).__name__}: {error})") from None
+            raise _Refused(
+                f"worker {worker.address} cannot do the work ({type(error).__name__}: {error})"
+            ) from None
         import drjit as dr
 
         from airlight.reports.machine.environment import LEAST_THREADS
@@ -190,11 +216,17 @@ def _outcome(task: Task, *values: Any) -> Outcome:
     except Exception as error:  # what a task raises is its row's, not the end of the run
         place = traceback.extract_tb(error.__traceback__)[-1]
         words = " ".join(str(error).split())
-        return Outcome(task, "failed", reason=f"{type(error).__name__}: {words} ({place.name}, line {place.lineno})")
+        return Outcome(
+            task,
+            "failed",
+            reason=f"{type(error).__name__}: {words} ({place.name}, line {place.lineno})",
+        )
 
 
 def _give_back(worker: Any) -> None:
-    """Give memory back where there is much of it, and start the worker again where that does not help."""
+    """Give memory back where there is much of it, and start the worker again
+    where that does not help.
+    """
     if worker.monitor.get_process_memory() < _FREE:
         return
     import gc

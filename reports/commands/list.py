@@ -23,14 +23,26 @@ def list(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | No
     what
         One of them; all by default.
     """
-    kinds = {"scenes": _scenes, "methods": _methods, "kernels": _kernels, "studies": _studies, "papers": _papers}
+    kinds = {
+        "scenes": _scenes,
+        "methods": _methods,
+        "kernels": _kernels,
+        "studies": _studies,
+        "papers": _papers,
+    }
     if what is not None and what not in kinds:
-        raise InputError(f"list: got {what!r}, expected one of {', '.join(kinds)}" + nearest(what, kinds))
+        raise InputError(
+            f"list: got {what!r}, expected one of {', '.join(kinds)}" + nearest(what, kinds)
+        )
     if what is not None:
         shown = kinds[what]()
         return Said(name=what, data=_data(shown), tables=(shown,))
     tables = {kind: replace(made(), title=kind.capitalize()) for kind, made in kinds.items()}
-    return Said(name="list", data={kind: _data(each) for kind, each in tables.items()}, tables=[*tables.values()])
+    return Said(
+        name="list",
+        data={kind: _data(each) for kind, each in tables.items()},
+        tables=[*tables.values()],
+    )
 
 
 def _data(shown: Table) -> Sequence[dict[str, str]]:
@@ -50,13 +62,17 @@ def _methods() -> Table:
         (each.name, each.summary, each().uses_kernel, each.shadows, _defaults(each), each.source)
         for each in METHODS.values()
     ]
-    return table("", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows)
+    return table(
+        "", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows
+    )
 
 
 def _kernels() -> Table:
     from airlight.realtime.kernels.registry import KERNELS
 
-    rows = [(each.name, each.summary, _words(each.parameters), each.source) for each in KERNELS.values()]
+    rows = [
+        (each.name, each.summary, _words(each.parameters), each.source) for each in KERNELS.values()
+    ]
     return table("", words("name", "what", "parameters", "source", how=_LONG), rows)
 
 

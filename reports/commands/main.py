@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line: each command is the public function of `airlight` of the same name.
 
-Cyclopts reads a function's signature and its docstring, so that the docstring is the help. This module adds the options
-of all commands: --json prints the result's data, -o writes it to files. A command returns a result
-(`reports.tables.record`), which is printed and decides the exit status. To add a command, write a public function in
-`reports/api/`, name it in `src/airlight/__init__.pyi`, and add it to its panel in `_PANELS`.
+Cyclopts reads a function's signature and its docstring, so that the docstring is the help. This
+module adds the options of all commands: --json prints the result's data, -o writes it to files. A
+command returns a result (`reports.tables.record`), which is printed and decides the exit status. To
+add a command, write a public function in `reports/api/`, name it in `src/airlight/__init__.pyi`,
+and add it to its panel in `_PANELS`.
 
 Modules of commands import nothing heavy at the top, so that `--help` answers at once.
 """
@@ -76,27 +77,46 @@ _SET = Annotated[
     Sequence[str],
     Parameter(
         name="--set",
-        help="NAME=VALUE, a parameter of the method, or kernel=NAME for its kernel; may be given several times.",
+        help=(
+            "NAME=VALUE, a parameter of the method, or kernel=NAME for its kernel; may be given "
+            "several times."
+        ),
     ),
 ]
 _JSON = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
-_OUTPUT = Annotated[Files, Parameter(name=("--output", "-o"), help="A file to write; may be given several times.")]
-_SPELT = {"output": ("--output", "-o"), "settings": "--set"}  #: options that are not written as their parameter
+_OUTPUT = Annotated[
+    Files, Parameter(name=("--output", "-o"), help="A file to write; may be given several times.")
+]
+#: options that are not written as their parameter
+_SPELT = {"output": ("--output", "-o"), "settings": "--set"}
 _ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
 
 
 def _shown_default(value: Any) -> Any:
     """Return a default as the help shows it, None for an empty one."""
-    return None if value in (None, False, (), "") else ", ".join(value) if isinstance(value, tuple) else str(value)
+    return (
+        None
+        if value in (None, False, (), "")
+        else ", ".join(value)
+        if isinstance(value, tuple)
+        else str(value)
+    )
 
 
 def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Callable[..., int]:
-    """Return a function as a command: with options for its output, without arguments that only Python can give."""
+    """Return a function as a command: with options for its output, without arguments
+    that only Python can give.
+    """
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
-    words = {each.arg_name: _plain(each.description) for each in docstring_parser.parse(function.__doc__ or "").params}
+    words = {
+        each.arg_name: _plain(each.description)
+        for each in docstring_parser.parse(function.__doc__ or "").params
+    }
     # A command with --set takes a kernel by --set kernel=NAME.
-    sets = "settings" in own or any(each.kind is inspect.Parameter.VAR_KEYWORD for each in own.values())
+    sets = "settings" in own or any(
+        each.kind is inspect.Parameter.VAR_KEYWORD for each in own.values()
+    )
     positional: list[inspect.Parameter] = []
     named: list[inspect.Parameter] = []
     for at, each in enumerate(own.values()):
@@ -109,7 +129,12 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             continue
         if isinstance(annotation, str):
             annotation = eval(annotation, scope)  # our own source, see `reports.api.inputs`
-        if isinstance(default, tuple) and all(isinstance(side, int) for side in default) and default:  # a size
+        # a size
+        if (
+            isinstance(default, tuple)
+            and all(isinstance(side, int) for side in default)
+            and default
+        ):
             default = "x".join(map(str, default))
         how: dict[str, Any] = {"help": words.get(each.name, "")}
         if each.kind is inspect.Parameter.VAR_POSITIONAL:
@@ -118,14 +143,20 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             kind = inspect.Parameter.POSITIONAL_ONLY
         elif each.name in _SPELT:
             how["name"] = _SPELT[each.name]
-        shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
+        shown = each.replace(
+            kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default
+        )
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
     if function not in (view, run_tests, export) and endings != STUDY_ENDINGS:
         extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False
-        named.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default))
+        named.append(
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default
+            )
+        )
 
     def command(*arguments: Any, **options: Any) -> int:
         json = options.pop("json", False)
@@ -149,9 +180,13 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
 
 
 def _plain(words: str | None) -> str:
-    """Return words of a docstring for a terminal: paragraphs as lines, no backticks, nothing of what Python can do."""
+    """Return words of a docstring for a terminal: paragraphs as lines, no backticks,
+    nothing of what Python can do.
+    """
     paragraphs = [" ".join(each.split()) for each in (words or "").split("\n\n")]
-    return re.sub(r"[;.] [Ff]rom Python [^.]*(\.[^ ][^.]*)*\.", ".", "\n\n".join(paragraphs)).replace("`", "")
+    return re.sub(
+        r"[;.] [Ff]rom Python [^.]*(\.[^ ][^.]*)*\.", ".", "\n\n".join(paragraphs)
+    ).replace("`", "")
 
 
 def _help(function: Callable[..., Any], *, whole: bool) -> str:
@@ -184,7 +219,9 @@ def _version() -> str:
 
 
 def make_app(words: Sequence[str] = ()) -> App:
-    """Return the command line; only the command that is asked for is more than its name and its first sentence."""
+    """Return the command line; only the command that is asked for is more than its
+    name and its first sentence.
+    """
     how: dict[str, Any] = {
         "help_format": "plaintext",
         "default_parameter": Parameter(negative=(), show_default=_shown_default),
@@ -192,7 +229,9 @@ def make_app(words: Sequence[str] = ()) -> App:
         "help_epilogue": "",
     }
     summary = "How fast, accurate and robust is a real-time method for volumetric light, against a checked reference?"
-    app = App(name="airlight", help=summary, version=_version, suppress_keyboard_interrupt=False, **how)
+    app = App(
+        name="airlight", help=summary, version=_version, suppress_keyboard_interrupt=False, **how
+    )
     app.help_epilogue, app.version_flags = _EPILOGUE, ("--version",)
     app["--help"].group = app["--version"].group = Group("Options", sort_key=99)
     for number, (title, functions) in enumerate(_PANELS.items()):
@@ -240,22 +279,31 @@ def find_command(words: Sequence[str]) -> App:
 def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
     """Run the command line and return the exit status.
 
-    `extras` has the names of those that the launcher added for this command; None where it did not start this process.
+    `extras` has the names of those that the launcher added for this command; None where it
+    did not start this process.
 
-    The user's mistakes, missing libraries and unusable files give one line on the error stream; any other exception
-    is a fault of the program and keeps its traceback.
+    The user's mistakes, missing libraries and unusable files give one line on the error stream; any
+    other exception is a fault of the program and keeps its traceback.
     """
     try:
         os.getcwd()
     except OSError:  # Dr.Jit ends the process over it
-        return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
+        return _fail(
+            "the current folder was deleted: change into another folder, then run this again",
+            WRONG_INPUT,
+        )
     try:
         words = [_at_home(word) for word in arguments]
         if words[:1] == ["test"] and "--" not in words:  # pytest has its own options
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
             words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
         app = make_app(words)
-        status = app(words or ["--help"], exit_on_error=False, print_error=False, result_action="return_value")
+        status = app(
+            words or ["--help"],
+            exit_on_error=False,
+            print_error=False,
+            result_action="return_value",
+        )
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left
         return _drop_output(FAILED)
@@ -270,11 +318,14 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
             raise
         _drop_output(WRONG_INPUT)
         return _fail(f"{error.filename or 'output'}: {error.strerror}", WRONG_INPUT)
-    except (ImportError, NameError):  # a NameError is what `import drjit` raises where libatomic is missing
+    # a NameError is what `import drjit` raises where libatomic is missing
+    except (ImportError, NameError):
         packages = missing_packages()
         if not packages:
             raise
-        return _fail(f"system libraries are missing. To install them: {install_line(packages)}", MISSING)
+        return _fail(
+            f"system libraries are missing. To install them: {install_line(packages)}", MISSING
+        )
     except cyclopts.CycloptsError as error:
         path, said = " ".join(["airlight", *(error.command_chain or ())]), str(error).rstrip(".")
         comma = re.search(r'unable to convert "(-?\d+),(\d+)"', said)
@@ -288,7 +339,9 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
 
 
 def _at_home(word: str) -> str:
-    """Return a word with the home folder for a ~ at its beginning, also behind --option=, where shells leave it."""
+    """Return a word with the home folder for a ~ at its beginning, also behind
+    --option=, where shells leave it.
+    """
     option, equals, value = word.partition("=")
     if word.startswith("~"):
         return os.path.expanduser(word)
@@ -301,6 +354,8 @@ def _fail(message: str, status: int) -> int:
 
 
 def _drop_output(status: int) -> int:
-    """Redirect the output to nowhere, so that Python does not try again at exit what cannot be written."""
+    """Redirect the output to nowhere, so that Python does not try again at
+    exit what cannot be written.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return status

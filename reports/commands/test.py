@@ -16,18 +16,18 @@ WORKER_MEMORY = 4e9  #: [bytes]: the largest worker of a run of all tiers held 3
 def run_tests(*arguments: str, all_: bool = False) -> int:
     """Run the fast tests of the source checkout, or all tests.
 
-    The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
-    are the same bit for bit.
+    The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what
+    everything else runs. Images are the same bit for bit.
 
-    `--all` without arguments for pytest writes the date, the machine, how kernels were compiled and the counts into
-    docs/data/full_run.json. It fails if a test was skipped for a reason that .ci/skips does not allow. Exit status 1 if
-    anything failed.
+    `--all` without arguments for pytest writes the date, the machine, how kernels were compiled and
+    the counts into docs/data/full_run.json. It fails if a test was skipped for a reason that
+    .ci/skips does not allow. Exit status 1 if anything failed.
 
     Parameters
     ----------
     arguments
-        For pytest, its options too; paths are relative to the checkout. As many processes share the tests as there are
-        cores, as far as the memory goes; -n 0 is this one.
+        For pytest, its options too; paths are relative to the checkout. As many processes share the
+        tests as there are cores, as far as the memory goes; -n 0 is this one.
     all_
         Also the slow and the statistical tests, injected faults and baselines.
     """
@@ -37,7 +37,8 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
     root = Path(__file__).resolve().parents[2]
     if not (root / "tests").is_dir():
         raise MissingError(
-            f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
+            f"there are no tests in {root}, they come with the source only: clone it and run "
+            "`./airlight test` there"
         )
     require("pytest", "test", "a test")
     variant = prepare().variant
@@ -55,7 +56,9 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
 
 
 def _workers() -> int:
-    """Return how many processes share the tests: a core each, and the memory that a worker needs."""
+    """Return how many processes share the tests: a core each, and the
+    memory that a worker needs.
+    """
     from airlight.reports.machine.environment import threads
 
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -76,10 +79,15 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
         asked = [f"--junit-xml={results}", "--allowed-skips=.ci/skips", "--durations=40"]
         status = subprocess.run([*command, *asked], check=False).returncode
         if not results.is_file():
-            print(f"airlight: error: pytest ended with {status} and counted no tests: no record", file=sys.stderr)
+            print(
+                f"airlight: error: pytest ended with {status} and counted no tests: no record",
+                file=sys.stderr,
+            )
             return 1
         suite = next(ElementTree.parse(results).iter("testsuite"))
-    tests, failed, errors, skipped = (int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped"))
+    tests, failed, errors, skipped = (
+        int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped")
+    )
     record = {
         "date": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "machine": machine_in_words(describe_environment() | {"variant": variant}),

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The records of report.json: their fields are its keys, with units and meanings; and how they are read and written.
+"""The records of report.json: their fields are its keys, with units and meanings; and how
+they are read and written.
 
-`read_report` makes them from the file, without Mitsuba, and refuses values that do not fit their types. Code that draws
-a page, a table or a figure, or compares two reports, takes records. None is `null` in the file: not known, not
-measured, not finite. Fields with a default came after the first reports of the version.
+`read_report` makes them from the file, without Mitsuba, and refuses values that do not fit their
+types. Code that draws a page, a table or a figure, or compares two reports, takes records. None is
+`null` in the file: not known, not measured, not finite. Fields with a default came after the first
+reports of the version.
 """
 
 import json
@@ -46,7 +48,9 @@ class Environment:
     threads: int
     variant: str = column(meaning="Mitsuba's")
     device: str | None = column(meaning="the GPU, where there is one", default=None)
-    opengl: str | None = column(meaning="that draws shaders, and its error on certified integrals", default=None)
+    opengl: str | None = column(
+        meaning="that draws shaders, and its error on certified integrals", default=None
+    )
     llvm: str | None = None
     build: Build | None = column(
         meaning="airlight's version, its `commit` ('unknown' without git), whether files were `changed` since, and "
@@ -56,7 +60,9 @@ class Environment:
 
     @property
     def airlight(self) -> str:
-        """Which airlight it was: the version, and the commit and the digest where the report has them."""
+        """Which airlight it was: the version, and the commit and the digest
+        where the report has them.
+        """
         return self.build.words if self.build else str(self.versions.get("airlight"))
 
 
@@ -66,12 +72,17 @@ class Claim:
 
     kind: str = column(
         meaning="`reference` (whether an estimator confirms it), `left-out` (the fraction that single scattering "
-        "leaves out), `image`, `failed` (values that are not finite or negative, shadow rays that disagree), "
-        "`published` (the same in configurations that reproduce a paper with its errors: no failure), `refused`, "
-        "`growth`, `times` (when they were measured, and whether the machine changed meanwhile), or `not-measured`"
+        "leaves out), `image`, `failed` (values that are not finite or negative, shadow rays that "
+        "disagree), "
+        "`published` (the same in configurations that reproduce a paper with its errors: no "
+        "failure), `refused`, "
+        "`growth`, `times` (when they were measured, and whether the machine changed meanwhile), "
+        "or `not-measured`"
     )
     text: str = column(meaning="the sentence")
-    good: bool | None = column(meaning="the verdict; `null` for a fact or an undecided check", default=None)
+    good: bool | None = column(
+        meaning="the verdict; `null` for a fact or an undecided check", default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +90,9 @@ class Reference:
     """The accuracy of the quadrature."""
 
     mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
-    relative_bound: Number = column(meaning="its error over that mean, three standard errors of area lights added")
+    relative_bound: Number = column(
+        meaning="its error over that mean, three standard errors of area lights added"
+    )
     kind: str | None = column(
         meaning="of that error: `proven`, `estimated` (density grids) or `statistical` (area lights, skies); `null` in "
         "reports of 1.0.0",
@@ -95,10 +108,16 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class Method(Row):
-    """The row of a method in a scene, or of an engine's image: its files, and when it was measured."""
+    """The row of a method in a scene, or of an engine's image: its files,
+    and when it was measured.
+    """
 
-    files: Files = column(meaning="`exr`, `picture`, `error` (a picture of the signed relative error)")
-    measured: str = column(meaning="date of the image and its errors; that of its times is `times.run.started`")
+    files: Files = column(
+        meaning="`exr`, `picture`, `error` (a picture of the signed relative error)"
+    )
+    measured: str = column(
+        meaning="date of the image and its errors; that of its times is `times.run.started`"
+    )
     seconds: float = column(unit="s", meaning="that it took")
     cached: bool = column(meaning="whether an earlier run made the image and its errors")
 
@@ -125,12 +144,24 @@ class Scene:
     plan: Mapping[str, str] = column(meaning="the features of the scene in words")
     notes: tuple[str, ...] = column(meaning="remarks for the reader")
     reference: Reference = column(meaning="the accuracy of the quadrature")
-    exposure: float = column(meaning="the factor before the tone curve of all pictures of the scene")
-    agreement: Mapping[str, Agreement] = column(meaning="checks of the reference, by name as `volpath airlight`")
-    multiple: MultipleScattering = column(meaning="fractions of airlight and of all light that scatter more than once")
-    files: SceneFiles = column(meaning="of the reference: `exr`, `picture`, `airlight` (a picture of it alone)")
-    methods: tuple[Method, ...] = column(meaning="what methods and images cost, and how wrong they are")
-    seconds: Mapping[str, float] = column(unit="s", meaning="that its parts took when they were computed")
+    exposure: float = column(
+        meaning="the factor before the tone curve of all pictures of the scene"
+    )
+    agreement: Mapping[str, Agreement] = column(
+        meaning="checks of the reference, by name as `volpath airlight`"
+    )
+    multiple: MultipleScattering = column(
+        meaning="fractions of airlight and of all light that scatter more than once"
+    )
+    files: SceneFiles = column(
+        meaning="of the reference: `exr`, `picture`, `airlight` (a picture of it alone)"
+    )
+    methods: tuple[Method, ...] = column(
+        meaning="what methods and images cost, and how wrong they are"
+    )
+    seconds: Mapping[str, float] = column(
+        unit="s", meaning="that its parts took when they were computed"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,18 +171,32 @@ class Report:
     schema: str = column(meaning="the schema and its version")
     created: str = column(meaning="date and time of the report")
     command: str = column(meaning="the command line that reproduces it")
-    seconds: float = column(unit="s", meaning="of the measurements in this run, without drawing the page")
-    parts: Mapping[str, float] = column(unit="s", meaning="of this run: `scenes`, `stability`, `scaling`, `papers`")
+    seconds: float = column(
+        unit="s", meaning="of the measurements in this run, without drawing the page"
+    )
+    parts: Mapping[str, float] = column(
+        unit="s", meaning="of this run: `scenes`, `stability`, `scaling`, `papers`"
+    )
     cached: int = column(meaning="number of results that an earlier run computed")
     computed: int = column(meaning="number of results that this run computed")
-    measured: Measured | None = column(meaning="when the oldest and the newest result were; `null` without any")
+    measured: Measured | None = column(
+        meaning="when the oldest and the newest result were; `null` without any"
+    )
     settings: Settings = column(meaning="what the study asked for")
-    environment: Environment = column(meaning="what made the numbers: versions, processor, variant, LLVM or device")
+    environment: Environment = column(
+        meaning="what made the numbers: versions, processor, variant, LLVM or device"
+    )
     claims: tuple[Claim, ...] = column(meaning="the sentences of the page")
     scenes: tuple[Scene, ...] = column(meaning="what was measured, by scene")
-    stability: tuple[Stability, ...] = column(meaning="by kernel, where it breaks; empty with `--quick`")
-    scaling: tuple[Scaling, ...] = column(meaning="how times grow with the work; empty without `--full`", default=())
-    papers: tuple[PaperClaim, ...] = column(meaning="claims of papers, as `airlight paper` prints them", default=())
+    stability: tuple[Stability, ...] = column(
+        meaning="by kernel, where it breaks; empty with `--quick`"
+    )
+    scaling: tuple[Scaling, ...] = column(
+        meaning="how times grow with the work; empty without `--full`", default=()
+    )
+    papers: tuple[PaperClaim, ...] = column(
+        meaning="claims of papers, as `airlight paper` prints them", default=()
+    )
 
 
 # The file
@@ -164,7 +209,10 @@ def read_report(path: Path | str) -> Report:
     given = data.get("schema") if isinstance(data, dict) else None
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
-        raise InputError(f"{file} has {got}, expected {SCHEMA!r}; make the report again with this version of airlight")
+        raise InputError(
+            f"{file} has {got}, expected {SCHEMA!r}; make the report again with this version of "
+            "airlight"
+        )
     from msgspec import ValidationError
 
     try:
@@ -172,18 +220,26 @@ def read_report(path: Path | str) -> Report:
     except ValidationError as error:
         words, _, place = str(error).partition(" - at `$")
         where = f"report{place.rstrip('`')}"
-        raise InputError(f"{file} does not keep to {SCHEMA}: {where}: {words}; make the report again") from None
+        raise InputError(
+            f"{file} does not keep to {SCHEMA}: {where}: {words}; make the report again"
+        ) from None
 
 
 def load_report(path: Path | str) -> tuple[Report, Path]:
-    """Read a report, check that every file it names is there, and return it with the folder of the files."""
+    """Read a report, check that every file it names is there, and return it with
+    the folder of the files.
+    """
     report, file = read_report(path), _report_file(path)
     for name in named_files(report):
         # `C:name` is relative to the folder of another drive.
         if Path(name).is_absolute() or PureWindowsPath(name).drive or ".." in Path(name).parts:
-            raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
+            raise InputError(
+                f"{file} names {name}, which is not in its folder; make the report again"
+            )
         if not (file.parent / name).is_file():
-            raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
+            raise InputError(
+                f"{file} names {name}, which is not beside it; move a report with its whole folder"
+            )
     return report, file.parent
 
 
@@ -193,7 +249,9 @@ def read_json(path: Path, wanted: str) -> Any:
     A number that is not finite stays the word that stands there, so that no record takes it.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"), parse_float=_finite, parse_constant=_finite)
+        return json.loads(
+            path.read_text(encoding="utf-8"), parse_float=_finite, parse_constant=_finite
+        )
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; expected {wanted}") from error
     except (ValueError, RecursionError) as error:
@@ -226,7 +284,9 @@ def named_files(report: Report) -> Iterator[str]:
 
 def record_types(kind: Any = Report) -> dict[str, type]:
     """Return the classes of a record and of those within it, by name."""
-    found: dict[str, type] = {kind.__name__: kind} if isinstance(kind, type) and is_dataclass(kind) else {}
+    found: dict[str, type] = (
+        {kind.__name__: kind} if isinstance(kind, type) and is_dataclass(kind) else {}
+    )
     inside = get_type_hints(kind).values() if found else get_args(kind)
     for each in inside:
         found |= record_types(each)
@@ -235,5 +295,10 @@ def record_types(kind: Any = Report) -> dict[str, type]:
 
 def meanings(record: type) -> dict[str, str]:
     """Return the meanings of the keys of a record with their units."""
-    units = {each.key: f" [{each.unit}]" * (each.unit not in ("", "1")) for each in described(record).values()}
-    return {name: f"{each.meaning}{units[name]}".strip() for name, each in described(record).items()}
+    units = {
+        each.key: f" [{each.unit}]" * (each.unit not in ("", "1"))
+        for each in described(record).values()
+    }
+    return {
+        name: f"{each.meaning}{units[name]}".strip() for name, each in described(record).items()
+    }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two reports compared: what got slower or less accurate beyond the noise, what is new and what is gone.
+"""Two reports compared: what got slower or less accurate beyond the noise, what
+is new and what is gone.
 
 Read in this order:
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two reports compared: methods that got slower or less accurate beyond the noise, that are new or that are gone.
+"""Two reports compared: methods that got slower or less accurate beyond the noise, that
+are new or that are gone.
 
-`validation.statistics.noise` derives the limits of noise. A finding is worse, better, or a note; anything worse
-makes the comparison fail, and so does a missing method: a method that is no longer measured is no longer guarded.
+`validation.statistics.noise` derives the limits of noise. A finding is worse, better, or a note;
+anything worse makes the comparison fail, and so does a missing method: a method that is no longer
+measured is no longer guarded.
 """
 
 import math
@@ -55,7 +57,10 @@ def compare_reports(
     Reports without a common number are refused.
     """
     if time_tolerance is not None and not 0 < time_tolerance < math.inf:
-        raise InputError(f"--time-tolerance: got {time_tolerance:g}, expected a number above 0, such as 0.1 for 10 %")
+        raise InputError(
+            f"--time-tolerance: got {time_tolerance:g}, expected a number above 0, such as 0.1 for "
+            "10 %"
+        )
     before, after = ({scene.name: scene for scene in report.scenes} for report in (old, new))
     findings: list[Finding] = []
     compared = 0
@@ -67,13 +72,16 @@ def compare_reports(
         differences, count = _methods(before[name], after[name])
         findings += differences
         compared += count
-    findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
+    findings += [
+        Finding("note", name, "", "the scene is new") for name in after if name not in before
+    ]
     times, slower = compare_times(old, new, tolerance=time_tolerance)
     findings += [*slower, *_stability(old, new), *_growth(old, new)]
     findings += _papers(old, new)
     if not compared and not times.compared:
         raise InputError(
-            "reports: no number can be compared: no method of a scene was measured in both at one size; "
+            "reports: no number can be compared: no method of a scene was measured in both at one "
+            "size; "
             "give two reports of the same scenes with the same effort"
         )
     rank = {"worse": 0, "better": 1, "note": 2}
@@ -97,13 +105,17 @@ def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
     compared = 0
     for label in [label for label in before if label in after]:
         changes, count = _entries(before[label], after[label], errors=reason is None)
-        findings += [Finding(found, name, label, what, was, now) for found, what, was, now in changes]
+        findings += [
+            Finding(found, name, label, what, was, now) for found, what, was, now in changes
+        ]
         compared += count
     return findings, compared
 
 
 def _entries(old: Row, new: Row, *, errors: bool) -> tuple[list[Change], int]:
-    """Compare a configuration in a scene, and where `errors` can be compared these: return how many were."""
+    """Compare a configuration in a scene, and where `errors` can be compared
+    these: return how many were.
+    """
     if bool(old.reason) != bool(new.reason):
         words = f"refused: {new.reason}" if new.reason else "no longer refused"
         # Leaving a method out for the time it takes is a decision of the user, not a fault.
@@ -130,18 +142,20 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
     before, after = (scene.reference.mean for scene in (old, new))
     if before is None or after is None:
         return None
-    # Each error is that of the mean absolute value, so the means differ by at most the sum of both. A dark reference
-    # has no relative error: its mean is 0.
+    # Each error is that of the mean absolute value, so the means differ by at most the sum of both.
+    # A dark reference has no relative error: its mean is 0.
     errors = [each for scene in (old, new) if (each := scene.reference.relative_bound) is not None]
     if abs(after - before) > (sum(errors) + FLOORS["mean"]) * abs(before):
         words = (
-            "the reference moved (mean radiance): another scene by this name, or another reference; errors not compared"
+            "the reference moved (mean radiance): another scene by this name, or another reference; "
+            "errors not compared"
         )
         return Finding("worse", old.name, "", words, before, after)
     return None
 
 
-Numbers = Mapping[str, Any]  #: of `Metrics` by name, and `NAME_within`, half of the interval of a number
+#: of `Metrics` by name, and `NAME_within`, half of the interval of a number
+Numbers = Mapping[str, Any]
 
 
 def _numbers(errors: Metrics | None) -> Numbers:
@@ -158,7 +172,9 @@ def _errors_of(entry: Row, noisy: bool) -> Numbers:
 
 
 def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], int]:
-    """Compare the errors of a configuration in one layer; what has an interval may differ by it too."""
+    """Compare the errors of a configuration in one layer; what has an
+    interval may differ by it too.
+    """
     if not old or not new:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
     changes: list[Change] = []
@@ -200,17 +216,23 @@ def _reference(old: Scene, new: Scene) -> Iterator[Finding]:
         if key not in new.agreement:
             yield Finding("worse", name, "", f"the comparison with {key} is gone")
         elif verdict(agreement) is True and verdict(new.agreement[key]) is None:
-            yield Finding("note", name, "", f"{key} ran out of time before it could confirm the reference")
+            yield Finding(
+                "note", name, "", f"{key} ran out of time before it could confirm the reference"
+            )
     if old.size == new.size:
         for key in ("disagreements", "left"):
             before, after = getattr(old.reference, key), getattr(new.reference, key)
             if after > before:
-                yield Finding("worse", name, "", f"lit intervals of the reference: {key}", before, after)
+                yield Finding(
+                    "worse", name, "", f"lit intervals of the reference: {key}", before, after
+                )
 
 
 def _stability(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which kernels break their bars."""
-    before, after = ({entry.kernel: entry.broken for entry in report.stability} for report in (old, new))
+    before, after = (
+        {entry.kernel: entry.broken for entry in report.stability} for report in (old, new)
+    )
     for kernel in before:
         if kernel in after and after[kernel] and not before[kernel]:
             yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
@@ -225,7 +247,9 @@ def _growth(old: Report, new: Report) -> Iterator[Finding]:
             if change := other_power(before.growth[name], growth):
                 was, is_now = before.growth[name].exponent, growth.exponent
                 what = f"the power of the {WORK[after.kind]} with which {TIMES[name]} grows"
-                yield Finding("worse" if change > 0 else "better", after.scene, after.label, what, was, is_now)
+                yield Finding(
+                    "worse" if change > 0 else "better", after.scene, after.label, what, was, is_now
+                )
 
 
 # Claims of papers
@@ -242,7 +266,9 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
         if now is None:
             yield Finding("worse", "", "", f"{name}: the row is gone")
         elif now.published != row.published:
-            yield Finding("worse", "", "", f"{name}: the published figure", row.published, now.published)
+            yield Finding(
+                "worse", "", "", f"{name}: the published figure", row.published, now.published
+            )
         elif now.verdict != row.verdict:
             what = f"{name}: {now.verdict}, was {row.verdict}"
             yield Finding(_kind(row, now), "", "", what, row.measured, now.measured)
@@ -261,7 +287,9 @@ def _kind(row: Claim, now: Claim) -> str:
 
 def difference_tables(difference: Difference) -> list[Table]:
     """Return the findings that have numbers, the worse ones first."""
-    rows = [vars(each) | {"change": _change(each)} for each in difference.findings if _has_row(each)]
+    rows = [
+        vars(each) | {"change": _change(each)} for each in difference.findings if _has_row(each)
+    ]
     return [table("", _COLUMNS, rows)] if rows else []
 
 
@@ -285,7 +313,9 @@ def _has_row(finding: Finding) -> bool:
 
 
 def _change(finding: Finding) -> str:
-    """Return the change in percent, or as a factor where it is more than double or less than half."""
+    """Return the change in percent, or as a factor where it is more than
+    double or less than half.
+    """
     if finding.old is None or finding.new is None or finding.old == 0:
         return ""
     ratio = abs(finding.new / finding.old)
@@ -296,9 +326,16 @@ def _times_line(difference: Difference) -> str:
     times = difference.times
     if not times.compared:
         return "times: none compared"
-    where = "one machine" if times.same_machine else "two machines, so beside the median of all frames"
-    busy = f"; the machine was busy (quartiles {times.spread:.2f} times apart)" if times.spread > _BUSY else ""
+    where = (
+        "one machine" if times.same_machine else "two machines, so beside the median of all frames"
+    )
+    busy = (
+        f"; the machine was busy (quartiles {times.spread:.2f} times apart)"
+        if times.spread > _BUSY
+        else ""
+    )
     return (
-        f"times: {times.compared} configurations, {where}; all frames together {times.drift:.2f} times the old; "
+        f"times: {times.compared} configurations, {where}; all frames together {times.drift:.2f} "
+        "times the old; "
         f"the least slowdown that would be seen is {times.least:.2f} times{busy}"
     )

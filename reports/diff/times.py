@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 from airlight.reports.data.records import Report, Size
 from airlight.reports.tables.methods import runs_of
-from airlight.validation.statistics.noise import SHORTEST, Times, drift, growths, least_ratio, slower_stages, spread
+from airlight.validation.statistics.noise import (
+    SHORTEST,
+    Times,
+    drift,
+    growths,
+    least_ratio,
+    slower_stages,
+    spread,
+)
 from airlight.validation.timing import FrameTimes
 
 
@@ -37,8 +45,12 @@ class TimeComparison:
     drift: float  #: median ratio of all frames
 
 
-def compare_times(old: Report, new: Report, *, tolerance: float | None) -> tuple[TimeComparison, list[Finding]]:
-    """Compare the times of two reports, with findings; parameters as in `reports.diff.compare.compare_reports`."""
+def compare_times(
+    old: Report, new: Report, *, tolerance: float | None
+) -> tuple[TimeComparison, list[Finding]]:
+    """Compare the times of two reports, with findings; parameters as in
+    `reports.diff.compare.compare_reports`.
+    """
     machine, changes = _machines(old, new)
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
@@ -83,7 +95,8 @@ def _changed(which: str, report: Report) -> Iterator[Finding]:
         for run in runs_of(scene.methods):
             if run.steady is False:
                 words = (
-                    f"the machine changed while the times of the {which} report were measured, {run.started} (factor)"
+                    f"the machine changed while the times of the {which} report were measured, "
+                    f"{run.started} (factor)"
                 )
                 yield Finding("note", scene.name, "", words, run.within, run.between)
 
@@ -100,10 +113,18 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
         (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
         if size != new_size:
             sizes = " and ".join("x".join(map(str, pixels)) for pixels in (size, new_size))
-            notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
+            notes[
+                Finding(
+                    "note", key[0], "", f"times not compared: the frames timed are {sizes} pixels"
+                )
+            ] = None
         elif note != new_note:
             notes[
-                Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
+                Finding(
+                    "note",
+                    *key,
+                    f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now",
+                )
             ] = None
         elif new_times.run is not None and new_times == old_times:
             words = f"times not compared: both reports show the run of {new_times.run.started}"
@@ -114,7 +135,9 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
 
 
 def _timed(report: Report) -> dict[Key, tuple[Size, str | None, FrameTimes]]:
-    """Return the size of the frames that were timed, the device or the note on how, and times, by scene and label."""
+    """Return the size of the frames that were timed, the device or the note on how, and
+    times, by scene and label.
+    """
     return {
         (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times)
         for scene in report.scenes
@@ -149,12 +172,23 @@ def _configuration(
 ) -> list[Finding]:
     """Return the stages of one configuration that got slower or faster."""
     floor = 1.0 if machine else 0.0
-    slower = slower_stages(old, new, least=least, scale=max(floor, common), others=others, tests=tests)
-    faster = slower_stages(new, old, least=least, scale=max(floor, 1 / common), others=others, tests=tests)
+    slower = slower_stages(
+        old, new, least=least, scale=max(floor, common), others=others, tests=tests
+    )
+    faster = slower_stages(
+        new, old, least=least, scale=max(floor, 1 / common), others=others, tests=tests
+    )
     moved = [("worse", stage) for stage in slower] + [("better", stage) for stage in faster]
     beside = "" if machine else f", beside the median of all ({common:.2f} times)"
     return [
-        Finding(verdict, scene, label, f"{stage} [ms]{beside}", old[stage].median_ms, new[stage].median_ms)
+        Finding(
+            verdict,
+            scene,
+            label,
+            f"{stage} [ms]{beside}",
+            old[stage].median_ms,
+            new[stage].median_ms,
+        )
         for verdict, stage in moved
         if max(old[stage].median_ms, new[stage].median_ms) >= SHORTEST
     ]

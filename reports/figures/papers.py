@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pictures and curves of the papers again, in our scenes: for `airlight paper NAME --figures DIR`.
+"""The pictures and curves of the papers again, in our scenes: for `airlight
+paper NAME --figures DIR`.
 
 Each figure is PDF and PNG, with its data as EXR files or CSV beside it.
 """
@@ -31,8 +32,12 @@ class PaperFigure:
     rows: Sequence[Mapping[str, Any]] = ()
 
 
-def write_figures(folder: Path, paper: str | None, *, quick: bool, progress: Progress) -> tuple[str, ...]:
-    """Draw the figures of a paper, or of all, into a folder, `quick` ones smaller; return the names of the files."""
+def write_figures(
+    folder: Path, paper: str | None, *, quick: bool, progress: Progress
+) -> tuple[str, ...]:
+    """Draw the figures of a paper, or of all, into a folder, `quick` ones smaller;
+    return the names of the files.
+    """
     target = ensure_folder(folder)
     chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}
     written: list[Path] = []
@@ -45,7 +50,10 @@ def write_figures(folder: Path, paper: str | None, *, quick: bool, progress: Pro
             write_exr(written[-1], stamped(Image({"total": radiance})))
         if figure.rows:
             written.append(target / f"{name}.csv")
-            write_text(written[-1], csv(table("", [Column(key, key) for key in figure.rows[0]], figure.rows)))
+            write_text(
+                written[-1],
+                csv(table("", [Column(key, key) for key in figure.rows[0]], figure.rows)),
+            )
     return tuple(map(str, written))
 
 
@@ -54,20 +62,25 @@ def _grid(pictures: Sequence[tuple[str, Any]], across: int = 3) -> Callable[[str
 
 
 def _pictures(quick: bool, progress: Progress) -> PaperFigure:
-    """Return the pictures of Biri 2006 and Billeter 2010: a triptych, two lights, two tessellations."""
+    """Return the pictures of Biri 2006 and Billeter 2010: a triptych, two
+    lights, two tessellations.
+    """
     from airlight.validation.papers.pictures import tessellations, triptych, two_lights_image
 
     size = (80, 60) if quick else (400, 300)
     lit = triptych(size)
     shared = exposure(list(lit.values())[2])
-    shown = [(f"Biri 2006, Fig. 1\n{label}", tone_mapped(image, shared)) for label, image in lit.items()]
+    shown = [
+        (f"Biri 2006, Fig. 1\n{label}", tone_mapped(image, shared)) for label, image in lit.items()
+    ]
     images = {f"triptych-{at}": image for at, image in enumerate(lit.values())}
     images["two-lights"] = two = two_lights_image(size)
     shown.append(("Billeter 2010, Fig. 1\ntwo lights", tone_mapped(two, exposure(two))))
     for name, side in tessellations(64 if quick else 256).items():
         label = "quads by our filter" if name == "ours" else "by the plain Laplacian"
         images[f"side-{name}"] = np.repeat(side[:, :, None], 3, axis=2)
-        shown.append((f"Billeter 2010, Fig. 8b\n{label}", np.log2(side[::-1])))  # by the side of the quads
+        # by the side of the quads
+        shown.append((f"Billeter 2010, Fig. 8b\n{label}", np.log2(side[::-1])))
     return PaperFigure(_grid(shown), images)
 
 
@@ -81,8 +94,16 @@ _SHAFTS = {
 
 
 def _shafts(quick: bool, progress: Progress) -> PaperFigure:
-    """Return Fig. 5.8 of Ali 2016 in `fence`: R1 to R4, the shared points, the reference, with errors and times."""
-    from airlight.validation.papers.soft_shafts import RENDERINGS, VARIANTS, rendered, shafts_scene, timings
+    """Return Fig. 5.8 of Ali 2016 in `fence`: R1 to R4, the shared points, the
+    reference, with errors and times.
+    """
+    from airlight.validation.papers.soft_shafts import (
+        RENDERINGS,
+        VARIANTS,
+        rendered,
+        shafts_scene,
+        timings,
+    )
 
     size = (80, 60) if quick else (200, 152)
     progress(0.0, "the reference")
@@ -104,7 +125,9 @@ def _shafts(quick: bool, progress: Progress) -> PaperFigure:
 
 
 def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
-    """Return Figs 11 and 12 of Bouthors 2008: clouds by collectors above the same by light paths."""
+    """Return Figs 11 and 12 of Bouthors 2008: clouds by collectors above
+    the same by light paths.
+    """
     from airlight.validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
 
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
@@ -130,7 +153,9 @@ _WAYS = {
 
 
 def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
-    """Return Fig. 8 of Bouthors 2008: the light that leaves a point of a slab by its direction, in three ways."""
+    """Return Fig. 8 of Bouthors 2008: the light that leaves a point of a slab by its
+    direction, in three ways.
+    """
     from airlight.validation.papers.slab import transport_curves
 
     curves = transport_curves()
@@ -143,11 +168,19 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
         panels = figure.subplots(down, across, sharex=True, squeeze=False).ravel()
         for panel, place in zip(panels, places):
             for at, orders in enumerate(_ORDERS):
-                (curve,) = (c for c in curves if (c.thickness, c.depth, c.orders) == (*place, orders))
+                (curve,) = (
+                    c for c in curves if (c.thickness, c.depth, c.orders) == (*place, orders)
+                )
                 for way, (style, colour, label) in _WAYS.items():
                     values = getattr(curve, way)
                     shown = np.where((curve.exact > 0) & (values > 0), values, np.nan)
-                    panel.plot(curve.angle, shown, style, color=COLOURS[colour], label=None if at else label)
+                    panel.plot(
+                        curve.angle,
+                        shown,
+                        style,
+                        color=COLOURS[colour],
+                        label=None if at else label,
+                    )
             title = f"{place[0]:g} m thick, {place[1]:g} m deep, orders {', '.join(_ORDERS)}"
             panel.set_title(title, fontsize=6)
             panel.set(yscale="log", xlabel="zenith angle of the view [degrees]", ylabel="T [1/sr]")
@@ -160,7 +193,9 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
     rows = [
         dict(zip(names, (curve.thickness, curve.depth, curve.orders, *numbers)))
         for curve in curves
-        for numbers in zip(curve.angle.tolist(), *(getattr(curve, way).tolist() for way in _WAYS), strict=True)
+        for numbers in zip(
+            curve.angle.tolist(), *(getattr(curve, way).tolist() for way in _WAYS), strict=True
+        )
     ]
     return PaperFigure(draw, rows=rows)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of a report for papers: time against error, images with insets and error maps, a LaTeX table of methods.
+"""Figures of a report for papers: time against error, images with insets and error maps,
+a LaTeX table of methods.
 
 They are drawn from report.json and the EXR files beside it, without Mitsuba.
 """
@@ -17,8 +18,22 @@ from airlight.reference.storage.exr import layer as image_layer
 from airlight.reference.storage.exr import read_exr
 from airlight.reference.storage.files import write_text
 from airlight.reports.data.records import Method, Report, Scene, load_report
-from airlight.reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
-from airlight.reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
+from airlight.reports.plotting.figure import (
+    ENDINGS,
+    has_point,
+    new_figure,
+    save_figure,
+    show_picture,
+    speed_chart,
+)
+from airlight.reports.plotting.pictures import (
+    ERROR_CEILING,
+    ERROR_FLOOR,
+    error_map,
+    error_scale,
+    exposure,
+    tone_mapped,
+)
 from airlight.reports.plotting.style import COLOURS, WIDTHS
 from airlight.reports.tables.drawing import latex
 from airlight.reports.tables.methods import method_row, methods_table
@@ -35,17 +50,27 @@ _FRAMES = (COLOURS["orange"], COLOURS["sky"])
 def write_figures(
     folder: Path, column: str, *, scene: str | None = None, labels: Sequence[str] | None = None
 ) -> tuple[str, ...]:
-    """Write the figures of a report into its folder, for a 'single' or 'double' column; return the names of the files.
+    """Write the figures of a report into its folder, for a 'single' or 'double' column;
+    return the names of the files.
 
-    The strip shows `scene` and `labels`: by default the first scene with shadows and the most accurate of each method.
+    The strip shows `scene` and `labels`: by default the first scene with shadows and the most
+    accurate of each method.
     """
     report, place = load_report(folder)
     drawn: dict[str, Callable[[str], Any]] = {}
     if any(has_point(entry) for each in report.scenes for entry in each.methods):
         drawn["frame-speed"] = partial(draw_speed, report.scenes)
-    if scene or labels or any(_shown(each, name) for each in report.scenes for name in ("airlight", "total")):
+    if (
+        scene
+        or labels
+        or any(_shown(each, name) for each in report.scenes for name in ("airlight", "total"))
+    ):
         drawn["strip"] = partial(draw_strip, *_strip(report, place, scene, labels))
-    paths = [save_figure(folder / f"{name}{end}", draw, column) for name, draw in drawn.items() for end in ENDINGS]
+    paths = [
+        save_figure(folder / f"{name}{end}", draw, column)
+        for name, draw in drawn.items()
+        for end in ENDINGS
+    ]
     write_text(folder / "methods-table.tex", latex_table(report.scenes))
     return tuple(str(path) for path in (*paths, folder / "methods-table.tex"))
 
@@ -54,7 +79,8 @@ def latex_table(scenes: Sequence[Scene]) -> str:
     """Return the LaTeX table of times and errors of every method in every scene."""
     comment = (
         "Times: medians with the distances to the quartiles, kernels compiled before.",
-        "Errors of the airlight against the quadrature reference; p99: quantile of |error| / max(ref, mean / 1000).",
+        "Errors of the airlight against the quadrature reference; p99: quantile of |error| / "
+        "max(ref, mean / 1000).",
     )
     tables = []
     for scene in scenes:
@@ -62,7 +88,9 @@ def latex_table(scenes: Sequence[Scene]) -> str:
         known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
         about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene.size) + known
         rows = [_latex_row(entry) for entry in scene.methods]
-        tables.append(methods_table(scene.name, rows, "label", *_TIMES, *_ERRORS, explanation=about))
+        tables.append(
+            methods_table(scene.name, rows, "label", *_TIMES, *_ERRORS, explanation=about)
+        )
     return latex(tables, comment=comment)
 
 
@@ -87,7 +115,9 @@ def draw_speed(scenes: Sequence[Scene], column: str) -> Any:
 # Images with insets: the two squares in which the methods are wrong the most
 
 
-def _strip(report: Report, place: Path, name: str | None, labels: Sequence[str] | None) -> tuple[Any, ...]:
+def _strip(
+    report: Report, place: Path, name: str | None, labels: Sequence[str] | None
+) -> tuple[Any, ...]:
     """Return the scene, the methods to show, and the images of the reference and of each."""
     scene = _scene(report, name)
     chosen = _chosen(scene, labels)
@@ -96,18 +126,30 @@ def _strip(report: Report, place: Path, name: str | None, labels: Sequence[str] 
 
 
 def _scene(report: Report, name: str | None) -> Scene:
-    scenes = {scene.name: scene for scene in report.scenes if _shown(scene, "airlight") or _shown(scene, "total")}
+    scenes = {
+        scene.name: scene
+        for scene in report.scenes
+        if _shown(scene, "airlight") or _shown(scene, "total")
+    }
     if name is not None and name not in scenes:
-        raise InputError(f"scene: got {name!r}, expected one of {', '.join(scenes)}" + nearest(name, scenes))
+        raise InputError(
+            f"scene: got {name!r}, expected one of {', '.join(scenes)}" + nearest(name, scenes)
+        )
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
-    shadowed = [scene for scene in scenes.values() if not scene.plan.get("shadows", "none").startswith("none")]
+    shadowed = [
+        scene
+        for scene in scenes.values()
+        if not scene.plan.get("shadows", "none").startswith("none")
+    ]
     return scenes[name] if name else (shadowed or list(scenes.values()))[0]
 
 
 def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
-    known = {entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
+    known = {
+        entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)
+    }
     if wanted is None:
         best: dict[str, Method] = {}
         for entry in _shown(scene, "airlight") or _shown(scene, "total"):
@@ -118,16 +160,24 @@ def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
     for label in wanted:
         if label not in known:
             names = "; ".join(known)
-            raise InputError(f"method: got {label!r}, expected some of {names}" + nearest(label, known))
+            raise InputError(
+                f"method: got {label!r}, expected some of {names}" + nearest(label, known)
+            )
     chosen = [known[label] for label in wanted]
     if len({entry.layer for entry in chosen}) > 1:
-        raise InputError("method: got images with airlight and images without layers; show them in two figures")
+        raise InputError(
+            "method: got images with airlight and images without layers; show them in two figures"
+        )
     return chosen
 
 
 def _shown(scene: Scene, layer: str) -> list[Method]:
     """Return the methods of a scene that have an image whose error is of a layer."""
-    return [entry for entry in scene.methods if "exr" in entry.files and entry.error and entry.layer == layer]
+    return [
+        entry
+        for entry in scene.methods
+        if "exr" in entry.files and entry.error and entry.layer == layer
+    ]
 
 
 def _rank(entry: CellRow) -> float:
@@ -145,7 +195,8 @@ def _pixels(path: Path, name: str) -> Any:
 
 
 def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ...]:
-    """Return the corners (column, row) of two squares that do not overlap, with the largest errors of all methods.
+    """Return the corners (column, row) of two squares that do not overlap, with the
+    largest errors of all methods.
 
     Errors are divided by the largest of their method, so that every method counts.
     """
@@ -165,13 +216,17 @@ def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ..
 
 
 def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], column: str) -> Any:
-    """Return reference and methods in one exposure, two insets of each, and the signed relative error."""
+    """Return reference and methods in one exposure, two insets of each, and
+    the signed relative error.
+    """
     height, width = images[0].shape[:2]
     side = max(4, min(height, width) // _INSET)
     corners, factor = worst_squares(images, side), exposure(images[0])
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
     figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + 0.55)
-    grid = figure.add_gridspec(3, 2 * len(images), height_ratios=[height / width, 0.5, height / width])
+    grid = figure.add_gridspec(
+        3, 2 * len(images), height_ratios=[height / width, 0.5, height / width]
+    )
     for at, (entry, image) in enumerate(zip([None, *methods], images)):
         picture = tone_mapped(image, factor)
         panel = figure.add_subplot(grid[0, 2 * at : 2 * at + 2])
@@ -179,7 +234,11 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
         for corner, colour, place in zip(corners, _FRAMES, (0, 1)):
             _mark(panel, corner, side, colour)
             inset = figure.add_subplot(grid[1, 2 * at + place])
-            _show(inset, picture[corner[1] : corner[1] + side, corner[0] : corner[0] + side], frame=colour)
+            _show(
+                inset,
+                picture[corner[1] : corner[1] + side, corner[0] : corner[0] + side],
+                frame=colour,
+            )
         below = figure.add_subplot(grid[2, 2 * at : 2 * at + 2])
         if entry is None:
             _scale(below, size)
@@ -198,7 +257,9 @@ def _words(entry: CellRow | None, scene: str) -> str:
     return "\n".join((name, rest.rstrip(")"), f"RMSE {_rmse(entry):.1e}{time}"))
 
 
-def _show(panel: Any, picture: Any, title: str = "", size: float = 6, frame: str | None = None) -> None:
+def _show(
+    panel: Any, picture: Any, title: str = "", size: float = 6, frame: str | None = None
+) -> None:
     show_picture(panel, picture, title, size)
     for spine in panel.spines.values():
         spine.set(edgecolor=frame or "black", linewidth=1.2 if frame else 0.4)
@@ -217,6 +278,10 @@ def _scale(panel: Any, size: float) -> None:
     bar = panel.inset_axes([0.06, 0.45, 0.88, 0.16])
     bar.imshow(error_scale(), aspect="auto", extent=(-1, 1, 0, 1))
     bar.set_yticks([])
-    bar.set_xticks([-1, 0, 1], [f"-{ERROR_CEILING:g}", f"±{ERROR_FLOOR:g}", f"+{ERROR_CEILING:g}"], fontsize=size)
+    bar.set_xticks(
+        [-1, 0, 1],
+        [f"-{ERROR_CEILING:g}", f"±{ERROR_FLOOR:g}", f"+{ERROR_CEILING:g}"],
+        fontsize=size,
+    )
     bar.grid(False)
     bar.set_title("relative error [1]", fontsize=size)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Height fog as a grid of densities, for renderers that do not know its layers.
 
-A grid is linear between the middles of its voxels, and constant beyond the outermost. Linear interpolation of an
-exponential is too dense by (u/2)/tanh(u/2), u = dz/H, in every cell alike: nodes times tanh(u/2)/(u/2) have the optical
-depth of the layer between any two of them. With dz = H/20 densities differ by 2e-4 at the nodes.
+A grid is linear between the middles of its voxels, and constant beyond the outermost. Linear
+interpolation of an exponential is too dense by (u/2)/tanh(u/2), u = dz/H, in every cell alike:
+nodes times tanh(u/2)/(u/2) have the optical depth of the layer between any two of them. With dz =
+H/20 densities differ by 2e-4 at the nodes.
 """
 
 from pathlib import Path
@@ -27,7 +28,8 @@ def fog_grid(medium: HeightMedium) -> Array:
     count = max(2, int(np.ceil(_VOXELS * (medium.cap - medium.floor) / least)))
     if count > _MOST:
         raise InputError(
-            f"the height fog takes {count} voxels, 20 a scale height; expected at most {_MOST}: lower its cap"
+            f"the height fog takes {count} voxels, 20 a scale height; expected at most {_MOST}: "
+            "lower its cap"
         )
     step = (medium.cap - medium.floor) / count
     z = medium.floor + step * (np.arange(count) + 0.5)
@@ -40,7 +42,9 @@ def fog_grid(medium: HeightMedium) -> Array:
 
 
 def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
-    """Write height fog or a grid as a volume file of Mitsuba, and return the medium that reads it, as XML."""
+    """Write height fog or a grid as a volume file of Mitsuba, and return the
+    medium that reads it, as XML.
+    """
     import mitsuba as mi
 
     if isinstance(medium, GridMedium):
@@ -52,16 +56,20 @@ def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
     parts = (
         f'<volume type="gridvolume" name="sigma_t"> <string name="filename" value="{path}"/>',
         '<boolean name="raw" value="true"/> <string name="wrap_mode" value="clamp"/>',
-        f'<transform name="to_world"> <scale value="{words[0]}"/> <translate value="{words[1]}"/> </transform>',
+        f'<transform name="to_world"> <scale value="{words[0]}"/> <translate value="{words[1]}"/> '
+        "</transform>",
         "</volume>",
-        f'<rgb name="albedo" value="{words[2]}"/> <boolean name="has_spectral_extinction" value="false"/>',
+        f'<rgb name="albedo" value="{words[2]}"/> <boolean name="has_spectral_extinction" '
+        'value="false"/>',
         _phase(medium.phase),
     )
     return f'<medium type="heterogeneous"> {" ".join(parts)} </medium>'
 
 
 def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
-    """Return the densities of height fog, (z, y, x) [1/m], and corner and size of their box, (3,) [m]."""
+    """Return the densities of height fog, (z, y, x) [1/m], and corner and
+    size of their box, (3,) [m].
+    """
     density, height = fog_grid(medium), medium.cap - medium.floor
     axis = int(np.argmax(np.abs(medium.up)))
     upwards = bool(medium.up[axis] > 0)

@@ -1,26 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A scene as binary glTF 2.0, with the same camera and lights, for engines and modelling programs.
 
-glTF has y up and cameras that look along -z with x to the right; lengths are metres, as here. The scene is turned by a
-quarter about an axis, which is exact, so that its own up axis becomes y: with z up, (x, y, z) becomes (x, z, -y).
+glTF has y up and cameras that look along -z with x to the right; lengths are metres, as here. The
+scene is turned by a quarter about an axis, which is exact, so that its own up axis becomes y: with
+z up, (x, y, z) becomes (x, z, -y).
 
-Lights are those of KHR_lights_punctual. Its unit is the candela, 1 lm/sr, and its colours are RGB factors: here the
-largest channel of the intensity in W/sr stands as the intensity, the channels over it as the colour, with no factor of
-683 lm/W. Its spots fall off otherwise than Mitsuba's and their inner angle must be smaller than the outer one. The
-`extras` of each light, camera, material and medium hold the exact values of the scene.
+Lights are those of KHR_lights_punctual. Its unit is the candela, 1 lm/sr, and its colours are RGB
+factors: here the largest channel of the intensity in W/sr stands as the intensity, the channels
+over it as the colour, with no factor of 683 lm/W. Its spots fall off otherwise than Mitsuba's and
+their inner angle must be smaller than the outer one. The `extras` of each light, camera, material
+and medium hold the exact values of the scene.
 
-The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect ratio of a camera,
-3 % off at 52 degrees, and no lights.
+The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect
+ratio of a camera, 3 % off at 52 degrees, and no lights.
 
-glTF has no area light, and KHR_lights_punctual none either. Such a light is written as its shape, a mesh whose
-material emits (KHR_materials_emissive_strength, whose unit is cd/m^2: here the largest channel of the radiance in
-W/(m^2 sr), again with no factor of 683 lm/W). Engines that do not treat emitting meshes as lights show it and are not
-lit by it; the `extras` say so, and have the shape in numbers.
+glTF has no area light, and KHR_lights_punctual none either. Such a light is written as its shape, a
+mesh whose material emits (KHR_materials_emissive_strength, whose unit is cd/m^2: here the largest
+channel of the radiance in W/(m^2 sr), again with no factor of 683 lm/W). Engines that do not treat
+emitting meshes as lights show it and are not lit by it; the `extras` say so, and have the shape in
+numbers.
 
 References
 ----------
-Khronos 2021, *glTF 2.0 specification*, sections 3 and 4; KHR_lights_punctual; KHR_materials_specular;
-KHR_materials_emissive_strength.
+Khronos 2021, *glTF 2.0 specification*, sections 3 and 4; KHR_lights_punctual;
+KHR_materials_specular; KHR_materials_emissive_strength.
 """
 
 import json
@@ -56,9 +59,11 @@ _TURNS: dict[str, list[list[int]]] = {
 
 
 def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
-    """Write a scene as a .glb file, whole or not at all; the camera's aspect ratio is that of the image.
+    """Write a scene as a .glb file, whole or not at all; the camera's aspect
+    ratio is that of the image.
 
-    Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
+    Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are
+    not triangles by nature.
     """
     described = describe_scene(loaded)
     scene = read_reference(loaded.scene)
@@ -78,8 +83,12 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     }
 
 
-def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON and the binary part; the shapes are surfaces, bounds of media, lights, as described."""
+def _document(
+    described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]
+) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON and the binary part; the shapes are surfaces, bounds of
+    media, lights, as described.
+    """
     buffer = _Buffer()
     punctual = [light for light in described["lights"] if light["kind"] != "area"]
     extended = [light for light in described["lights"] if light["kind"] == "area"]
@@ -87,8 +96,12 @@ def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -
     materials += [_boundary(medium) for medium in described["bounded_media"]]
     materials += [_emission(light) for light in extended]
     # glTF has no empty lists: a mesh without triangles is left out.
-    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes) if len(mesh.faces)]
-    nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
+    meshes = [
+        buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes) if len(mesh.faces)
+    ]
+    nodes: list[dict[str, Any]] = [
+        {"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)
+    ]
     camera = described["camera"]
     nodes.append({"name": "camera", "camera": 0, "matrix": _camera_matrix(camera, turn)})
     nodes += [
@@ -109,13 +122,19 @@ def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -
         "extensionsUsed": [name for name, users in used.items() if users],
         "scene": 0,
         "scenes": [
-            {"name": described["scene"], "nodes": list(range(len(nodes))), "extras": _scene_extras(described, turn)}
+            {
+                "name": described["scene"],
+                "nodes": list(range(len(nodes))),
+                "extras": _scene_extras(described, turn),
+            }
         ],
         "nodes": nodes,
         "cameras": [_camera(camera)],
     }
     if punctual:
-        document["extensions"] = {"KHR_lights_punctual": {"lights": [_light(light) for light in punctual]}}
+        document["extensions"] = {
+            "KHR_lights_punctual": {"lights": [_light(light) for light in punctual]}
+        }
     if meshes:
         document |= {
             "meshes": meshes,
@@ -161,7 +180,9 @@ _KEYS = {"W/sr": "w_per_sr", "W/m^2": "w_per_m2"}
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
     # For a directional light the format requires lux in place of candela.
-    quantity, unit = ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
+    quantity, unit = (
+        ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
+    )
     intensity = np.array(light[quantity])
     largest = float(intensity.max())
     punctual: dict[str, Any] = {
@@ -195,7 +216,9 @@ def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
 
 
 def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
-    """Return a transform as glTF lists it, column by column; `axes` has the node's axes as columns."""
+    """Return a transform as glTF lists it, column by column; `axes` has
+    the node's axes as columns.
+    """
     matrix = np.eye(4)
     # The axes are in float32, but the format requires a rotation.
     unit, _, other = np.linalg.svd(turn @ axes)
@@ -212,7 +235,9 @@ def _material(surface: dict[str, Any]) -> dict[str, Any]:
 
 
 def _emission(light: dict[str, Any]) -> dict[str, Any]:
-    """Return the material of an area light: black, and as bright as the light on the side of its normal."""
+    """Return the material of an area light: black, and as bright as the light
+    on the side of its normal.
+    """
     largest = max(light["radiance"])
     extras = {
         "light": light,
@@ -220,21 +245,31 @@ def _emission(light: dict[str, Any]) -> dict[str, Any]:
         "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
     }
     made = _matte(f"light {light['name']}", [0.0, 0.0, 0.0, 1.0], extras)
-    made["emissiveFactor"] = [value / largest if largest > 0 else 0.0 for value in light["radiance"]]
+    made["emissiveFactor"] = [
+        value / largest if largest > 0 else 0.0 for value in light["radiance"]
+    ]
     made["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": largest}
     return made
 
 
 def _boundary(medium: dict[str, Any]) -> dict[str, Any]:
-    """Return a material for the bounds of a medium: nothing is seen of them, what is in them stands in the extras."""
-    return _matte(f"medium {medium['name']}", [1.0, 1.0, 1.0, 0.0], {"medium": medium}) | {"alphaMode": "BLEND"}
+    """Return a material for the bounds of a medium: nothing is seen of them, what is in
+    them stands in the extras.
+    """
+    return _matte(f"medium {medium['name']}", [1.0, 1.0, 1.0, 0.0], {"medium": medium}) | {
+        "alphaMode": "BLEND"
+    }
 
 
 def _matte(name: str, colour: list[float], extras: dict[str, Any]) -> dict[str, Any]:
     """Return a material without a gloss, of one side."""
     return {
         "name": name,
-        "pbrMetallicRoughness": {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 1.0},
+        "pbrMetallicRoughness": {
+            "baseColorFactor": colour,
+            "metallicFactor": 0.0,
+            "roughnessFactor": 1.0,
+        },
         "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
         "extras": extras,
     }
@@ -252,7 +287,10 @@ class _Buffer:
         """Add a mesh and return its entry."""
         vertices = (mesh.vertices @ turn.T).astype("<f4")
         attributes = {"POSITION": self._add(vertices, "VEC3", _FLOAT, _VERTICES)}
-        self.accessors[-1] |= {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
+        self.accessors[-1] |= {
+            "min": vertices.min(axis=0).tolist(),
+            "max": vertices.max(axis=0).tolist(),
+        }
         if mesh.normals is not None:
             normals = (mesh.normals @ turn.T).astype("<f4")
             attributes["NORMAL"] = self._add(normals, "VEC3", _FLOAT, _VERTICES)
@@ -263,18 +301,29 @@ class _Buffer:
         }
 
     def _add(self, values: NDArray[Any], kind: str, component: int, target: int) -> int:
-        """Add an array, every number of which has four bytes, and return the number of its accessor."""
+        """Add an array, every number of which has four bytes, and return
+        the number of its accessor.
+        """
         data = values.tobytes()
-        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data), "target": target})
+        self.views.append(
+            {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data), "target": target}
+        )
         self.data += data
         self.accessors.append(
-            {"bufferView": len(self.views) - 1, "componentType": component, "count": len(values), "type": kind}
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": component,
+                "count": len(values),
+                "type": kind,
+            }
         )
         return len(self.accessors) - 1
 
 
 def _container(document: dict[str, Any], binary: bytes) -> bytes:
-    """Return the bytes of a .glb file: a header, the JSON, the binary part, each padded to four bytes."""
+    """Return the bytes of a .glb file: a header, the JSON, the binary part,
+    each padded to four bytes.
+    """
     text = json.dumps(document, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
     chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
     chunks += [(b"BIN\0", binary + b"\0" * (-len(binary) % 4))] if binary else []

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shapes of a Mitsuba scene as triangle meshes, for engines that support nothing else.
 
-Meshes, rectangles and Mitsuba's cubes stay what they are. Round shapes are cut into `SIDES` around: no point of the
-mesh is further inside the shape than 1 - cos(pi / SIDES) = 3e-4 of the radius, twice that for spheres.
+Meshes, rectangles and Mitsuba's cubes stay what they are. Round shapes are cut into `SIDES` around:
+no point of the mesh is further inside the shape than 1 - cos(pi / SIDES) = 3e-4 of the radius,
+twice that for spheres.
 """
 
 from dataclasses import dataclass
@@ -32,13 +33,19 @@ class ShapeMesh:
 
 
 def shape_mesh(shape: Any) -> ShapeMesh:
-    """Return a shape of a Mitsuba scene as a mesh; one that cannot be made a mesh is refused by name."""
-    unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(shape.class_name())
-    if unit is None and shape.is_mesh():  # Mitsuba's rectangle claims to be a mesh, but has no vertices
+    """Return a shape of a Mitsuba scene as a mesh; one that cannot be made a
+    mesh is refused by name.
+    """
+    unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(
+        shape.class_name()
+    )
+    # Mitsuba's rectangle claims to be a mesh, but has no vertices
+    if unit is None and shape.is_mesh():
         return _of_mesh(shape)
     if unit is None:
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name()}; expected meshes, cubes, rectangles, spheres, disks and "
+            f"shape '{shape.id()}' is a {shape.class_name()}; expected meshes, cubes, rectangles, "
+            "spheres, disks and "
             "cylinders to write as triangles: replace it by a mesh"
         )
     return _placed(shape, *unit())
@@ -69,7 +76,8 @@ def _of_mesh(shape: Any) -> ShapeMesh:
 def _placed(shape: Any, vertices: Array, faces: Index, normals: Array | None) -> ShapeMesh:
     """Move a unit shape to where its transform puts it; normals go with the inverse transposed.
 
-    Where the transform mirrors, Mitsuba's cylinder shades its inside, the others the side that the transform leaves.
+    Where the transform mirrors, Mitsuba's cylinder shades its inside, the others the side
+    that the transform leaves.
     """
     import mitsuba as mi
 
@@ -78,14 +86,22 @@ def _placed(shape: Any, vertices: Array, faces: Index, normals: Array | None) ->
     if mirrored and shape.class_name() != "Cylinder":
         faces = faces[:, ::-1]
     if normals is not None:
-        normals = normals @ np.linalg.inv(matrix[:3, :3]) * (-1 if mirrored and shape.class_name() == "Cylinder" else 1)
+        normals = (
+            normals
+            @ np.linalg.inv(matrix[:3, :3])
+            * (-1 if mirrored and shape.class_name() == "Cylinder" else 1)
+        )
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     moved = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    return _turned(shape, ShapeMesh(shape.id(), moved, faces, normals, exact=shape.class_name() == "Rectangle"))
+    return _turned(
+        shape, ShapeMesh(shape.id(), moved, faces, normals, exact=shape.class_name() == "Rectangle")
+    )
 
 
 def _towards(vertices: Array, faces: Index, normals: Array) -> Index:
-    """Return faces that run counter-clockwise about their normals: a mesh that was mirrored keeps its order."""
+    """Return faces that run counter-clockwise about their normals: a mesh that was
+    mirrored keeps its order.
+    """
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     against = np.sum(normals[faces].sum(axis=1) * area, axis=1) < 0
@@ -122,7 +138,9 @@ def _sphere() -> tuple[Array, Index, Array]:
 
 
 def _revolved(profile: Any) -> tuple[Array, Index]:
-    """Return the surface that points (radius, z) sweep about the z axis, seen from outside where z grows."""
+    """Return the surface that points (radius, z) sweep about the z axis, seen
+    from outside where z grows.
+    """
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     vertices = np.concatenate([radius * circle + [0, 0, z] for radius, z in profile])
@@ -131,5 +149,7 @@ def _revolved(profile: Any) -> tuple[Array, Index]:
     band = np.concatenate([np.stack([i, j, SIDES + j], 1), np.stack([i, SIDES + j, SIDES + i], 1)])
     faces = np.concatenate([band + ring * SIDES for ring in range(len(profile) - 1)])
     corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
     return vertices, faces[area > 1e-9]  # half of the triangles at a pole have none

@@ -12,7 +12,12 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
+from airlight.reference.scene.read import (
+    ReferenceLight,
+    ReferenceMedium,
+    ReferenceScene,
+    read_reference,
+)
 from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
 from airlight.validation.scenes.loading import LoadedScene, scene_stem
@@ -24,8 +29,13 @@ Array = NDArray[np.float64]
 _POINTS = 64  # samples of a reflectance, to tell a texture from a colour
 
 _FALLOFF = {
-    "point": "the same intensity in every direction; irradiance falls as 1/r^2, times exp(-sigma_t r)",
-    "hard": "full intensity within the cut-off angle of the axis, none beyond; then 1/r^2 exp(-sigma_t r)",
+    "point": (
+        "the same intensity in every direction; irradiance falls as 1/r^2, times exp(-sigma_t r)"
+    ),
+    "hard": (
+        "full intensity within the cut-off angle of the axis, none beyond; then 1/r^2 exp(-sigma_t "
+        "r)"
+    ),
     "soft": "full intensity within the beam angle of the axis, none beyond the cut-off angle, between them "
     "intensity (cutoff - angle)/(cutoff - beam), linear in the angle; then 1/r^2 exp(-sigma_t r)",
     "directional": "from infinity, parallel: the same irradiance everywhere, times exp(-sigma_t length) of its way in "
@@ -35,26 +45,33 @@ _FALLOFF = {
 }
 EFFICACY = 683.0  #: of monochromatic light of 540 THz, which defines the lumen [lm/W]
 CONVENTION = (
-    "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no tone mapping, no "
-    "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse reflection - eye, "
-    "attenuated by exp(-sigma_t length) along both segments of the path; no ambient light, no sky. The airlight alone "
-    "is the layer `airlight`; the plain channels are airlight + surface. One ray through the centre of every pixel, or "
+    "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no "
+    "tone mapping, no "
+    "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse "
+    "reflection - eye, "
+    "attenuated by exp(-sigma_t length) along both segments of the path; no ambient light, no sky. "
+    "The airlight alone "
+    "is the layer `airlight`; the plain channels are airlight + surface. One ray through the "
+    "centre of every pixel, or "
     "the mean over the pixel's area (a box filter): `compare` finds out which."
 )
 
 
 def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
-    """Return everything that a renderer needs to render a scene, at the size of its image, as plain data.
+    """Return everything that a renderer needs to render a scene, at the size of
+    its image, as plain data.
 
-    These are dictionaries, not records: other programs read them as JSON, and their keys differ by the kind of a light
-    or a medium.
+    These are dictionaries, not records: other programs read them as JSON, and their keys differ by
+    the kind of a light or a medium.
 
-    These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`,
-    `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`. Lengths in metres, angles in degrees,
-    extinction in 1/m, intensity in W/sr, power in W. Black shapes of area lights are among the lights, not the
-    surfaces. A scene without a reference is refused, with what is in the way.
+    These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`,
+    `lights`, `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`. Lengths in
+    metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black shapes of
+    area lights are among the lights, not the surfaces. A scene without a reference is refused, with
+    what is in the way.
     """
-    notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
+    # it refuses what `render` refuses, in its words
+    notes = read_scene(loaded.scene).features.notes
     scene = read_reference(loaded.scene)
     camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
@@ -66,11 +83,18 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "camera": camera,
         "medium": _medium(scene.medium),
         "bounded_media": [
-            {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in scene.media
+            {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)}
+            for medium in scene.media
         ],
-        "lights": [*map(_light, scene.lights), *map(_directional, scene.directional), *map(_area, scene.area)],
+        "lights": [
+            *map(_light, scene.lights),
+            *map(_directional, scene.directional),
+            *map(_area, scene.area),
+        ],
         "surfaces": [
-            surface(shape) for shape in scene.occluders.shapes() if not shape.is_emitter() or _reflects(shape)
+            surface(shape)
+            for shape in scene.occluders.shapes()
+            if not shape.is_emitter() or _reflects(shape)
         ],
         "radiance": CONVENTION,
         "notes": list(notes),
@@ -78,17 +102,26 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             "name": f"{scene_stem(str(loaded.path or loaded.name))}.exr",
             "format": "OpenEXR, one part of scan lines, half or float",
             "layers": {
-                "airlight": "airlight.R, airlight.G, airlight.B: the in-scattered light alone, if the engine has it",
+                "airlight": (
+                    "airlight.R, airlight.G, airlight.B: the in-scattered light alone, if the "
+                    "engine has it"
+                ),
                 "total": "R, G, B: airlight + surface",
             },
         },
     }
-    drawn = {"drawn": drawn_values(loaded.name)} if loaded.path is None and is_random(loaded.name) else {}
+    drawn = (
+        {"drawn": drawn_values(loaded.name)}
+        if loaded.path is None and is_random(loaded.name)
+        else {}
+    )
     return described | drawn
 
 
 def up_axis(up: Array) -> str:
-    """Return the axis of the world that points up in the image most: 'x', '-x', 'y', '-y', 'z' or '-z'."""
+    """Return the axis of the world that points up in the image most: 'x',
+    '-x', 'y', '-y', 'z' or '-z'.
+    """
     number = int(np.argmax(np.abs(up)))
     return ("-" if up[number] < 0 else "") + "xyz"[number]
 
@@ -119,8 +152,13 @@ def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
     import mitsuba as mi
 
     matrix = camera_matrix(sensor)
-    if not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-5) or np.linalg.det(matrix[:3, :3]) < 0:
-        raise InputError("the camera's to_world scales, shears or mirrors; expected a rotation and a translation")
+    if (
+        not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-5)
+        or np.linalg.det(matrix[:3, :3]) < 0
+    ):
+        raise InputError(
+            "the camera's to_world scales, shears or mirrors; expected a rotation and a translation"
+        )
     x_fov = _number(float(mi.traverse(sensor)["x_fov"][0]))
     tangent = np.tan(0.5 * np.deg2rad(x_fov))
     return {
@@ -132,7 +170,8 @@ def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
         "fov_horizontal": x_fov,
         "fov_vertical": float(2 * np.rad2deg(np.arctan(tangent * scene.height / scene.width))),
         "projection": "pinhole; square pixels; the pixel in column i and row j, counted from 0 at the upper left, "
-        "looks through (i + 0.5, j + 0.5); no depth of field, no jitter; the medium begins at the pinhole, so let the "
+        "looks through (i + 0.5, j + 0.5); no depth of field, no jitter; the medium begins at the "
+        "pinhole, so let the "
         "near plane cut nothing away",
     }
 
@@ -146,7 +185,10 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
         phase["g"] = _number(medium.phase.g)
     if isinstance(medium.phase, Tabulated):
         phase["table"] = _numbers(medium.phase.table)
-    scattering = {"albedo": _numbers(medium.albedo), "phase": phase | {"formula": _PHASES[medium.phase.name]}}
+    scattering = {
+        "albedo": _numbers(medium.albedo),
+        "phase": phase | {"formula": _PHASES[medium.phase.name]},
+    }
     if isinstance(medium, GridMedium):
         return {
             "voxels": list(medium.values.shape[::-1]),
@@ -187,14 +229,23 @@ def _in_engine(name: str, medium: HeightMedium) -> dict[str, Any]:
         return {"cannot": found}
     numbers = {key: _number(value) for key, value in found.items()}
     engine = ENGINES[name]
-    return {"parameters": numbers, "not_physical": engine["unphysical"], "not_checked": engine["unchecked"]}
+    return {
+        "parameters": numbers,
+        "not_physical": engine["unphysical"],
+        "not_checked": engine["unchecked"],
+    }
 
 
 _PHASES = {
     "isotropic": "1/(4 pi) [1/sr]",
     "rayleigh": "3 (1 + cos^2)/(16 pi) [1/sr]",
-    "hg": "(1 - g^2)/(4 pi (1 + g^2 - 2 g cos)^1.5) [1/sr], cos = 1 forward: g > 0 scatters forward",
-    "tabulated": "linear between values at regular cosines from -1 (backward) to 1, divided by 4 pi times their mean",
+    "hg": (
+        "(1 - g^2)/(4 pi (1 + g^2 - 2 g cos)^1.5) [1/sr], cos = 1 forward: g > 0 scatters forward"
+    ),
+    "tabulated": (
+        "linear between values at regular cosines from -1 (backward) to 1, divided by 4 pi times "
+        "their mean"
+    ),
 }
 
 
@@ -202,20 +253,27 @@ def _bounds(bounds: Any) -> dict[str, Any]:
     from airlight.reference.scene.convex_bounds import Sphere
 
     if isinstance(bounds, Sphere):
-        return {"kind": "sphere", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
+        return {
+            "kind": "sphere",
+            "centre": _numbers(bounds.centre),
+            "radius": _number(bounds.radius),
+        }
     return {"kind": "convex mesh", "facets": len(bounds.offset)}
 
 
 def spot_power_angle(beam: float, cutoff: float) -> float:
     r"""Return the power of a spot over the intensity on its axis [sr]; the angles in radians.
 
-    Full intensity up to the beam angle b, linear in the angle down to zero at the cut-off c, has the power
+    Full intensity up to the beam angle b, linear in the angle down to zero at the
+    cut-off c, has the power
 
         2 pi I (int_0^b sin(t) dt + int_b^c (c - t)/(c - b) sin(t) dt) = 2 pi I (1 - (sin(c) - sin(b))/(c - b)),
 
-    by parts, and 2 pi I (1 - cos(c)) where b is c. Valid to 1e-8 for cut-offs of a hundredth of a degree or more.
+    by parts, and 2 pi I (1 - cos(c)) where b is c. Valid to 1e-8 for cut-offs of a
+    hundredth of a degree or more.
     """
-    # The difference of the sines is 2 cos((c + b)/2) sin((c - b)/2): sinc has no cancellation as b goes to c.
+    # The difference of the sines is 2 cos((c + b)/2) sin((c - b)/2): sinc has no
+    # cancellation as b goes to c.
     half = 0.5 * (cutoff - beam)
     return float(2 * np.pi * (1 - np.cos(0.5 * (cutoff + beam)) * np.sinc(half / np.pi)))
 
@@ -252,7 +310,9 @@ def _directional(light: DirectionalLight) -> dict[str, Any]:
 
 
 def _area(light: ReferenceAreaLight) -> dict[str, Any]:
-    r"""Return an area light: a Lambertian emitter of area A sends pi Le A, from a sphere of 4 pi r^2 too."""
+    r"""Return an area light: a Lambertian emitter of area A sends pi Le A, from
+    a sphere of 4 pi r^2 too.
+    """
     radiance = np.array(_numbers(light.radiance))
     power = np.pi * light.area * radiance
     described: dict[str, Any] = {
@@ -280,9 +340,9 @@ def _area(light: ReferenceAreaLight) -> dict[str, Any]:
 def luminous_flux(power: Array) -> float:
     """Return the luminous flux [lm] of radiant power in three channels [W].
 
-    The channels are taken for linear RGB with the primaries and the white of sRGB: 683 lm/W times the luminance of the
-    triple, as colour-science has it. That is how Radiance and many engines count; a real spectrum of this power and
-    colour has another, lower flux.
+    The channels are taken for linear RGB with the primaries and the white of sRGB: 683 lm/W times
+    the luminance of the triple, as colour-science has it. That is how Radiance and many engines
+    count; a real spectrum of this power and colour has another, lower flux.
     """
     from colour.models import RGB_COLOURSPACE_sRGB
 
@@ -294,16 +354,21 @@ def _reflects(shape: Any) -> bool:
 
 
 def _reflectance(shape: Any) -> tuple[list[float], bool]:
-    """Return the diffuse reflectance, its mean where it differs from place to place, and whether it does."""
+    """Return the diffuse reflectance, its mean where it differs from place to
+    place, and whether it does.
+    """
     import drjit as dr
     import mitsuba as mi
 
     number = np.arange(_POINTS)
-    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)  # evenly spread: Kronecker's points
+    # evenly spread: Kronecker's points
+    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
     sample = shape.sample_position(0, place)
     interaction = mi.SurfaceInteraction3f(sample, dr.zeros(mi.Color0f))
     interaction.wi = mi.Vector3f(0, 0, 1)
-    values = np.array(shape.bsdf().eval_diffuse_reflectance(interaction), dtype=np.float64).reshape(3, -1)
+    values = np.array(shape.bsdf().eval_diffuse_reflectance(interaction), dtype=np.float64).reshape(
+        3, -1
+    )
     return _numbers(values.mean(axis=1)), bool(np.ptp(values, axis=1).max() > 1e-6)
 
 
@@ -312,7 +377,10 @@ def _numbers(values: Any) -> list[float]:
 
 
 def _number(value: float) -> float:
-    """Return a number that float32 rounded as the one that was meant: 0.91 instead of 0.9100000262260437."""
-    short = float(np.format_float_scientific(np.float32(value)))  # str follows the print options of the process
+    """Return a number that float32 rounded as the one that was meant: 0.91
+    instead of 0.9100000262260437.
+    """
+    # str follows the print options of the process
+    short = float(np.format_float_scientific(np.float32(value)))
     # A number with more digits than float32 holds is kept; + 0.0 removes the sign of a zero.
     return (short if abs(short - value) <= 1e-7 * abs(value) else float(value)) + 0.0

@@ -10,13 +10,21 @@ _LISTED = 12  # most surfaces and values that are shown; the others are in the J
 
 #: Units of numbers by their name in the JSON.
 _UNITS = {
-    **dict.fromkeys(("position", "centre", "radius", "sides", "low", "high", "floor", "cap", "base"), "m"),
+    **dict.fromkeys(
+        ("position", "centre", "radius", "sides", "low", "high", "floor", "cap", "base"), "m"
+    ),
     **dict.fromkeys(("scale_height", "mean_free_path"), "m"),
     **dict.fromkeys(("sigma_t", "sigma_s", "sigma_a", "constant", "mean", "largest"), "1/m"),
     **dict.fromkeys(("power", "power_all_round"), "W"),
     **dict.fromkeys(("cutoff_angle", "beam_angle"), "degrees from the axis"),
     **dict.fromkeys(("fov_horizontal", "fov_vertical"), "degrees"),
-    **{"size": "pixels", "area": "m^2", "luminous_flux": "lm", "intensity": "W/sr", "irradiance": "W/m^2"},
+    **{
+        "size": "pixels",
+        "area": "m^2",
+        "luminous_flux": "lm",
+        "intensity": "W/sr",
+        "irradiance": "W/m^2",
+    },
     "radiance": "W/(m^2 sr)",
 }
 
@@ -24,7 +32,9 @@ Cells = tuple[str, str, str]  # what it is, which part of it, and its value
 
 
 def description_table(described: Mapping[str, Any]) -> Table:
-    """Return a description by `reports.interchange.scene.describe_scene`, a row for each number to set."""
+    """Return a description by `reports.interchange.scene.describe_scene`, a
+    row for each number to set.
+    """
     width, height = described["camera"]["size"]
     title = f"{described['scene']}, {width} x {height} pixels. {described['purpose']}"
     columns = (
@@ -46,7 +56,11 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
     surfaces = described["surfaces"]
     yield "surfaces", "", f"{len(surfaces)}; diffuse: radiance = reflectance / pi irradiance"
     for surface in surfaces[:_LISTED]:
-        yield "", surface["name"], _words({key: value for key, value in surface.items() if key != "name"})
+        yield (
+            "",
+            surface["name"],
+            _words({key: value for key, value in surface.items() if key != "name"}),
+        )
     if len(surfaces) > _LISTED:
         yield "", "", f"and {len(surfaces) - _LISTED} more: --json lists them"
     if "drawn" in described:
@@ -79,4 +93,8 @@ def _words(value: Any, name: str = "") -> str:
         return f"({', '.join(map(_words, value))}) {_UNITS.get(name, '')}".rstrip()
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
-    return f"{value:.7g} {_UNITS.get(name, '')}".rstrip() if isinstance(value, int | float) else str(value)
+    return (
+        f"{value:.7g} {_UNITS.get(name, '')}".rstrip()
+        if isinstance(value, int | float)
+        else str(value)
+    )

@@ -8,7 +8,8 @@ Read in this order:
 - `llvm.py`: finds a libLLVM that works
 - `quick_compilation.py`: a hack, kernels that compile quickly and run slowly
 - `opengl.py`: OpenGL, which draws shaders, and what to install.
-- `driver_check.py`: the kernel `exact` in GLSL over certified integrals, which shows the errors of a driver.
+- `driver_check.py`: the kernel `exact` in GLSL over certified integrals, which
+  shows the errors of a driver.
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `mitsuba_log.py`: Mitsuba's warnings on the error stream, each once
 - `environment.py`: chooses the variant; versions and processor

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.doctor`: every part that a kernel needs, then a kernel itself, and what is cached between runs.
+"""`airlight.doctor`: every part that a kernel needs, then a kernel itself, and
+what is cached between runs.
 
-The kernel has a separate process, because what can go wrong there ends the process: a libLLVM that aborts, a driver
-that crashes.
+The kernel has a separate process, because what can go wrong there ends the process: a libLLVM that
+aborts, a driver that crashes.
 
     python -m airlight.reports.machine.doctor
 
@@ -114,8 +115,13 @@ class Doctor(Result):
     def lines(self) -> Sequence[str]:
         """The cache, and the verdict."""
         cache = self.cache
-        lines = [f"cache {cache.folder}: {cache.files} files, {_size(cache.bytes)} of at most {_size(cache.limit)}"]
-        lines += [f"  {kind}: {of.files} files, {_size(of.bytes)}" for kind, of in cache.kinds.items()]
+        lines = [
+            f"cache {cache.folder}: {cache.files} files, {_size(cache.bytes)} of at most "
+            f"{_size(cache.limit)}"
+        ]
+        lines += [
+            f"  {kind}: {of.files} files, {_size(of.bytes)}" for kind, of in cache.kinds.items()
+        ]
         if cache.freed is not None:
             lines.append(f"  {cache.removed} files removed, {_size(cache.freed)} freed")
         ready = "Everything that airlight needs works."
@@ -128,7 +134,9 @@ class Doctor(Result):
 
     @property
     def status(self) -> int:
-        """The exit status: 3 where no kernel can be run, 1 where the cache was to be cleared and files are left."""
+        """The exit status: 3 where no kernel can be run, 1 where the cache was to be
+        cleared and files are left.
+        """
         return super().status if self.works else 3
 
     @property
@@ -140,10 +148,11 @@ class Doctor(Result):
 def doctor(*, clear_cache: bool = False) -> Doctor:
     """Show what works on this machine, and how to fix what does not.
 
-    The command examines Python and its packages, LLVM, CUDA, OptiX, OpenGL for shaders, a test kernel in a separate
-    process, and the cache: finished references and results lie in `~/.cache/airlight` (or in
-    `$XDG_CACHE_HOME/airlight`). `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than
-    4 GiB (500MB, 20GiB; 0 keeps nothing): above it the files that were used longest ago are removed.
+    The command examines Python and its packages, LLVM, CUDA, OptiX, OpenGL for shaders, a test
+    kernel in a separate process, and the cache: finished references and results lie in
+    `~/.cache/airlight` (or in `$XDG_CACHE_HOME/airlight`). `AIRLIGHT_CACHE_DIR` names another
+    folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps nothing): above it
+    the files that were used longest ago are removed.
 
     Exit status 3 if no kernel can be run, 1 if a file of the cache could not be removed.
 
@@ -165,16 +174,33 @@ def doctor(*, clear_cache: bool = False) -> Doctor:
 def _cache(*, clear: bool) -> Cache:
     """Return how much is cached, after everything is removed where that is asked for."""
     from airlight.errors import InputError
-    from airlight.reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
+    from airlight.reference.storage.cache import (
+        cache_entries,
+        cache_folder,
+        cache_limit,
+        clear_cache,
+    )
 
     folder = cache_folder()
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"the cache {folder} is not a folder; remove it, or name another by AIRLIGHT_CACHE_DIR")
+        raise InputError(
+            f"the cache {folder} is not a folder; remove it, or name another by AIRLIGHT_CACHE_DIR"
+        )
     removed = clear_cache() if clear else (None, None)
     entries = cache_entries()
-    sizes = {kind: [each.size for each in entries if each.kind == kind] for kind in sorted({e.kind for e in entries})}
+    sizes = {
+        kind: [each.size for each in entries if each.kind == kind]
+        for kind in sorted({e.kind for e in entries})
+    }
     kinds = {kind: Files(len(each), sum(each)) for kind, each in sizes.items()}
-    return Cache(str(folder), cache_limit(), len(entries), sum(each.size for each in entries), kinds, *removed)
+    return Cache(
+        str(folder),
+        cache_limit(),
+        len(entries),
+        sum(each.size for each in entries),
+        kinds,
+        *removed,
+    )
 
 
 def _size(size: float) -> str:
@@ -183,7 +209,9 @@ def _size(size: float) -> str:
     while size >= 1024 and len(units) > 1:
         size /= 1024
         units.pop(0)
-    return f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "bytes" else f"{size:.3g} {units[0]}"
+    return (
+        f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "bytes" else f"{size:.3g} {units[0]}"
+    )
 
 
 def diagnose() -> Machine:
@@ -199,7 +227,9 @@ def diagnose() -> Machine:
         problem = str(error)
     checks = [Check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")]
     for name, version in versions().items():
-        details = {"airlight": build().words, "python": f"{version}, {sys.executable}"}.get(name, version)
+        details = {"airlight": build().words, "python": f"{version}, {sys.executable}"}.get(
+            name, version
+        )
         checks.append(Check(name, version != "missing", details))
     libraries = find_llvm()
     for llvm in libraries:
@@ -216,16 +246,22 @@ def diagnose() -> Machine:
         loaded = f"; loaded {kernel.library}" if kernel.library else ""
         details = f"ran in {kernel.seconds:.1f} s on {kernel.threads} threads{loaded}"
         checks.append(Check("test kernel", True, details))
-        checks.append(Check("shadow-ray epsilon", None, f"{kernel.epsilon:.4g}, relative; measured"))
+        checks.append(
+            Check("shadow-ray epsilon", None, f"{kernel.epsilon:.4g}, relative; measured")
+        )
     elif variant:
         checks.append(Check("test kernel", False, "failed"))
     return Machine(problem is None, problem, variant, kernel, tuple(checks))
 
 
 def try_kernel(variant: str) -> Kernel:
-    """Run a kernel in a separate process; raises EndedError or MissingError where it does not work."""
+    """Run a kernel in a separate process; raises EndedError or
+    MissingError where it does not work.
+    """
     took = stopwatch()
-    kernel = in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
+    kernel = in_own_process(
+        probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant
+    )
     return replace(kernel, seconds=took().seconds)
 
 
@@ -240,7 +276,9 @@ def probe() -> Kernel:
     towards = scene.ray_intersect(mi.Ray3f(mi.Point3f([0, 3], 0, -2), mi.Vector3f(0, 0, 1)))
     distances = towards.t.numpy().tolist()
     if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
-        raise MissingError(f"the test kernel is wrong: distances {distances}, expected 1.5 and infinity")
+        raise MissingError(
+            f"the test kernel is wrong: distances {distances}, expected 1.5 and infinity"
+        )
     return Kernel(mi.variant(), dr.thread_count(), _loaded_llvm(), measure_shadow_epsilon())
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A driver of OpenGL is judged before its images are: the exported kernel `exact` over the certified integrals.
+"""A driver of OpenGL is judged before its images are: the exported kernel `exact` over
+the certified integrals.
 
 A driver beyond `realtime.export.text.CONFORMING` computes other fog than its shader says.
 """
@@ -31,15 +32,24 @@ void main() {
 
 
 def exported_values(host: ShaderHost, text: str, columns: Sequence[Any]) -> NDArray[np.float64]:
-    """Return J [1/m] of rays by an exported GLSL text on a driver; not a number where it does not compile.
+    """Return J [1/m] of rays by an exported GLSL text on a driver; not a number
+    where it does not compile.
 
     `columns`: foot, height, x0, x1 [m], sigma_t [1/m] and g, of shape (n,), n at most 16384.
     """
-    stacked = np.stack([np.broadcast_to(column, np.shape(columns[0])) for column in columns], axis=1)
+    stacked = np.stack(
+        [np.broadcast_to(column, np.shape(columns[0])) for column in columns], axis=1
+    )
     given = np.zeros((2, len(stacked), 4), dtype=np.float32)
     given[0], given[1, :, :2] = np.minimum(stacked[:, :4], 3e38), stacked[:, 4:]
     whole = f"#version 430 core\n{text}{_MAIN}"
-    stage = {"name": "rows", "text": whole, "kind": "picture", "size": [len(stacked), 1], "format": "rgba32f"}
+    stage = {
+        "name": "rows",
+        "text": whole,
+        "kind": "picture",
+        "size": [len(stacked), 1],
+        "format": "rgba32f",
+    }
     said, _ = host.ask("open", stages=[stage])
     if "log" in said:
         return np.full(len(stacked), math.nan)
@@ -61,18 +71,28 @@ def error_of_device(device: str, *, host: ShaderHost) -> float:
 
 
 def driver_error(host: ShaderHost, kernel: str = "exact", phase: str = "hg") -> tuple[float, int]:
-    """Return the largest relative error on the certified integrals, infinite where one is not finite, and their number.
+    """Return the largest relative error on the certified integrals, infinite where one is not
+    finite, and their number.
 
     `host` must be a new one. `phase` is in words, see `realtime.scene.phase.named_phase`.
     """
     columns, expected = certified_rays(phase)
-    error = np.abs(exported_values(host, kernel_text(kernel, named_phase(phase), "glsl"), columns) / expected - 1)
+    error = np.abs(
+        exported_values(host, kernel_text(kernel, named_phase(phase), "glsl"), columns) / expected
+        - 1
+    )
     return float(error.max()) if np.isfinite(error).all() else math.inf, len(expected)
 
 
 def certified_rays(phase: str) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return the columns that `exported_values` takes of the certified rays of a phase function, and their J [1/m]."""
-    cases = read_cases(certified_data(f"airlight_integral{'_droplets' if phase.startswith('hg-draine') else ''}.csv"))
+    """Return the columns that `exported_values` takes of the certified rays of a phase
+    function, and their J [1/m].
+    """
+    cases = read_cases(
+        certified_data(
+            f"airlight_integral{'_droplets' if phase.startswith('hg-draine') else ''}.csv"
+        )
+    )
     assert cases.value is not None
     # With g = 0 Henyey and Greenstein's function is the isotropic one.
     own = np.isin(cases.phase, ("isotropic", "hg") if phase == "hg" else (phase,))

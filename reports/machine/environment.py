@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The environment of this machine, and the check that every command runs before its first kernel.
 
-Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only place that sets a Mitsuba variant.
+Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only place
+that sets a Mitsuba variant.
 """
 
 import ctypes
@@ -28,21 +29,30 @@ if TYPE_CHECKING:
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
 VARIANT_VARIABLE = "AIRLIGHT_VARIANT"
 
-_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "OpenEXR", "colour-science", "matplotlib")
+_PACKAGES = (
+    "mitsuba",
+    "drjit",
+    "numpy",
+    "scipy",
+    "mpmath",
+    "OpenEXR",
+    "colour-science",
+    "matplotlib",
+)
 
 
 class MissingError(RuntimeError):
     """Something that airlight needs is missing on this machine.
 
-    The message is one line that says what is missing and what to type. The command line prints it without a
-    traceback and exits with status 3.
+    The message is one line that says what is missing and what to type. The command line prints it
+    without a traceback and exits with status 3.
     """
 
     extra: str | None = None  #: whose packages are missing, where it is these
 
 
-#: Threads of Dr.Jit. With one, Mitsuba 3.9.1 never ends reading or writing an EXR file: its tasks wait for a thread
-#: beside the caller, and there is none. A machine of one core has one by default.
+#: Threads of Dr.Jit. With one, Mitsuba 3.9.1 never ends reading or writing an EXR file: its tasks
+#: wait for a thread beside the caller, and there is none. A machine of one core has one by default.
 LEAST_THREADS = 2
 
 
@@ -55,12 +65,13 @@ class Prepared:
 
 
 def prepare(variant: str | None = None) -> Prepared:
-    """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use; raises MissingError if one is
-    missing.
+    """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use; raises
+    MissingError if one is missing.
 
-    Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds. Where
-    ``AIRLIGHT_COMPILATION`` is ``quick``, kernels compile quickly and run slowly (`reports.machine.quick_compilation`).
-    The variant is by default ``AIRLIGHT_VARIANT``, else the best that works.
+    Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few
+    milliseconds. Where ``AIRLIGHT_COMPILATION`` is ``quick``, kernels compile quickly and run
+    slowly (`reports.machine.quick_compilation`). The variant is by default ``AIRLIGHT_VARIANT``,
+    else the best that works.
     """
     variant = variant or os.environ.get(VARIANT_VARIABLE) or None
     if variant is not None:
@@ -69,12 +80,17 @@ def prepare(variant: str | None = None) -> Prepared:
         reason = cuda_problem()
         if variant is not None and reason:
             raise MissingError(
-                f"the variant cuda_ad_rgb does not work here: {reason}; set {VARIANT_VARIABLE}=llvm_ad_rgb"
+                f"the variant cuda_ad_rgb does not work here: {reason}; set "
+                f"{VARIANT_VARIABLE}=llvm_ad_rgb"
             )
         variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
     on_processor = variant == "llvm_ad_rgb"
     llvm = next(iter(find_llvm()), None)
-    problems = [problem for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem()) if problem]
+    problems = [
+        problem
+        for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem())
+        if problem
+    ]
     if problems:
         packages = missing_packages()
         install = f". To install what is missing: {install_line(packages)}" if packages else ""
@@ -107,12 +123,16 @@ def activate(variant: str | None = None) -> str:
     try:
         import mitsuba as mi
     except ImportError as error:
-        raise MissingError(f"mitsuba cannot be imported ({error}): run `pip install mitsuba==3.9.1`") from error
+        raise MissingError(
+            f"mitsuba cannot be imported ({error}): run `pip install mitsuba==3.9.1`"
+        ) from error
 
     try:
         mi.set_variant(chosen.variant)
     except ImportError as error:  # the library exists but cannot be loaded
-        raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
+        raise MissingError(
+            f"{chosen.variant} does not start ({error}); see `airlight doctor`"
+        ) from error
     import drjit as dr
 
     from airlight.reports.machine.mitsuba_log import log_to_error_stream
@@ -126,14 +146,17 @@ def require(package: str, extra: str, what: str) -> None:
     """Raise MissingError where a package of an extra is not installed, before any work."""
     if importlib.util.find_spec(package) is None:
         error = MissingError(
-            f"{what} needs the package {package}: `./airlight` brings it in a clone, `pip install {package}` elsewhere"
+            f"{what} needs the package {package}: `./airlight` brings it in a clone, `pip install "
+            f"{package}` elsewhere"
         )
         error.extra = extra
         raise error
 
 
 def child_environment(variant: str | None = None) -> dict[str, str]:
-    """Return the environment of a child process: our modules, those of PYTHONPATH, and a variant, else the current."""
+    """Return the environment of a child process: our modules, those of PYTHONPATH, and a
+    variant, else the current.
+    """
     # Not resolved: in a checkout src/airlight has links to the folders.
     paths = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
     mitsuba = sys.modules.get("mitsuba")
@@ -148,12 +171,15 @@ def check_variant(variant: str) -> None:
 
     if variant not in VARIANTS:
         raise InputError(
-            f"variant: got {variant!r}, expected one of {', '.join(VARIANTS)}" + nearest(variant, VARIANTS)
+            f"variant: got {variant!r}, expected one of {', '.join(VARIANTS)}"
+            + nearest(variant, VARIANTS)
         )
 
 
 def atomic_problem() -> str:
-    """Say what is wrong with libatomic, without which `import drjit` fails; nothing wrong gives an empty string."""
+    """Say what is wrong with libatomic, without which `import drjit` fails; nothing
+    wrong gives an empty string.
+    """
     if sys.platform != "linux":
         return ""
     try:
@@ -206,7 +232,9 @@ def processor() -> str:
 
     named = ""
     with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-        named = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+        named = next(
+            (line.partition(":")[2].strip() for line in lines if line.startswith("model name")), ""
+        )
     return named or platform.processor() or platform.machine()
 
 
@@ -256,9 +284,14 @@ def describe_environment() -> dict[str, object]:
 
 
 def machine() -> dict[str, str]:
-    """Return the parts of the environment that times depend on, for the keys of results with times."""
+    """Return the parts of the environment that times depend on, for the
+    keys of results with times.
+    """
     environment = describe_environment()
-    return {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
+    return {
+        name: str(environment.get(name))
+        for name in ("processor", "threads", "variant", "llvm", "device")
+    }
 
 
 def machine_in_words(environment: Mapping[str, Any]) -> str:

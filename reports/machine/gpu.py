@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether CUDA and OptiX work here, each with the reason: asked of the driver, without Dr.Jit.
 
-Dr.Jit knows whether (`dr.has_backend`), but not why not, and it loads OptiX when the first ray is cast.
+Dr.Jit knows whether (`dr.has_backend`), but not why not, and it loads OptiX
+when the first ray is cast.
 
-The rules are those of drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which is driver 535, or
-newer; for OptiX not CUDA 12.7 (drivers 565 to 569, refused as miscompiling); compute capability 7.5 for the kernels
-that it ships.
+The rules are those of drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which
+is driver 535, or newer; for OptiX not CUDA 12.7 (drivers 565 to 569, refused as miscompiling);
+compute capability 7.5 for the kernels that it ships.
 """
 
 import ctypes
@@ -32,18 +33,30 @@ def cuda_status() -> Status:
     """Return whether Dr.Jit's CUDA backend can work, with the device's name or the reason."""
     cuda = _load("libcuda.so.1", "DRJIT_LIBCUDA_PATH")
     if cuda is None:
-        why = "libcuda.so.1 cannot be loaded" if sys.platform == "linux" else "it is looked for on Linux alone"
+        why = (
+            "libcuda.so.1 cannot be loaded"
+            if sys.platform == "linux"
+            else "it is looked for on Linux alone"
+        )
         return Status(False, f"no NVIDIA driver: {why}")
     error = cuda.cuInit(0)
     if error:
-        return Status(False, f"cuInit fails with error {error}" + (": no device" if error == 100 else ""))
+        return Status(
+            False, f"cuInit fails with error {error}" + (": no device" if error == 100 else "")
+        )
     version = _cuda_version(cuda)
     if version < _OLDEST_CUDA:
-        return Status(False, f"driver too old: CUDA {_dotted(version)}, 12.2 (driver 535) or newer is needed")
+        return Status(
+            False, f"driver too old: CUDA {_dotted(version)}, 12.2 (driver 535) or newer is needed"
+        )
     count = ctypes.c_int()
     if cuda.cuDeviceGetCount(ctypes.byref(count)) or not count.value:
         return Status(False, "no device")
-    device, name, numbers = ctypes.c_int(), ctypes.create_string_buffer(256), (ctypes.c_int(), ctypes.c_int())
+    device, name, numbers = (
+        ctypes.c_int(),
+        ctypes.create_string_buffer(256),
+        (ctypes.c_int(), ctypes.c_int()),
+    )
     failed = cuda.cuDeviceGet(ctypes.byref(device), 0)
     failed = failed or cuda.cuDeviceGetName(name, 256, device)
     for number, attribute in zip(numbers, (_CAPABILITY_MAJOR, _CAPABILITY_MINOR)):
@@ -63,12 +76,15 @@ def optix_status() -> Status:
     if cuda is None:
         return Status(False, "no NVIDIA driver")
     if _cuda_version(cuda) == _MISCOMPILING_CUDA:
-        return Status(False, "Dr.Jit refuses drivers 565 to 569, they miscompile: use an older or a newer one")
+        return Status(
+            False, "Dr.Jit refuses drivers 565 to 569, they miscompile: use an older or a newer one"
+        )
     optix = _load("libnvoptix.so.1", "DRJIT_LIBOPTIX_PATH")
     if optix is None:
         return Status(
             False,
-            "libnvoptix.so.1 cannot be loaded: install the graphics part of the driver (libnvidia-gl-<version>), in a "
+            "libnvoptix.so.1 cannot be loaded: install the graphics part of the driver "
+            "(libnvidia-gl-<version>), in a "
             "container ask for the driver capability `graphics`",
         )
     if not hasattr(optix, "optixQueryFunctionTable"):

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Installs airlight, what it needs and the packages of some extras into the environment of the Python that runs it.
+"""Installs airlight, what it needs and the packages of some extras into the environment of
+the Python that runs it.
 
     .venv/bin/python -I reports/machine/install.py sweep view
 
-The launcher runs this where nothing is installed but pip. Versions and checksums are those of uv.lock: uv and pip, from
-any index, install these files or nothing.
+The launcher runs this where nothing is installed but pip. Versions and checksums are those of
+uv.lock: uv and pip, from any index, install these files or nothing.
 """
 
 import os
@@ -19,7 +20,8 @@ _ROOT = Path(__file__).resolve().parents[2]
 
 
 def requirements(extras: Iterable[str], root: Path = _ROOT) -> list[str]:
-    """Return a line with version and checksums for every package that airlight with some extras needs in this Python.
+    """Return a line with version and checksums for every package that airlight with some
+    extras needs in this Python.
 
     Raises
     ------
@@ -35,14 +37,22 @@ def requirements(extras: Iterable[str], root: Path = _ROOT) -> list[str]:
     while waiting:
         wanted = waiting.pop()
         name, inner = wanted["name"], wanted.get("extra", [])
-        if (name, *inner) in done or ("marker" in wanted and not Marker(wanted["marker"]).evaluate()):
+        if (name, *inner) in done or (
+            "marker" in wanted and not Marker(wanted["marker"]).evaluate()
+        ):
             continue
         done.add((name, *inner))
         # Where Pythons need several versions of a package, the requirement names one.
         several = [each for each in packages if each["name"] == name]
-        package = next(each for each in several if each["version"] == wanted.get("version", each["version"]))
+        package = next(
+            each for each in several if each["version"] == wanted.get("version", each["version"])
+        )
         files = [*package.get("wheels", []), *([package["sdist"]] if "sdist" in package else [])]
-        lines.add(" ".join([f"{name}=={package['version']}", *(f"--hash={file['hash']}" for file in files)]))
+        lines.add(
+            " ".join(
+                [f"{name}=={package['version']}", *(f"--hash={file['hash']}" for file in files)]
+            )
+        )
         waiting += _needs(package, inner)
     return sorted(lines)
 
@@ -53,8 +63,12 @@ def _needs(package: dict[str, Any], extras: Iterable[str]) -> Iterator[dict[str,
         yield from package["optional-dependencies"][extra]
 
 
-def install(extras: Sequence[str], root: Path = _ROOT, environment: Path = Path(sys.prefix)) -> bool:
-    """Install by uv, which takes a tenth of pip's time, or by pip, which knows the user's index and proxy."""
+def install(
+    extras: Sequence[str], root: Path = _ROOT, environment: Path = Path(sys.prefix)
+) -> bool:
+    """Install by uv, which takes a tenth of pip's time, or by pip, which knows
+    the user's index and proxy.
+    """
     listed, lines = environment / "airlight-packages.txt", requirements(extras, root)
     uv, pip = environment / "bin" / "uv", [sys.executable, "-m", "pip"]
     by_uv = [str(uv), "pip", "install", "--quiet", "--no-deps", "--python", sys.executable]
@@ -68,13 +82,20 @@ def install(extras: Sequence[str], root: Path = _ROOT, environment: Path = Path(
     _write(listed, lines)
     installer = by_uv if _run(by_uv + locked, quiet=True) else by_pip
     if installer is by_pip:
-        print("airlight: uv cannot install here: pip installs the same versions, which takes longer", file=sys.stderr)
+        print(
+            "airlight: uv cannot install here: pip installs the same versions, which takes longer",
+            file=sys.stderr,
+        )
         _write(listed, [line for line in lines if not line.startswith("uv==")])
         if not _run(by_pip + locked):
             return False
 
-    # The project itself is links to the checkout: it is installed again only where its declaration has changed.
-    declared, installed = (root / "pyproject.toml").read_bytes(), environment / "airlight-pyproject.toml"
+    # The project itself is links to the checkout: it is installed again only where its
+    # declaration has changed.
+    declared, installed = (
+        (root / "pyproject.toml").read_bytes(),
+        environment / "airlight-pyproject.toml",
+    )
     if installed.exists() and installed.read_bytes() == declared:
         return True
     if not _run([*installer, "--no-build-isolation", "-e", str(root)]):
@@ -88,10 +109,19 @@ def _write(path: Path, lines: Sequence[str]) -> None:
 
 
 def _run(command: Sequence[str], *, quiet: bool = False) -> bool:
-    """Return whether a command succeeded; settings of the user cannot turn it to another environment."""
-    environment = {name: value for name, value in os.environ.items() if name != "UV_SYSTEM_PYTHON"} | {"PIP_USER": "0"}
+    """Return whether a command succeeded; settings of the user cannot turn
+    it to another environment.
+    """
+    environment = {
+        name: value for name, value in os.environ.items() if name != "UV_SYSTEM_PYTHON"
+    } | {"PIP_USER": "0"}
     try:
-        return subprocess.run(command, env=environment, stderr=subprocess.DEVNULL if quiet else None).returncode == 0
+        return (
+            subprocess.run(
+                command, env=environment, stderr=subprocess.DEVNULL if quiet else None
+            ).returncode
+            == 0
+        )
     except OSError:
         return False
 

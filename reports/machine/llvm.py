@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Find a libLLVM that works, before Dr.Jit picks one that does not.
 
-Dr.Jit 1.5 compiles its kernels with whatever libLLVM it meets first: the file named by `DRJIT_LIBLLVM_PATH`, else
-`libLLVM.so` as the dynamic linker finds it, else the newest of `/usr/lib/<multiarch>/libLLVM*.so.*` (drjit-core,
-`src/llvm_api.cpp`). It accepts version 11 and newer, but 14 and 15, Debian 12's default, abort the process in the
-kernels of Mitsuba's volumetric path tracer. The choice is therefore made here, from file names alone: nothing is
-loaded, because a library that is loaded wins over any later setting.
+Dr.Jit 1.5 compiles its kernels with whatever libLLVM it meets first: the file named by
+`DRJIT_LIBLLVM_PATH`, else `libLLVM.so` as the dynamic linker finds it, else the newest of
+`/usr/lib/<multiarch>/libLLVM*.so.*` (drjit-core, `src/llvm_api.cpp`). It accepts version 11 and
+newer, but 14 and 15, Debian 12's default, abort the process in the kernels of Mitsuba's volumetric
+path tracer. The choice is therefore made here, from file names alone: nothing is loaded, because a
+library that is loaded wins over any later setting.
 """
 
 import os
@@ -19,7 +20,8 @@ from pathlib import Path
 OLDEST_LLVM = 17
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
-# Folders of the distributions and apt.llvm.org, of Homebrew, and of archives unpacked in /opt or /usr/local.
+# Folders of the distributions and apt.llvm.org, of Homebrew, and of archives
+# unpacked in /opt or /usr/local.
 _FOLDERS = (
     *(
         f"usr/lib/{os.uname().machine}-linux-gnu",
@@ -29,11 +31,17 @@ _FOLDERS = (
         "usr/lib",
         "usr/local/lib",
     ),
-    *("home/linuxbrew/.linuxbrew/opt/llvm*/lib", "opt/[lL][lL][vV][mM]*/lib", "usr/local/[lL][lL][vV][mM]*/lib"),
+    *(
+        "home/linuxbrew/.linuxbrew/opt/llvm*/lib",
+        "opt/[lL][lL][vV][mM]*/lib",
+        "usr/local/[lL][lL][vV][mM]*/lib",
+    ),
 )
-# libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, without a version libLLVM.so; not the libraries of single
-# components, such as libLLVMCore.so.19.1.
-_LIBRARY = re.compile(r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.so[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.so)")
+# libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, without a version libLLVM.so; not the
+# libraries of single components, such as libLLVMCore.so.19.1.
+_LIBRARY = re.compile(
+    r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.so[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.so)"
+)
 _ASK_VERSION = (
     "import ctypes, sys\n"
     "numbers = [ctypes.c_uint() for _ in range(3)]\n"
@@ -58,22 +66,41 @@ class Llvm:
 
 
 def llvm_folders() -> list[Path]:
-    """Return the folders in which a libLLVM may lie: those of LD_LIBRARY_PATH, of conda, and of the system."""
+    """Return the folders in which a libLLVM may lie: those of LD_LIBRARY_PATH, of
+    conda, and of the system.
+    """
     named = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
-    conda = [Path(prefix, "lib") for prefix in (sys.prefix, os.environ.get("CONDA_PREFIX")) if prefix]
-    return [*named, *conda, *(path for each in _FOLDERS for path in sorted(Path("/").glob(each), reverse=True))]
+    conda = [
+        Path(prefix, "lib") for prefix in (sys.prefix, os.environ.get("CONDA_PREFIX")) if prefix
+    ]
+    return [
+        *named,
+        *conda,
+        *(path for each in _FOLDERS for path in sorted(Path("/").glob(each), reverse=True)),
+    ]
 
 
 def find_llvm() -> list[Llvm]:
-    """List every libLLVM of this machine: the user's setting first, then those that work, then the newest."""
+    """List every libLLVM of this machine: the user's setting first, then those
+    that work, then the newest.
+    """
     setting = os.environ.get(LLVM_VARIABLE)
     seen: dict[str, Llvm] = {}
     for path in _libraries(llvm_folders()):
         seen.setdefault(os.path.realpath(path), examine_llvm(str(path)))
-    libraries = sorted(seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True)
+    libraries = sorted(
+        seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True
+    )
     if setting:
         own = examine_llvm(setting)
-        libraries = [own, *(llvm for llvm in libraries if os.path.realpath(llvm.path) != os.path.realpath(setting))]
+        libraries = [
+            own,
+            *(
+                llvm
+                for llvm in libraries
+                if os.path.realpath(llvm.path) != os.path.realpath(setting)
+            ),
+        ]
     return libraries
 
 
@@ -83,9 +110,19 @@ def examine_llvm(path: str) -> Llvm:
         return Llvm(path, None, False, "there is no such file")
     version = _version_of_name(path) or _version_asked(path)
     if version is None:
-        return Llvm(path, None, False, "its version is unknown: it has no LLVMGetVersion, so it is older than 16")
+        return Llvm(
+            path,
+            None,
+            False,
+            "its version is unknown: it has no LLVMGetVersion, so it is older than 16",
+        )
     if version[0] < OLDEST_LLVM:
-        return Llvm(path, version, False, f"too old: {OLDEST_LLVM} or newer is needed, 14 and 15 abort the process")
+        return Llvm(
+            path,
+            version,
+            False,
+            f"too old: {OLDEST_LLVM} or newer is needed, 14 and 15 abort the process",
+        )
     return Llvm(path, version, True, "works")
 
 
@@ -108,7 +145,9 @@ def _version_asked(path: str) -> tuple[int, int] | None:
     """Load the library in a separate process and ask it; slow, for names that do not tell."""
     command = [sys.executable, "-c", _ASK_VERSION, path]
     try:
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout.split()
+        answer = subprocess.run(
+            command, capture_output=True, text=True, timeout=30, check=True
+        ).stdout.split()
     except (OSError, subprocess.SubprocessError):
         return None
     return (int(answer[0]), int(answer[1])) if len(answer) == 2 else None

@@ -23,12 +23,16 @@ class _OncePerLine(mi.Appender):
             self._said.add(words)
             print(f"airlight: note: {words}", file=sys.stderr)
 
-    def log_progress(self, progress: float, name: str, formatted: str, eta: str, ptr: object = None) -> None:
+    def log_progress(
+        self, progress: float, name: str, formatted: str, eta: str, ptr: object = None
+    ) -> None:
         """Mitsuba's progress bars are not shown."""
 
 
 def log_to_error_stream() -> None:
-    """Let Mitsuba's messages go to the error stream; standard output stays for what commands print."""
+    """Let Mitsuba's messages go to the error stream; standard output stays
+    for what commands print.
+    """
     logger = mi.logger()
     formatter = logger.formatter()
     formatter.set_has_date(False)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A function run in a separate process: the user's code, which may end the process or never return, and work of ours
-whose kernels are to compile quickly.
+"""A function run in a separate process: the user's code, which may end the process or never return,
+and work of ours whose kernels are to compile quickly.
 
-The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the
-user's code and sends back the result of the function, or one after the other the values that it yields. Its prints go
-to the error stream, so that they do not mix with the command's output. `realtime/child_process.py` ends it.
+The caller sends the name of one of our functions with arguments that name scenes and methods; the
+process imports the user's code and sends back the result of the function, or one after the other
+the values that it yields. Its prints go to the error stream, so that they do not mix with the
+command's output. `realtime/child_process.py` ends it.
 """
 
 import sys
@@ -29,18 +30,20 @@ def in_own_process(
 ) -> Any:
     """Call a function in a new process; return what it returns, raise what it raises.
 
-    Values that a function yields are yielded here: the process goes on to the next value when that is asked for.
-    It ends with the last one, or when the iterator that is returned here is closed. The variant is by default the
-    current one.
+    Values that a function yields are yielded here: the process goes on to the next value when that
+    is asked for. It ends with the last one, or when the iterator that is returned here is closed.
+    The variant is by default the current one.
 
-    The function is at the top of a module of ours and prints nothing on the output; arguments and result are pickled.
-    `what` and `name` name the work in messages. If it takes longer than `limit` [s] to the result, or to a value that
-    it yields, the process is ended: math.inf is never, None what the environment says of user methods. `quick` compiles
-    kernels quickly: nothing is timed. EndedError says that the process ended without an answer, or not in time.
+    The function is at the top of a module of ours and prints nothing on the output; arguments and
+    result are pickled. `what` and `name` name the work in messages. If it takes longer than `limit`
+    [s] to the result, or to a value that it yields, the process is ended: math.inf is never, None
+    what the environment says of user methods. `quick` compiles kernels quickly: nothing is timed.
+    EndedError says that the process ended without an answer, or not in time.
     """
     environment = child_environment(variant) | (quick_compilation.settings() if quick else {})
     answers = _answers(
-        ChildProcess(__name__, name=f"{what} {name}", limit=limit, environment=environment), (function, arguments)
+        ChildProcess(__name__, name=f"{what} {name}", limit=limit, environment=environment),
+        (function, arguments),
     )
     if next(answers):
         return answers
@@ -49,8 +52,12 @@ def in_own_process(
     return value
 
 
-def _answers(process: ChildProcess, task: tuple[Callable[..., Any], tuple[Any, ...]]) -> Generator[Any, None, None]:
-    """Yield whether a function in a new process yields values; then these values, or the one that it returns."""
+def _answers(
+    process: ChildProcess, task: tuple[Callable[..., Any], tuple[Any, ...]]
+) -> Generator[Any, None, None]:
+    """Yield whether a function in a new process yields values; then these values, or
+    the one that it returns.
+    """
     message: Any = (sys.argv, *task)
     yields = False
     try:

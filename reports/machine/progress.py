@@ -42,7 +42,8 @@ def _rich_bar(title: str) -> Iterator[Progress]:
     )
     start = time.monotonic()
     console = Console(stderr=True, color_system="auto" if colours_wanted() else None)
-    bar = Progress(*columns, console=console, transient=True)  # it prints messages of others above itself
+    # it prints messages of others above itself
+    bar = Progress(*columns, console=console, transient=True)
     task = bar.add_task(title, total=1.0, what="", left="")
     shown = False
 
@@ -52,7 +53,8 @@ def _rich_bar(title: str) -> Iterator[Progress]:
         if not shown and elapsed > _PATIENCE:
             shown = True
             bar.start()
-            console.show_cursor(True)  # Rich hides it, and Ctrl-C ends the process before it would show it again
+            # Rich hides it, and Ctrl-C ends the process before it would show it again
+            console.show_cursor(True)
         bar.update(task, completed=fraction, what=what, left=_left(elapsed, fraction))
 
     try:
@@ -71,13 +73,19 @@ def _plain_lines(title: str) -> Progress:
         if now - start < _PATIENCE or now - last < _PLAIN_EVERY:
             return
         last = now
-        print(f"{title}: {100 * fraction:.0f} %, {_left(now - start, fraction)}{what}", file=sys.stderr, flush=True)
+        print(
+            f"{title}: {100 * fraction:.0f} %, {_left(now - start, fraction)}{what}",
+            file=sys.stderr,
+            flush=True,
+        )
 
     return progress
 
 
 def _left(elapsed: float, fraction: float) -> str:
-    """Return the time left at the mean pace of all work; by the last half minute, one long part makes it jump."""
+    """Return the time left at the mean pace of all work; by the last half minute, one
+    long part makes it jump.
+    """
     return f"about {_clock(elapsed * (1 - fraction) / fraction)} left, " if fraction > 0 else ""
 
 
@@ -87,7 +95,9 @@ def _clock(seconds: float) -> str:
 
 
 def part_of(progress: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
-    """Return the callback for a part of some work, from fraction `first` to `last`; `before` precedes its words."""
+    """Return the callback for a part of some work, from fraction `first` to `last`;
+    `before` precedes its words.
+    """
     if progress is None:
         return lambda fraction, what: None
     # This form, unlike first + fraction (last - first), gives both ends exactly.
@@ -95,7 +105,9 @@ def part_of(progress: Progress | None, first: float, last: float, *, before: str
 
 
 def sharing(progress: Progress | None, parts: Iterable[tuple[str, float]]) -> list[Progress]:
-    """Return the callback for each part of some work: of a part the words before its own, and how long it will take."""
+    """Return the callback for each part of some work: of a part the words before its own,
+    and how long it will take.
+    """
     named = [(words, max(_LEAST, seconds)) for words, seconds in parts]
     ends = [0.0, *itertools.accumulate(seconds for _, seconds in named)]
     return [
@@ -105,7 +117,9 @@ def sharing(progress: Progress | None, parts: Iterable[tuple[str, float]]) -> li
 
 
 def counted(progress: Progress | None) -> Steps:
-    """Return the callback (done, total, what) for work that counts its steps; `progress` is called with fractions."""
+    """Return the callback (done, total, what) for work that counts its steps; `progress`
+    is called with fractions.
+    """
     if progress is None:
         return lambda done, total, what: None
     return lambda done, total, what: progress(done / total, what)

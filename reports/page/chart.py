@@ -8,7 +8,13 @@ from html import escape
 from typing import Any
 
 from airlight.reports.data.records import Scene
-from airlight.reports.plotting.figure import has_point, legend_below, new_figure, speed_chart, speed_panel
+from airlight.reports.plotting.figure import (
+    has_point,
+    legend_below,
+    new_figure,
+    speed_chart,
+    speed_panel,
+)
 from airlight.reports.plotting.style import page_style, report_styles
 
 _SIZE = {"markersize": 7}
@@ -24,12 +30,17 @@ def speed_error_chart(scenes: Sequence[Scene]) -> str:
 
 @page_style()
 def scene_chart(scenes: Sequence[Scene], place: int) -> str:
-    """Return speed against error in one of the scenes as inline SVG, in the styles of the whole report.
+    """Return speed against error in one of the scenes as inline SVG, in the
+    styles of the whole report.
 
-    The point of the n-th method that has images has the name "point-n", and says what it is under the pointer.
+    The point of the n-th method that has images has the name "point-n", and says what
+    it is under the pointer.
     """
     rows = ((row.method, row.label) for scene in scenes for row in scene.methods)
-    styles, scene = {label: style | _SIZE for label, style in report_styles(rows).items()}, scenes[place]
+    styles, scene = (
+        {label: style | _SIZE for label, style in report_styles(rows).items()},
+        scenes[place],
+    )
     figure = new_figure(5.2, 3.0)
     panel = figure.subplots()
     points = speed_panel(panel, scene.name, scene.methods, styles)
@@ -43,7 +54,8 @@ def scene_chart(scenes: Sequence[Scene], place: int) -> str:
             assert entry.error
             time, error = entry.times.frame.median_ms, entry.error.relative_rmse
             titles[name] = escape(f"{entry.label}: {time:.3g} ms, relative RMSE {error:.2g}")
-    # The first variant of a method stands for all: the strip of the errors beside the chart names every one.
+    # The first variant of a method stands for all: the strip of the errors beside
+    # the chart names every one.
     methods: dict[str, Any] = {}
     for entry in scene.methods:
         if entry.label in points:
@@ -56,13 +68,17 @@ def scene_chart(scenes: Sequence[Scene], place: int) -> str:
 
 
 def svg_text(figure, salt: str = "airlight") -> str:
-    """Return a figure of matplotlib as inline SVG, the same bytes for the same figure; each chart has its salt."""
+    """Return a figure of matplotlib as inline SVG, the same bytes for the same figure;
+    each chart has its salt.
+    """
     import matplotlib
 
-    # A fixed salt, another for each chart of a page, and no date: the same data give the same bytes.
+    # A fixed salt, another for each chart of a page, and no date: the same
+    # data give the same bytes.
     with matplotlib.rc_context({"svg.hashsalt": salt, "svg.fonttype": "none", "font.size": 9}):
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
     text = buffer.getvalue()
-    # The names that matplotlib counts would be there twice on a page of two charts, and so would those of equal images.
+    # The names that matplotlib counts would be there twice on a page of two charts, and so
+    # would those of equal images.
     return re.sub(r' id="([\w.]+_\d+|image[0-9a-f]+)"', "", text[text.index("<svg") :])

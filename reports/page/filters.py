@@ -10,7 +10,13 @@ from airlight.reports.data.records import Report, Scene
 from airlight.reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from airlight.reports.tables.costs import scaling_tables, stability_summary
 from airlight.reports.tables.drawing import DASH, html, sentence_in_html, typeset
-from airlight.reports.tables.methods import fastest_table, method_row, methods_table, published_as, times_words
+from airlight.reports.tables.methods import (
+    fastest_table,
+    method_row,
+    methods_table,
+    published_as,
+    times_words,
+)
 from airlight.reports.tables.papers import paper_tables
 from airlight.reports.tables.table import Column, Row, Table, table
 from airlight.reports.tables.table import number as plain_number
@@ -53,8 +59,11 @@ def words(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {words(entry)}" for key, entry in value.items())
     if isinstance(value, list | tuple):
-        size = len(value) == 2 and all(isinstance(entry, int) for entry in value)  # width and height
-        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(entry) for entry in value) or DASH
+        # width and height
+        size = len(value) == 2 and all(isinstance(entry, int) for entry in value)
+        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(
+            words(entry) for entry in value
+        ) or DASH
     return str(value)
 
 
@@ -118,13 +127,18 @@ def methods(scene: Scene) -> Table:
         return replace(made, remarks=(*made.remarks, f"published peer, {peer}")) if peer else made
 
     explanation = (
-        f"Times at {words(scene.timed)} pixels, medians, below those of a frame their quartiles; errors at "
-        f"{words(scene.size)} pixels, of the airlight against the reference, or of all light where an image has no "
-        "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away. "
+        f"Times at {words(scene.timed)} pixels, medians, below those of a frame their quartiles; "
+        "errors at "
+        f"{words(scene.size)} pixels, of the airlight against the reference, or of all light where "
+        "an image has no "
+        "layers (total). A method that knows no shadows is marked; its error is then the light "
+        "that shadows take away. "
         "Published peers, at the end, are papers as printed: their errors are theirs. "
     ) + times_words(scene.methods)
     rows = map(row, sorted(scene.methods, key=lambda entry: bool(published_as(entry))))
-    return methods_table(f"Times and errors of the methods in {scene.name}", rows, *_METHODS, explanation=explanation)
+    return methods_table(
+        f"Times and errors of the methods in {scene.name}", rows, *_METHODS, explanation=explanation
+    )
 
 
 def facts(title: str, entries: Any) -> Table:
@@ -132,7 +146,13 @@ def facts(title: str, entries: Any) -> Table:
     known = entries if isinstance(entries, Mapping) else asdict(entries)
     columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
     return table(
-        title, columns, [(key.replace("_", " "), words(value)) for key, value in known.items() if value is not None]
+        title,
+        columns,
+        [
+            (key.replace("_", " "), words(value))
+            for key, value in known.items()
+            if value is not None
+        ],
     )
 
 
@@ -158,14 +178,17 @@ def drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any
         from markupsafe import Markup
 
         made = function(*arguments)
-        return Markup("\n".join(html(each) for each in ([made] if isinstance(made, Table) else made)))
+        return Markup(
+            "\n".join(html(each) for each in ([made] if isinstance(made, Table) else made))
+        )
 
     return draw
 
 
 #: Functions that the templates call, by name.
 TABLES: dict[str, Callable[..., Any]] = {
-    "fastest_table": drawn(lambda scenes: replace(fastest_table(scenes), title="")),  # its heading says it
+    # its heading says it
+    "fastest_table": drawn(lambda scenes: replace(fastest_table(scenes), title="")),
     "methods_table": drawn(methods),
     "agreement_table": drawn(agreement_table),
     "trust_table": drawn(trust_table),

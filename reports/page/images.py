@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The images of a report as data for its page: packed, with an index that the page's script reads.
 
-Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
-each lies. A page has a limit of bytes; the largest scenes go down `STRIDES` until all fit: every pixel is kept, every
-second, third ... The index has which, and the page says so.
+Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the
+index that says where each lies. A page has a limit of bytes; the largest scenes go down `STRIDES`
+until all fit: every pixel is kept, every second, third ... The index has which, and the page says
+so.
 
-A page holds hundreds of images, as integers that compress well and that the browser decodes. Readers look at the
-errors, which must not drown in the rounding of the encoding: a half float moves a radiance by up to 5e-4, a good
-method by 1e-6. Therefore only the reference is stored as radiance; every other image is stored as its difference from
-the reference, relative as in `validation.metrics.errors`:
+A page holds hundreds of images, as integers that compress well and that the browser decodes.
+Readers look at the errors, which must not drown in the rounding of the encoding: a half float moves
+a radiance by up to 5e-4, a good method by 1e-6. Therefore only the reference is stored as radiance;
+every other image is stored as its difference from the reference, relative as in
+`validation.metrics.errors`:
 
     d = (test - reference) / max(|reference|, floor),        floor = 0.001 mean(reference)
     code = round(k asinh(d / s)),       k = 250, s = 1e-4     16 bits
@@ -17,14 +19,15 @@ which is linear for |d| < s and logarithmic above, so that the rounding of d is 
 
     (1/2k) sqrt(s^2 + d^2)  (+ terms of second order in 1/k)
 
-that is 0.2 % of a large error, and 2e-7 of the reference for a small one. The largest code stands for d = 1e52, which
-float32 does not reach. The reference keeps the upper 24 bits of each float32, rounded: 16 binary digits, to
-2^-16 = 1.5e-5 relative at most. `d` is taken against the rounded reference in the denominator and against the exact one
-in the difference, so that the errors do not see that rounding.
+that is 0.2 % of a large error, and 2e-7 of the reference for a small one. The largest code stands
+for d = 1e52, which float32 does not reach. The reference keeps the upper 24 bits of each float32,
+rounded: 16 binary digits, to 2^-16 = 1.5e-5 relative at most. `d` is taken against the rounded
+reference in the denominator and against the exact one in the difference, so that the errors do not
+see that rounding.
 
-A code is then predicted from the left, in the second and third channel from the first too; what remains, zigzag coded
-(0, -1, 1, -2, ...), goes byte by byte, low bytes first, into zlib. All arithmetic is modulo 2^bits, so decoding is
-exact. `templates/codec.js` is the decoder of the page.
+A code is then predicted from the left, in the second and third channel from the first too; what
+remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first, into zlib. All
+arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page.
 """
 
 import base64
@@ -53,29 +56,36 @@ STRIDES = (1, 2, 3, 4, 6, 8, 12, 16)  #: of the pixels that are kept
 REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
 LARGEST = 32766  #: code of the largest finite difference
 NAN, INFINITE = -32768, 32767  #: codes of values that are not finite; minus infinity is -INFINITE
-K, S = 250.0, 1e-4  #: codes for each factor e of a large difference, and where the scale turns from linear
+#: codes for each factor e of a large difference, and where the scale turns from linear
+K, S = 250.0, 1e-4
 
 
 @dataclass(frozen=True)
 class SceneImages:
     """The images of one scene for the page."""
 
-    index: dict[str, Any]  #: what the page's script reads, JSON-ready; offsets count the bytes before base64
+    #: what the page's script reads, JSON-ready; offsets count the bytes before base64
+    index: dict[str, Any]
     data: str  #: all packed planes, in base64
 
 
 def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[SceneImages]:
-    """Return the images of scenes of report.json from a folder, all together in at most `limit` characters.
+    """Return the images of scenes of report.json from a folder, all together in at
+    most `limit` characters.
 
     Every scene begins with all pixels; while the page is too large the largest goes down `STRIDES`.
     """
     packed = [packed_scene(scene, folder, STRIDES[0]) for scene in scenes]
     while (total := sum(len(images.data) for images in packed)) > limit:
-        coarser = [place for place, images in enumerate(packed) if images.index["stride"] < STRIDES[-1]]
+        coarser = [
+            place for place, images in enumerate(packed) if images.index["stride"] < STRIDES[-1]
+        ]
         if not coarser:
             raise InputError(
-                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {STRIDES[-1]} "
-                f"along both axes, expected at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
+                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in "
+                f"{STRIDES[-1]} "
+                f"along both axes, expected at most {limit / 1e6:.1f} MB; report fewer scenes or "
+                "methods at once"
             )
         largest = max(coarser, key=lambda place: len(packed[place].data))
         stride = STRIDES[STRIDES.index(packed[largest].index["stride"]) + 1]
@@ -84,30 +94,38 @@ def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[Scene
 
 
 def read_images(scene: Scene, folder: Path) -> list[dict[str, Array]]:
-    """Return the layers of the files of a scene of report.json: of the reference, then of each method with images."""
+    """Return the layers of the files of a scene of report.json: of the reference, then of
+    each method with images.
+    """
     reference = _layers(folder / scene.files.exr)
     files = [folder / entry.files["exr"] for entry in scene.methods if entry.files]
-    methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
+    # not in parallel: reading turns the standard error stream off
+    methods = [_layers(path) for path in files]
     size = reference["airlight"].shape
     for path, layers in zip(files, methods):
         for layer in layers.values():
             if layer.shape != size:
                 raise InputError(
-                    f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, expected the {size[1]} x {size[0]} of "
+                    f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, expected the "
+                    f"{size[1]} x {size[0]} of "
                     "the scene's reference; make the report again"
                 )
     return [reference, *methods]
 
 
 def _layers(path: Path) -> dict[str, Array]:
-    """Return the layers of a file that the page shows: airlight and surface, or the total where it has no airlight."""
+    """Return the layers of a file that the page shows: airlight and surface, or the total
+    where it has no airlight.
+    """
     layers = read_exr(path).layers
     wanted = [*(LAYERS if "airlight" in layers else (TOTAL,)), FLIP_LAYER]
     return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
 
 
 def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
-    """Return the images of a scene of report.json for the page: one pixel in `stride` along both axes."""
+    """Return the images of a scene of report.json for the page: one pixel in
+    `stride` along both axes.
+    """
 
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
         return {name: layer[::stride, ::stride] for name, layer in layers.items()}
@@ -136,7 +154,9 @@ def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
         packed_layers = {}
         for name, layer in thin(tested[number]).items():
             if name == FLIP_LAYER:
-                levels = np.round(FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(np.int32)
+                levels = np.round(
+                    FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)
+                ).astype(np.int32)
                 packed_layers[name] = pack_planes(levels, FLIP_BITS)
             else:
                 relative = relative_difference(exact[name], rounded[name], layer, floors[name])
@@ -166,7 +186,8 @@ def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
 
 
 def relative_difference(exact: Array, rounded: Array, test: Array, floor: float) -> Array:
-    """Return the difference of an image from the reference, in units of the larger of that and a positive floor.
+    """Return the difference of an image from the reference, in units of the larger of
+    that and a positive floor.
 
     `rounded` is the reference as the page will have it, which it multiplies with.
     """
@@ -189,7 +210,9 @@ def _floor(reference: Array | None) -> float:
 
 
 def reference_codes(radiance: NDArray[np.floating]) -> Codes:
-    """Return the upper 24 bits of float32 values of any shape, rounded to nearest; every NaN has the same code."""
+    """Return the upper 24 bits of float32 values of any shape, rounded to nearest;
+    every NaN has the same code.
+    """
     with np.errstate(over="ignore"):  # values beyond float32 become infinite, as in the file
         single = np.ascontiguousarray(radiance, dtype=np.float32)
     bits = single.view(np.uint32).astype(np.int64)
@@ -213,7 +236,9 @@ def difference_codes(difference: Array) -> Codes:
 
 
 def pack_planes(codes: Codes, bits: int) -> bytes:
-    """Compress planes of codes, (height, width, planes), taken modulo 2^bits; bits are 8, 16 or 24."""
+    """Compress planes of codes, (height, width, planes), taken modulo
+    2^bits; bits are 8, 16 or 24.
+    """
     parts: list[bytes] = []
     for number in range(codes.shape[-1]):
         plane = codes[..., number].astype(np.int32) - (codes[..., 0] if number else 0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page of a report: report.json and its images as one self-contained HTML file.
 
-Styles, scripts and images are put into the file: it opens without a network, in any recent browser. The images go in as
-data (`reports.page.images`), decoded and drawn by the scripts in `templates/`.
+Styles, scripts and images are put into the file: it opens without a network, in any recent browser.
+The images go in as data (`reports.page.images`), decoded and drawn by the scripts in `templates/`.
 """
 
 import base64
@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 from airlight.errors import InputError
 from airlight.reports.data.records import Method, Report, Scene
 from airlight.reports.page.chart import scene_chart, speed_error_chart
-from airlight.reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words
+from airlight.reports.page.filters import (
+    FILTERS,
+    KINDS,
+    MARKS,
+    TABLES,
+    kept_words,
+    trust_words,
+    viewer_words,
+)
 from airlight.reports.page.images import SceneImages, page_images
 from airlight.reports.plotting.pictures import signed_colours, unsigned_colours
 
@@ -29,14 +37,19 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str:
-    """Return the HTML page of a report whose files lie in a folder; images are thinned out to keep the limit."""
+    """Return the HTML page of a report whose files lie in a folder; images are
+    thinned out to keep the limit.
+    """
     from markupsafe import Markup
 
     # A scene without any image has no viewer.
     with_images = [scene for scene in report.scenes if any(entry.files for entry in scene.methods)]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
-    lead = _lead(report.scenes, [place for place, scene in enumerate(report.scenes) if id(scene) in number_of])
+    lead = _lead(
+        report.scenes,
+        [place for place, scene in enumerate(report.scenes) if id(scene) in number_of],
+    )
     chart = "" if lead is None else Markup(scene_chart(report.scenes, lead))
     viewers = [
         _viewer(
@@ -60,20 +73,27 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
         chart=Markup(speed_error_chart(report.scenes)) if report.scenes else "",
         css=template_text("report.css"),
         scripts=[template_text(name) for name in SCRIPTS],
-        images=Markup(_script_json({"scenes": [scene_images.index for scene_images in images], "maps": _maps()})),
+        images=Markup(
+            _script_json(
+                {"scenes": [scene_images.index for scene_images in images], "maps": _maps()}
+            )
+        ),
         pixels=[Markup(scene_images.data) for scene_images in images],
         kept=kept_words(report),
     )
     if len(page.encode()) > limit:
         raise InputError(
-            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, expected at most {limit / 1e6:g} MB; "
+            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, expected at most "
+            f"{limit / 1e6:g} MB; "
             "report fewer scenes or methods at once"
         )
     return page
 
 
 def page_environment() -> "jinja2.Environment":
-    """Return the environment that renders the templates, with the filters and the marks of claims."""
+    """Return the environment that renders the templates, with the filters
+    and the marks of claims.
+    """
     import jinja2
 
     environment = jinja2.Environment(
@@ -95,12 +115,20 @@ def template_text(name: str) -> "Markup":
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
-def _viewer(scene: Scene, number: int, images: SceneImages, *, chart: str, folder: Path | None) -> dict[str, Any]:
-    """Return the values of the template of a viewer; with a folder also its first pictures, which need no script."""
+def _viewer(
+    scene: Scene, number: int, images: SceneImages, *, chart: str, folder: Path | None
+) -> dict[str, Any]:
+    """Return the values of the template of a viewer; with a folder also its first
+    pictures, which need no script.
+    """
     shown = [entry for entry in scene.methods if entry.files]
     first = _first_shown(shown)
     files = shown[first].files
-    named = {"reference": scene.files.picture, "method": files.get("picture"), "error": files.get("error")}
+    named = {
+        "reference": scene.files.picture,
+        "method": files.get("picture"),
+        "error": files.get("error"),
+    }
     return {
         "number": number,
         "shown": shown,
@@ -128,13 +156,15 @@ def _inline(path: Path) -> str:
             picture.convert("RGB").save(buffer, "WEBP", quality=80)
     except OSError as error:
         raise InputError(
-            f"{path} is no picture that can be read ({error}); expected the PNG of a report: measure again"
+            f"{path} is no picture that can be read ({error}); expected the PNG of a report: "
+            "measure again"
         ) from None
     return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
 
 def _lead(scenes: Sequence[Scene], shown: Sequence[int]) -> int | None:
-    """Return the place of the scene that opens the page: with the most edges between light and shadow; None for none.
+    """Return the place of the scene that opens the page: with the most edges between light
+    and shadow; None for none.
 
     The first of equals is taken; `shown` are the places of the scenes that have images.
     """
@@ -148,14 +178,22 @@ def _first_shown(methods: Sequence[Method]) -> int:
         rmse = getattr(methods[place].error, "relative_rmse", None)
         return float("inf") if rmse is None else rmse
 
-    ranked = sorted((place for place in range(len(methods)) if error(place) < float("inf")), key=error)
+    ranked = sorted(
+        (place for place in range(len(methods)) if error(place) < float("inf")), key=error
+    )
     return ranked[len(ranked) // 2] if ranked else 0
 
 
 def _maps() -> dict[str, str]:
     """Return the colour maps by name, their bytes in base64."""
-    maps = {"signed": signed_colours(), "relative": unsigned_colours("viridis"), "flip": unsigned_colours("magma")}
-    return {name: base64.b64encode(colours.tobytes()).decode("ascii") for name, colours in maps.items()}
+    maps = {
+        "signed": signed_colours(),
+        "relative": unsigned_colours("viridis"),
+        "flip": unsigned_colours("magma"),
+    }
+    return {
+        name: base64.b64encode(colours.tobytes()).decode("ascii") for name, colours in maps.items()
+    }
 
 
 def _script_json(value: Any) -> str:

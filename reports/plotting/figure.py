@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures for papers: an empty one, pictures in a grid, and how a figure becomes a file.
 
-Files hold nothing that varies from run to run, such as the date: the same numbers give the same bytes.
+Files hold nothing that varies from run to run, such as the date: the same
+numbers give the same bytes.
 """
 
 import io
@@ -19,12 +20,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Metadata without anything that differs from one run to the next.
-_METADATA: Mapping[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {"Software": None}}
+_METADATA: Mapping[str, dict[str, Any]] = {
+    ".pdf": {"CreationDate": None},
+    ".png": {"Software": None},
+}
 ENDINGS = tuple(_METADATA)
 
 
 def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "double") -> Path:
-    """Write a figure for a column, 'single' or 'double', as PDF or PNG, by the ending of the path; return the path."""
+    """Write a figure for a column, 'single' or 'double', as PDF or PNG, by the ending of
+    the path; return the path.
+    """
     with figure_style(column):
         write_bytes(path, file_bytes(draw(column), path.suffix))
     return path
@@ -45,7 +51,8 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def picture_grid(pictures: Sequence[tuple[str, Any]], column: str, *, across: int = 3) -> "Figure":
-    """Return a figure of pictures with titles, in rows of `across`, for a column, 'single' or 'double'.
+    """Return a figure of pictures with titles, in rows of `across`, for a
+    column, 'single' or 'double'.
 
     Pictures are (height, width, 3) in 8 bits, or (height, width) for shades of grey.
     """
@@ -65,24 +72,31 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
     panel.imshow(picture, interpolation="nearest", cmap="gray" if picture.ndim == 2 else None)
     panel.set(xticks=[], yticks=[])
     panel.grid(False)
-    panel.set_title(title, fontsize=size, parse_math=False)  # a dollar in a name must not begin a formula
+    # a dollar in a name must not begin a formula
+    panel.set_title(title, fontsize=size, parse_math=False)
 
 
 def has_point(entry: Row) -> bool:
-    """Return whether a method has a time and an error; an error of 0 has no place on a logarithmic axis."""
+    """Return whether a method has a time and an error; an error of 0 has no
+    place on a logarithmic axis.
+    """
     return bool(entry.times and entry.error and entry.error.relative_rmse)
 
 
-def speed_chart(scenes: Sequence[Scene], width: float, *, across: int, tallest: float, **marks: Any) -> "Figure":
+def speed_chart(
+    scenes: Sequence[Scene], width: float, *, across: int, tallest: float, **marks: Any
+) -> "Figure":
     """Return times of frames against errors, a panel for each scene that has any, and one legend.
 
-    A figure is `width` wide, a panel at most `tallest` high [inches]. Styles follow from all labels of a report, with
-    or without a point, and `marks` change them.
+    A figure is `width` wide, a panel at most `tallest` high [inches]. Styles follow from all labels
+    of a report, with or without a point, and `marks` change them.
     """
     timed = [scene for scene in scenes if any(map(has_point, scene.methods))]
     there = {entry.label for scene in timed for entry in scene.methods if has_point(entry)}
     rows = ((row.method, row.label) for scene in scenes for row in scene.methods)
-    styles = {label: style | marks for label, style in report_styles(rows).items() if label in there}
+    styles = {
+        label: style | marks for label, style in report_styles(rows).items() if label in there
+    }
     across = min(len(timed), across)
     down, lines = -(-len(timed) // across), -(-len(styles) // min(3, across))
     figure = new_figure(width, down * min(0.75 * width / across, tallest) + 0.14 * lines + 0.1)
@@ -96,19 +110,26 @@ def speed_chart(scenes: Sequence[Scene], width: float, *, across: int, tallest: 
     return figure
 
 
-def legend_below(figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int) -> None:
+def legend_below(
+    figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int
+) -> None:
     """Put the markers of labels below a figure."""
-    handles = [panel.plot([], [], **style, linestyle="none", label=short(label))[0] for label, style in styles.items()]
+    handles = [
+        panel.plot([], [], **style, linestyle="none", label=short(label))[0]
+        for label, style in styles.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 
 def speed_panel(
     panel: "Axes", title: str, entries: Iterable[Row], styles: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
+    """Draw times of frames, with quartiles, against errors of methods that have both;
+    return their points by label.
 
-    For a method that draws random numbers a bar goes down from its error to its bias, or to the largest possible bias.
-    A time that another program measured is hollow, and says so: it is of another run than the others.
+    For a method that draws random numbers a bar goes down from its error to its bias, or to the
+    largest possible bias. A time that another program measured is hollow, and says so: it is of
+    another run than the others.
     """
     points = {}
     for entry in filter(has_point, entries):
@@ -125,8 +146,16 @@ def speed_panel(
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
         if entry.times.run is None:
             style["markerfacecolor"] = "none"
-            panel.annotate("timed elsewhere", (frame.median_ms, error), (0, 5), textcoords="offset points", fontsize=5)
-        points[entry.label] = panel.errorbar([frame.median_ms], [error], xerr=spread, **style).lines[0]
+            panel.annotate(
+                "timed elsewhere",
+                (frame.median_ms, error),
+                (0, 5),
+                textcoords="offset points",
+                fontsize=5,
+            )
+        points[entry.label] = panel.errorbar(
+            [frame.median_ms], [error], xerr=spread, **style
+        ).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula
     plain_times(panel)
@@ -145,4 +174,6 @@ def plain_times(panel: "Axes") -> None:
 
 def short(label: str, most: int = 56) -> str:
     """Return a label that leaves room for others."""
-    return label if len(label) <= most else label[: most - 1].rstrip(" ,") + "\N{HORIZONTAL ELLIPSIS}"
+    return (
+        label if len(label) <= most else label[: most - 1].rstrip(" ,") + "\N{HORIZONTAL ELLIPSIS}"
+    )

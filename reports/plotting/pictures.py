@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures of radiance and of errors, as 8-bit arrays and PNG files.
 
-Pictures for comparison are linear up to white (`tone_mapped`): twice the radiance is shown twice as bright, and values
-above white are cut off. Previews and the gallery go through the curve of `preview`, which keeps the colours of lights
-and shows the dark of a room.
+Pictures for comparison are linear up to white (`tone_mapped`): twice the radiance is shown twice as
+bright, and values above white are cut off. Previews and the gallery go through the curve of
+`preview`, which keeps the colours of lights and shows the dark of a room.
 
-Equal steps of an error map look like equal steps of colour. The map of signed errors is made here: dark blue, over
-white in the middle, to dark red. Each arm is a quadratic Bezier curve in CAM16-UCS (Li et al. 2017), a space in which
-the distance of two colours is about how different they look, walked in equal steps of length. The arms are as long as
-one another within a few per cent, so that an error looks as large on either side. Values without a sign use viridis,
-HDR-FLIP uses magma, as its authors do; both are even by construction (van der Walt and Smith 2015). The nearest
-ready-made map with equally dark ends is colorcet's CET-D1A (Kovesi 2015): its steps differ by up to 34 % of their mean
-in CAM16-UCS, the steps here by 5 %, and its middle is not white.
+Equal steps of an error map look like equal steps of colour. The map of signed errors is made here:
+dark blue, over white in the middle, to dark red. Each arm is a quadratic Bezier curve in CAM16-UCS
+(Li et al. 2017), a space in which the distance of two colours is about how different they look,
+walked in equal steps of length. The arms are as long as one another within a few per cent, so that
+an error looks as large on either side. Values without a sign use viridis, HDR-FLIP uses magma, as
+its authors do; both are even by construction (van der Walt and Smith 2015). The nearest ready-made
+map with equally dark ends is colorcet's CET-D1A (Kovesi 2015): its steps differ by up to 34 % of
+their mean in CAM16-UCS, the steps here by 5 %, and its middle is not white.
 """
 
 import functools
@@ -40,7 +41,9 @@ _FINE = 4097  # points along each curve, from which equal steps are interpolated
 
 @functools.cache
 def signed_colours(steps: int = 127) -> Colours:
-    """Return the map of signed errors, (2 steps + 1, 3) in 8-bit sRGB: blue below, red above, white in the middle."""
+    """Return the map of signed errors, (2 steps + 1, 3) in 8-bit sRGB: blue below, red
+    above, white in the middle.
+    """
     import colour
 
     lightness_and_hue = np.concatenate([_arm(BLUE, steps)[:0:-1], _arm(RED, steps)])
@@ -69,11 +72,14 @@ def _arm(points: tuple[tuple[float, float, float], ...], steps: int) -> NDArray[
 
 Picture = NDArray[np.uint8]
 
-ERROR_FLOOR, ERROR_CEILING = 1e-4, 1.0  #: relative errors where the scale of the error maps begins and ends
+#: relative errors where the scale of the error maps begins and ends
+ERROR_FLOOR, ERROR_CEILING = 1e-4, 1.0
 
 
 def exposure(reference: NDArray[np.float64]) -> float:
-    """Return the factor that brings the 99th percentile of the finite values of a reference to 0.9; 1 for black."""
+    """Return the factor that brings the 99th percentile of the finite values of a
+    reference to 0.9; 1 for black.
+    """
     return float(np.exp2(auto_exposure(reference)))
 
 
@@ -94,7 +100,9 @@ def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
 
 @dataclass(frozen=True)
 class ToneCurve:
-    """x (1 + x/w^2) / (1 + x) of x, the radiance times an exposure, channel by channel: Reinhard et al. 2002, eq. 4."""
+    """x (1 + x/w^2) / (1 + x) of x, the radiance times an exposure, channel by channel:
+    Reinhard et al. 2002, eq. 4.
+    """
 
     exposure: float  #: of the radiance
     white: float  #: w, the x that becomes 1
@@ -103,12 +111,15 @@ class ToneCurve:
     def words(self) -> str:
         """The curve with its numbers."""
         return (
-            f"tone curve x (1 + x/{self.white:.3g}^2) / (1 + x), x = {self.exposure:.3g} times the radiance, then sRGB"
+            f"tone curve x (1 + x/{self.white:.3g}^2) / (1 + x), "
+            f"x = {self.exposure:.3g} times the radiance, then sRGB"
         )
 
 
 def tone_curve(radiance: NDArray[np.floating]) -> ToneCurve:
-    """Return the curve of previews that suits an image: its mean becomes 0.3, its 99.9th percentile white."""
+    """Return the curve of previews that suits an image: its mean becomes 0.3, its
+    99.9th percentile white.
+    """
     finite = radiance[np.all(np.isfinite(radiance), axis=-1)]
     mean = float(np.maximum(finite, 0).mean()) if finite.size else 0.0
     if not mean > 0:
@@ -118,14 +129,20 @@ def tone_curve(radiance: NDArray[np.floating]) -> ToneCurve:
 
 
 def preview(radiance: NDArray[np.float64], curve: ToneCurve) -> Picture:
-    """Return linear RGB, (height, width, 3), through a tone curve, encoded in sRGB; what is not finite is magenta."""
+    """Return linear RGB, (height, width, 3), through a tone curve, encoded in sRGB; what
+    is not finite is magenta.
+    """
     with np.errstate(invalid="ignore"):
         x = np.maximum(radiance * curve.exposure, 0)
         return tone_mapped(x * (1 + x / curve.white**2) / (1 + x), 1.0)
 
 
-def relative_error(reference: NDArray[np.float64], test: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (test - reference) / max(reference, 0.001 mean(reference)), not a number where an image is not finite."""
+def relative_error(
+    reference: NDArray[np.float64], test: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (test - reference) / max(reference, 0.001 mean(reference)), not a number
+    where an image is not finite.
+    """
     finite = np.isfinite(reference) & np.isfinite(test)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -135,15 +152,18 @@ def relative_error(reference: NDArray[np.float64], test: NDArray[np.float64]) ->
 
 
 def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:
-    """Return the signed relative error of images, (height, width, 3), in false colours: blue too dark, red too bright.
+    """Return the signed relative error of images, (height, width, 3), in false colours: blue
+    too dark, red too bright.
 
-    The error of a pixel is the largest `relative_error` over its channels, on a scale that is white below 1e-4 and
-    logarithmic from there to 1 on either side, the same for every method.
+    The error of a pixel is the largest `relative_error` over its channels, on a scale that is white
+    below 1e-4 and logarithmic from there to 1 on either side, the same for every method.
     """
     relative = relative_error(reference, test)
     finite = ~np.isnan(relative)
     relative = np.where(finite, relative, 0)
-    worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]
+    worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[
+        ..., 0
+    ]
     decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
     size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)
     colours = signed_colours()
@@ -163,7 +183,8 @@ def png_bytes(picture: Picture) -> bytes:
     from PIL import Image
 
     buffer = io.BytesIO()
-    Image.fromarray(picture).save(buffer, format="PNG")  # `optimize` saves 3 % and takes six times as long
+    # `optimize` saves 3 % and takes six times as long
+    Image.fromarray(picture).save(buffer, format="PNG")
     return buffer.getvalue()
 
 

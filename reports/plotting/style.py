@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How every chart looks: one colour and marker for each method and for each kernel, and the style sheets for papers.
+"""How every chart looks: one colour and marker for each method and for each kernel, and the
+style sheets for papers.
 
-The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under normal sight and for
-anyone who lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
-`LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the colour alone, each has its marker too. Variants of
-one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker.
+The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under
+normal sight and for anyone who lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity
+1) any two differ by more than `LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the
+colour alone, each has its marker too. Variants of one method (its kernel, its parameters) keep
+colour and marker and differ by the filling of the marker.
 
-Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
+Nothing heavy is imported at the top, and nothing is set: `figure_style` changes
+matplotlib's settings for a block.
 """
 
 from collections import Counter
@@ -18,7 +21,8 @@ from typing import Any
 
 from airlight.errors import InputError
 
-#: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and without one kind of cones.
+#: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and
+#: without one kind of cones.
 LEAST_DIFFERENCE = 10.0
 
 COLOURS: Mapping[str, str] = {
@@ -35,7 +39,8 @@ COLOURS: Mapping[str, str] = {
 #: Width of a figure [inches] by column.
 WIDTHS: Mapping[str, float] = {"single": 3.5, "double": 7.16}
 
-# By method, as a report may be drawn where Mitsuba, and with it the registry of methods, is missing.
+# By method, as a report may be drawn where Mitsuba, and with it the
+# registry of methods, is missing.
 _METHODS = {
     "unshadowed": ("sky", "o"),
     "ray-march": ("vermillion", "s"),
@@ -89,11 +94,12 @@ def reference_style() -> dict[str, Any]:
 
 
 def report_styles(shown: Iterable[tuple[str, str]]) -> dict[str, dict[str, Any]]:
-    """Return the marker style of every label of a report, the same in its page and in all figures made from it.
+    """Return the marker style of every label of a report, the same in its page and in
+    all figures made from it.
 
-    `shown` are pairs of a method and a label. Variants of a method, with history too, are numbered in the order in
-    which they come. Methods that are not built in take the pairs of `_OTHERS` in turn; from the seventh on these come
-    again, with other fillings.
+    `shown` are pairs of a method and a label. Variants of a method, with history too, are numbered
+    in the order in which they come. Methods that are not built in take the pairs of `_OTHERS` in
+    turn; from the seventh on these come again, with other fillings.
     """
     labels: dict[str, dict[str, None]] = {}
     for method, label in shown:
@@ -107,7 +113,9 @@ def report_styles(shown: Iterable[tuple[str, str]]) -> dict[str, dict[str, Any]]
 
 @contextmanager
 def figure_style(column: str = "double") -> Iterator[float]:
-    """Use the style sheets for papers for a block; give the width of the column, 'single' or 'double' [inches]."""
+    """Use the style sheets for papers for a block; give the width of the column,
+    'single' or 'double' [inches].
+    """
     import matplotlib.style
 
     if column not in WIDTHS:
@@ -127,7 +135,9 @@ def page_style() -> Iterator[None]:
 
 
 def _numbered(pairs: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, Any]]:
-    """Return the styles of labels by their colours and markers; labels that share a pair differ by the filling."""
+    """Return the styles of labels by their colours and markers; labels that share a
+    pair differ by the filling.
+    """
     variants, styles = Counter[tuple[str, str]](), {}
     for label, pair in pairs.items():
         styles[label] = _marker_style(*pair, variants[pair])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The claims at the top of a report, a sentence each; every one follows from the numbers of `report.json`.
+"""The claims at the top of a report, a sentence each; every one follows from the
+numbers of `report.json`.
 
 The kinds of claims:
 
@@ -38,10 +39,16 @@ def claims(scenes: Scenes) -> list[Claim]:
     sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
     slow = "Not measured for the time that they take"
     for kind, words, left_out in (("refused", "Refused", False), ("not-measured", slow, True)):
-        without = [(name, m) for name, m in _entries(scenes) if m.reason and (m.status == "left out") == left_out]
+        without = [
+            (name, m)
+            for name, m in _entries(scenes)
+            if m.reason and (m.status == "left out") == left_out
+        ]
         named = [f"{m.label} in {name}" for name, m in without]
         if named:
-            sentences.append(_claim(kind, f"{words}, with the reason in the tables: {'; '.join(named)}."))
+            sentences.append(
+                _claim(kind, f"{words}, with the reason in the tables: {'; '.join(named)}.")
+            )
     return sentences + _without_flip(scenes) + _timed(scenes)
 
 
@@ -64,11 +71,17 @@ def growth_claims(records: Sequence[Scaling]) -> list[Claim]:
     jumps = [_claim("growth", f"A time jumps: {jump}.", good=False) for jump in cliffs(records)]
     scenes = " and ".join(dict.fromkeys(record.scene for record in records))
     kinds = ", ".join(dict.fromkeys(WORK[record.kind] for record in records))
-    return jumps or [_claim("growth", f"No time of a frame of {scenes} jumps as the work grows: {kinds}.", good=True)]
+    return jumps or [
+        _claim(
+            "growth", f"No time of a frame of {scenes} jumps as the work grows: {kinds}.", good=True
+        )
+    ]
 
 
 def confirmed(scenes: Scenes) -> bool:
-    """Return whether no comparison speaks against the reference, and each layer is confirmed by at least one."""
+    """Return whether no comparison speaks against the reference, and each layer is
+    confirmed by at least one.
+    """
     for scene in scenes:
         compared = list(scene.agreement.values())
         if any(verdict(entry) is False for entry in compared):
@@ -96,14 +109,20 @@ def _trust(scenes: Scenes) -> list[Claim]:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
         return [_claim("reference", text)]
     estimators = dict.fromkeys(entry.estimator for _, entry in compared)
-    return [_verdict(_WORDS[name], [pair for pair in compared if pair[1].estimator == name]) for name in estimators]
+    return [
+        _verdict(_WORDS[name], [pair for pair in compared if pair[1].estimator == name])
+        for name in estimators
+    ]
 
 
 def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
-    against, open_ = ([_place(*pair) for pair in compared if verdict(pair[1]) is found] for found in (False, None))
+    against, open_ = (
+        [_place(*pair) for pair in compared if verdict(pair[1]) is found] for found in (False, None)
+    )
     if against:
         text = (
-            f"The reference is NOT confirmed by {words} in {', '.join(against)}: there the 95 % interval of the "
+            f"The reference is NOT confirmed by {words} in {', '.join(against)}: there the 95 % "
+            "interval of the "
             "relative bias is not inside the margin."
         )
         return _claim("reference", text, False)
@@ -114,13 +133,16 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
         low, high = (100 * known(end) for end in worst.statistics.relative_bias_ci)
         text = (
-            f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
-            f"of the pooled relative bias lies within its margin. The interval that fills most of its margin, "
+            f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: "
+            "every 95 % interval "
+            "of the pooled relative bias lies within its margin. The interval that fills most of "
+            "its margin, "
             f"{100 * most:.0f} %, is {low:+.2g}..{high:+.2g} %, in {place}."
         )
     if open_:
         text += (" " if text else "") + (
-            f"By {words} it is not decided within the time in {', '.join(open_)}: the 95 % interval is not narrow "
+            f"By {words} it is not decided within the time in {', '.join(open_)}: the 95 % "
+            "interval is not narrow "
             "enough there."
         )
     return _claim("reference", text, None if open_ else True)
@@ -131,7 +153,9 @@ def _place(scene: str, entry: Agreement) -> str:
 
 
 def _left_out(scenes: Scenes) -> Claim:
-    fractions = "; ".join(f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes)
+    fractions = "; ".join(
+        f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes
+    )
     text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {fractions}."
     return _claim("left-out", text)
 
@@ -144,20 +168,26 @@ def _images(scenes: Scenes) -> Iterator[Claim]:
         what = "total of airlight and surface" if entry.layer == "total" else entry.layer
         text = (
             f"The image {entry.label} of {scene}, judged by its {what}: relative RMSE "
-            f"{100 * error.relative_rmse:.3g} %, relative bias {100 * known(error.relative_bias):+.3g} %."
+            f"{100 * error.relative_rmse:.3g} %, relative bias "
+            f"{100 * known(error.relative_bias):+.3g} %."
         )
         yield _claim("image", text)
 
 
 def _failed(scenes: Scenes) -> Iterator[Claim]:
-    for count, words in (("nonfinite", "values that are not finite"), ("negative", "negative values")):
+    for count, words in (
+        ("nonfinite", "values that are not finite"),
+        ("negative", "negative values"),
+    ):
         wrong = [(name, m) for name, m in _entries(scenes) if getattr(m.error, count, 0)]
         failed = [_pixels(name, m, count) for name, m in wrong if not published_as(m)]
         if failed:
             yield _claim("failed", f"Images with {words}: {'; '.join(failed)}.", False)
         peers = [_pixels(name, m, count) for name, m in wrong if published_as(m)]
         if peers:
-            yield _claim("published", f"As the papers have it, images with {words}: {'; '.join(peers)}.")
+            yield _claim(
+                "published", f"As the papers have it, images with {words}: {'; '.join(peers)}."
+            )
     left = [f"{scene.name} ({scene.reference.left})" for scene in scenes if scene.reference.left]
     if left:
         text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
@@ -178,9 +208,8 @@ def _timed(scenes: Scenes) -> list[Claim]:
         if run.steady is False
     ]
     if changed:
-        text += (
-            f" The machine changed meanwhile, so that ratios count there, and no milliseconds: {', '.join(changed)}."
-        )
+        where = ", ".join(changed)
+        text += f" The machine changed meanwhile, so that ratios count there, and no milliseconds: {where}."
     return [_claim("times", text)]
 
 
@@ -191,7 +220,11 @@ def _pixels(scene: str, m: Row, count: str) -> str:
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
     """Return a claim on the images that have no HDR-FLIP, with the reason of the first."""
-    without = [(name, m.label, m.flip.note) for name, m in _entries(scenes) if m.flip and m.flip.value is None]
+    without = [
+        (name, m.label, m.flip.note)
+        for name, m in _entries(scenes)
+        if m.flip and m.flip.value is None
+    ]
     if not without:
         return []
     name, label, why = without[0]
@@ -202,10 +235,14 @@ def _without_flip(scenes: Scenes) -> list[Claim]:
 def own_fault(method: str, refused: str | None) -> str | None:
     """Return the fault of a user method, None for none; a refusal by name is a result and no fault.
 
-    They begin with the name of the method (`realtime.methods.user_method`, `realtime.methods.shader`,
-    `reports.machine.own_process`).
+    They begin with the name of the method (`realtime.methods.user_method`,
+    `realtime.methods.shader`, `reports.machine.own_process`).
     """
-    return refused if is_users(method) and refused and refused.startswith(f"method {method}: ") else None
+    return (
+        refused
+        if is_users(method) and refused and refused.startswith(f"method {method}: ")
+        else None
+    )
 
 
 def own_faults(methods: Iterable[Row]) -> list[str]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The error report: a study written down as EXR files, pictures, report.json and one page of HTML.
 
-Every result is kept on disk as soon as it is there (`validation.study.scene`): a report that was killed goes on where
-it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
+Every result is kept on disk as soon as it is there (`validation.study.scene`): a report that was
+killed goes on where it stopped, and one in which nothing changed measures nothing. The files of a
+report appear when it is whole.
 """
 
 import gc
@@ -70,13 +71,15 @@ def write_report(
     noted: Callable[[Sequence[str]], None] = lambda notes: None,
     cluster: "Client | None" = None,
 ) -> Report:
-    """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
+    """Study scenes and write the report into a folder; return the content of
+    report.json, see docs/formats.md.
 
-    Only the first of the sizes and media of the study counts. `images` from elsewhere are judged, by scene, at their
-    size. The page names `command` under "how to reproduce". `fresh` computes everything again. With `apart` user
-    methods run in separate processes, where a fault becomes a row (`own_faults`); else it ends the report. `noted`
-    is called with notes on the scenes before the work. Workers of `cluster` compute references and the batches that
-    check them; methods run here. Unusable input is refused, and an existing report is not damaged.
+    Only the first of the sizes and media of the study counts. `images` from elsewhere are judged,
+    by scene, at their size. The page names `command` under "how to reproduce". `fresh` computes
+    everything again. With `apart` user methods run in separate processes, where a fault becomes a
+    row (`own_faults`); else it ends the report. `noted` is called with notes on the scenes before
+    the work. Workers of `cluster` compute references and the batches that check them; methods run
+    here. Unusable input is refused, and an existing report is not damaged.
     """
     names = tuple(study.scene_names())
     _refuse_twins(names)
@@ -90,7 +93,12 @@ def write_report(
     if any(is_shader(chosen.method) for chosen in study.configurations):
         environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
-    since, notes, of_scenes, referenced = time.time() if fresh else None, list[str](), [], list[Cell]()
+    since, notes, of_scenes, referenced = (
+        time.time() if fresh else None,
+        list[str](),
+        [],
+        list[Cell](),
+    )
 
     def opened(name: str) -> SceneStudy:
         return open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine())
@@ -119,8 +127,9 @@ def write_report(
             bring_references(cluster, referenced, points=study.points)
         ended = _try_own(names[0], study, process) if names else {}
         for name, (_, parts), step in zip(names, of_scenes, steps):
-            # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
-            # that are loaded. A batch of volpath takes eight times as long with ten others.
+            # One scene at a time: Mitsuba compiles a virtual call for the materials, media and
+            # lights of all scenes that are loaded. A batch of volpath takes eight times as long
+            # with ten others.
             gc.collect()
             each = opened(name)
             result = study_scene(
@@ -160,7 +169,11 @@ def write_report(
             measured=Measured(first=date(made[0]), last=date(made[-1])) if made else None,
             settings=study.settings,
             environment=record_of(environment, Environment),
-            claims=(*claims(studied), *growth_claims(scaling), *(unstudied(names, list(FOG_SCENES)) if usual else [])),
+            claims=(
+                *claims(studied),
+                *growth_claims(scaling),
+                *(unstudied(names, list(FOG_SCENES)) if usual else []),
+            ),
             scenes=tuple(studied),
             stability=tuple(kernels),
             scaling=tuple(scaling),
@@ -168,19 +181,25 @@ def write_report(
         )
         page(0.0, "the page")
         (hidden / "report.json").write_text(report_text(report), encoding="utf-8", newline="\n")
-        (hidden / "report.html").write_text(render_page(report, hidden), encoding="utf-8", newline="\n")
+        (hidden / "report.html").write_text(
+            render_page(report, hidden), encoding="utf-8", newline="\n"
+        )
     page(1.0, "done")
     return report
 
 
 def _begins(progress: Progress, seconds: Mapping[str, float]) -> Callable[[str], None]:
-    """Return what tells that a part of a scene begins, by its name; `seconds`: what each part takes."""
+    """Return what tells that a part of a scene begins, by its name;
+    `seconds`: what each part takes.
+    """
     parts = dict(zip(seconds, sharing(progress, seconds.items())))
     return lambda name: parts[name](0.0, "")
 
 
 def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None":
-    """Return the function that lets workers trace the batches that check the reference of a scene."""
+    """Return the function that lets workers trace the batches that check
+    the reference of a scene.
+    """
     if cluster is None:
         return None
     from airlight.reports.cluster.references import image_of, spread
@@ -223,10 +242,12 @@ def _refuse_twins(scenes: Sequence[str]) -> None:
     """Refuse scenes whose images would lie in one folder."""
     for name, count in Counter(folder_of(scene) for scene in scenes).items():
         if count > 1:
-            raise InputError(f"scenes: two scenes are called {name}; give each once, or rename one of the files")
+            raise InputError(
+                f"scenes: two scenes are called {name}; give each once, or rename one of the files"
+            )
 
 
-# A folder out of sight until it is whole ------------------------------------------------------------------------------
+# A folder out of sight until it is whole ----------------------------------------------------------
 
 _PREFIX = ".airlight-report-"
 _STALE = 86400.0  # seconds after which the remains of a killed run are removed
@@ -234,11 +255,13 @@ _STALE = 86400.0  # seconds after which the remains of a killed run are removed
 
 @contextmanager
 def staged(target: Path) -> Iterator[Path]:
-    """Give a hidden folder in `target` whose files move there when the block ends without an exception.
+    """Give a hidden folder in `target` whose files move there when the block
+    ends without an exception.
 
-    Files of the same name are replaced one by one, the page and its data last; images that only the report before
-    named go, all else stays. Any exception, a KeyboardInterrupt too, leaves the target as it was; that of a full disk
-    names the target. Raises InputError if another process is writing a report there.
+    Files of the same name are replaced one by one, the page and its data last; images that only the
+    report before named go, all else stays. Any exception, a KeyboardInterrupt too, leaves the
+    target as it was; that of a full disk names the target. Raises InputError if another process is
+    writing a report there.
     """
     for left in target.glob(f"{_PREFIX}*"):
         if time.time() - left.stat().st_mtime > _STALE:
@@ -257,7 +280,9 @@ def staged(target: Path) -> Iterator[Path]:
 
 
 def _move(hidden: Path, target: Path) -> None:
-    """Move the files of a hidden folder into the target, and remove the images that only the report before named."""
+    """Move the files of a hidden folder into the target, and remove the images that only
+    the report before named.
+    """
     files, before = [path for path in hidden.rglob("*") if path.is_file()], set[Path]()
     with suppress(InputError):  # there was none, or of another version
         report, folder = load_report(target)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of a report that belong to no scene of it: the stability of kernels, how times grow, claims of papers."""
+"""The parts of a report that belong to no scene of it: the stability of kernels, how
+times grow, claims of papers.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -45,7 +47,9 @@ class OtherPart:
 
 
 def other_parts(study: Study) -> list[OtherPart]:
-    """Return the parts that a study asks for; claims of papers only with all scenes of a study of ours."""
+    """Return the parts that a study asks for; claims of papers only with all
+    scenes of a study of ours.
+    """
     parts = []
     if study.stability:
         parts.append(_stability_part(study.stability))
@@ -61,7 +65,7 @@ def other_parts(study: Study) -> list[OtherPart]:
 # The modules of these inputs are those that compute, not the reports that show.
 
 
-# --- kernels ---------------------------------------------------------------------------------------------------------
+# --- kernels --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -77,14 +81,23 @@ class StabilityInputs(Inputs):
 def _stability_part(rays: int) -> OtherPart:
     added = {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
     compute = partial(_stability, rays, list(added))
-    return OtherPart("stability", "stability", _STABILITY, StabilityInputs(rays, added), compute, list[Stability])
+    return OtherPart(
+        "stability", "stability", _STABILITY, StabilityInputs(rays, added), compute, list[Stability]
+    )
 
 
 def _stability(rays: int, added: list[str], progress: Progress) -> list[Stability]:
-    """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
+    """Return how stable kernels are. Nearly all of its time goes into compilation: a
+    process compiles them quickly.
+    """
     from airlight.validation.kernels.stability import stability
 
-    how: dict[str, Any] = {"what": "study", "name": "of the kernels", "limit": math.inf, "quick": True}
+    how: dict[str, Any] = {
+        "what": "study",
+        "name": "of the kernels",
+        "limit": math.inf,
+        "quick": True,
+    }
     known: list[Stability] = in_own_process(known_kernels, rays, **how)
     return known + (stability(added, count=rays, progress=counted(progress)) if added else [])
 
@@ -96,7 +109,7 @@ def known_kernels(rays: int) -> list[Stability]:
     return stability(count=rays)
 
 
-# --- growth ----------------------------------------------------------------------------------------------------------
+# --- growth ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -112,24 +125,32 @@ class ScalingInputs(Inputs):
 
 def _scaling_part(work: str, study: Study) -> OtherPart:
     inputs = ScalingInputs(work, study, machine())
-    return OtherPart("scaling", "how times grow", _GROWTH, inputs, partial(_scaling, work, study), list[Scaling])
+    return OtherPart(
+        "scaling", "how times grow", _GROWTH, inputs, partial(_scaling, work, study), list[Scaling]
+    )
 
 
 def _scaling(work: str, study: Study, progress: Progress) -> list[Scaling]:
     """Return how times grow with one kind of work."""
     from airlight.validation.study.growth import ladder, study_growth
 
-    return study_growth(study, work, ladder(work, study.scenes[0], study.sizes[0]), progress=counted(progress))
+    return study_growth(
+        study, work, ladder(work, study.scenes[0], study.sizes[0]), progress=counted(progress)
+    )
 
 
-# --- claims of papers ------------------------------------------------------------------------------------------------
+# --- claims of papers -----------------------------------------------------------------------------
 
 
 def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[str]:
     """Return the names of the experiments that claims need and that an effort has."""
     needed = {claim.experiment for claim in chosen}
     most = EFFORTS.index(effort)
-    return [name for name, each in experiments().items() if name in needed and EFFORTS.index(each.effort) <= most]
+    return [
+        name
+        for name, each in experiments().items()
+        if name in needed and EFFORTS.index(each.effort) <= most
+    ]
 
 
 @dataclass(frozen=True)
@@ -148,7 +169,9 @@ def _paper(name: str) -> OtherPart:
     module = f"airlight.validation.papers.{experiment.function.partition(':')[0]}"
     inputs = PaperInputs(name, source_digest(module), machine())
     compute = partial(_experiment, name)
-    return OtherPart("papers", name, experiment.seconds, inputs, compute, tuple[str, dict[str, Any]])
+    return OtherPart(
+        "papers", name, experiment.seconds, inputs, compute, tuple[str, dict[str, Any]]
+    )
 
 
 def _experiment(name: str, progress: Progress) -> tuple[str, dict[str, Any]]:
@@ -165,7 +188,8 @@ def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Claim]:
 def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
     """Return the claims whose experiments were made, and those that no experiment can measure.
 
-    `figures`, by experiment: numbers by the names that claims.toml gives them, a free set and so no record.
+    `figures`, by experiment: numbers by the names that claims.toml gives them, a
+    free set and so no record.
     """
     return [
         judged(claim, figures.get(claim.experiment, {}))
@@ -174,8 +198,12 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
     ]
 
 
-def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Claim]:
-    """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
+def measure_claims(
+    chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None
+) -> list[Claim]:
+    """Measure what claims need and is not cached, and return those that are decided;
+    `quick` leaves out images.
+    """
     parts = [_paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])]
     steps = sharing(progress, [(f"{part.title}, ", part.seconds) for part in parts])
     return decided(chosen, dict(part.result(step).value for part, step in zip(parts, steps)))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The record of one scene of a report, and its files: an EXR and pictures of the reference and of every row."""
+"""The record of one scene of a report, and its files: an EXR and pictures of the
+reference and of every row.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,8 +35,13 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
     (folder / own).mkdir(exist_ok=True)
     light = reference.airlight + reference.surface
     factor = exposure(light)
-    pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
-    named = _written(folder, f"{own}/{_REFERENCE}", layered_reference(study.loaded, reference), pictures)
+    pictures = {
+        "picture": tone_mapped(light, factor),
+        "airlight": tone_mapped(reference.airlight, factor),
+    }
+    named = _written(
+        folder, f"{own}/{_REFERENCE}", layered_reference(study.loaded, reference), pictures
+    )
     stems = [f"{own}/{stem}" for stem in file_stems([judged.row.label for judged in result.rows])]
     return Scene(
         name=study.name,
@@ -50,7 +57,10 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
         agreement=result.agreement,
         multiple=result.multiple,
         files=SceneFiles(**named),
-        methods=tuple(_entry(judged, folder, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)),
+        methods=tuple(
+            _entry(judged, folder, stem, factor)
+            for judged, stem in zip(result.rows, stems, strict=True)
+        ),
         seconds=result.seconds,
     )
 
@@ -60,7 +70,10 @@ def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
     named = dict[str, str]()
     if judged.image is not None and judged.expected is not None:
         test = np.asarray(judged.image.layers[judged.row.layer], dtype=np.float64)
-        pictures = {"picture": tone_mapped(judged.light, factor), "error": error_map(judged.expected, test)}
+        pictures = {
+            "picture": tone_mapped(judged.light, factor),
+            "error": error_map(judged.expected, test),
+        }
         named = _written(report, stem, judged.image, pictures)
     return Method(
         **vars(judged.row),
@@ -77,16 +90,21 @@ def reference_record(reference: ReferenceImage) -> Reference:
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
     bound = float(of_image(reference).bound[finite].mean()) / mean if mean > 0 else None
-    found = {"mean": mean, "relative_bound": bound, "kind": known_to(reference, "airlight").kind} | {
-        name: getattr(reference, name) for name in numbers
-    }
+    found = {
+        "mean": mean,
+        "relative_bound": bound,
+        "kind": known_to(reference, "airlight").kind,
+    } | {name: getattr(reference, name) for name in numbers}
     return record_of(found, Reference)
 
 
 def _written(report: Path, stem: str, image: Image, pictures: Mapping[str, Any]) -> dict[str, str]:
-    """Write an image and its pictures into a folder of the report; return the names of the files by what they are."""
+    """Write an image and its pictures into a folder of the report; return the names of
+    the files by what they are.
+    """
     names = {kind: f"{stem}{SUFFIXES[kind]}" for kind in ("exr", *pictures)}
-    write_exr(report / names["exr"], stamped(image), finite=False)  # somebody's, which the report judges
+    # somebody's, which the report judges
+    write_exr(report / names["exr"], stamped(image), finite=False)
     for kind, pixels in pictures.items():
         (report / names[kind]).write_bytes(png_bytes(pixels))
     return names
@@ -98,7 +116,9 @@ def folder_of(name_or_path: str) -> str:
 
 
 def file_stems(labels: Sequence[str]) -> list[str]:
-    """Return a name for the files of every label: letters, digits and dashes; no two labels share a file."""
+    """Return a name for the files of every label: letters, digits and dashes; no
+    two labels share a file.
+    """
 
     def files(stem: str) -> set[str]:
         return {stem + suffix for suffix in SUFFIXES.values()}

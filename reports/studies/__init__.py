@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies, `airlight study NAME`: a function with typed parameters that returns rows, tables and a figure.
+"""Studies, `airlight study NAME`: a function with typed parameters that returns
+rows, tables and a figure.
 
 Read in this order:
 

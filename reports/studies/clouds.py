@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of clouds: a slab in sunlight by order of scattering, and the grid of canonical transport."""
+"""Studies of clouds: a slab in sunlight by order of scattering, and the
+grid of canonical transport.
+"""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,14 +27,17 @@ _SIDES = (("reflectance", "reflected", "blue"), ("transmittance", "transmitted",
 class SlabStudy(Study):
     """The light of a slab by order of scattering.
 
-    A row for each set of orders has `orders` (its name), `reflectance`, `transmittance`, `reflected_mean`,
-    `reflected_rms`, `transmitted_mean`, `transmitted_rms` [mean free paths] and `fluence`, a row for each depth.
-    `data` has besides `orders` the `total` of all, with `reflectance`, `transmittance`, `flux` and `radiance`, the
-    estimated `error` of every number, and `photons`: the same by photons, with standard errors.
+    A row for each set of orders has `orders` (its name), `reflectance`, `transmittance`,
+    `reflected_mean`, `reflected_rms`, `transmitted_mean`, `transmitted_rms` [mean free paths] and
+    `fluence`, a row for each depth. `data` has besides `orders` the `total` of all, with
+    `reflectance`, `transmittance`, `flux` and `radiance`, the estimated `error` of every number,
+    and `photons`: the same by photons, with standard errors.
     """
 
     def __getitem__(self, name: Any) -> Mapping[str, Any]:
-        """Return the row of a set of orders by its name, such as '3-4', or of one order by its number."""
+        """Return the row of a set of orders by its name, such as '3-4', or of
+        one order by its number.
+        """
         for row in self.rows:
             if row["orders"] == str(name):
                 return row
@@ -54,11 +59,12 @@ def slab(
 ) -> SlabStudy:
     """Compute the light of a slab in sunlight by order of scattering.
 
-    The study computes how much light the slab reflects and transmits, and where the light leaves the slab. Light of
-    order n was scattered n times.
-    Displacements are measured from the point of entry, horizontally: the mean along the direction in which the sun's
-    light travels, and rms, the root of the mean of x^2 + y^2. The numbers come from a deterministic computation with an
-    estimate of its error; `--photons` puts a random walk with standard errors beside them. See docs/the-reference.md.
+    The study computes how much light the slab reflects and transmits, and where the light leaves
+    the slab. Light of order n was scattered n times. Displacements are measured from the point of
+    entry, horizontally: the mean along the direction in which the sun's light travels, and rms, the
+    root of the mean of x^2 + y^2. The numbers come from a deterministic computation with an
+    estimate of its error; `--photons` puts a random walk with standard errors beside them. See
+    docs/the-reference.md.
 
     Parameters
     ----------
@@ -67,15 +73,19 @@ def slab(
     sun
         Zenith angle of the sun [degrees], from 0 to below 90.
     phase
-        isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of angles [degrees] and values.
+        isotropic, hg:G, hg-draine:D, mie, mie-modified, or a CSV file of
+        angles [degrees] and values.
     albedo
         Single-scattering albedo, 0 to 1.
     orders
-        Orders of scattering, such as 1,2,3-4,31-inf; 'sets' are the orders of Bouthors 2008, 'all' is the sum.
+        Orders of scattering, such as 1,2,3-4,31-inf; 'sets' are the orders of
+        Bouthors 2008, 'all' is the sum.
     depths
-        Depths of fluence, flux and radiance [mean free paths], with commas; top and bottom by default.
+        Depths of fluence, flux and radiance [mean free paths], with commas;
+        top and bottom by default.
     directions
-        Directions of the radiance, MU:PHI with commas: mu is positive upwards, phi [degrees] is 0 forward.
+        Directions of the radiance, MU:PHI with commas: mu is positive upwards,
+        phi [degrees] is 0 forward.
     photons
         Number of photons of a random walk that checks the numbers.
     progress
@@ -93,10 +103,18 @@ def slab(
     from airlight.validation.study.cost import Work, check_work
 
     if photons != int(photons) or photons == 1 or photons < 0:
-        raise InputError(f"photons: got {photons}, expected a whole number from 2 on, for example 1000000")
+        raise InputError(
+            f"photons: got {photons}, expected a whole number from 2 on, for example 1000000"
+        )
     chosen = orders if isinstance(orders, str) else several(orders)
     request = slab_request(
-        tau, sun, phase=os.fspath(phase), albedo=albedo, orders=chosen, depths=depths, directions=directions
+        tau,
+        sun,
+        phase=os.fspath(phase),
+        albedo=albedo,
+        orders=chosen,
+        depths=depths,
+        directions=directions,
     )
     check_work(f"photons {photons}", [Work(expected_seconds(request, int(photons)))])
     with telling(progress, "slab") as tell:
@@ -106,7 +124,8 @@ def slab(
         for side in ("reflectance", "transmittance")
     }
     said = (
-        f"All orders: reflectance {words_of['reflectance']}, transmittance {words_of['transmittance']} (with the light "
+        f"All orders: reflectance {words_of['reflectance']}, transmittance "
+        f"{words_of['transmittance']} (with the light "
         "that was never scattered)."
     )
     return SlabStudy(
@@ -119,14 +138,18 @@ def slab(
     )
 
 
-_EXITS = {f"{side}_{kind}": kind for side in ("reflected", "transmitted") for kind in ("mean", "rms")}
+_EXITS = {
+    f"{side}_{kind}": kind for side in ("reflected", "transmitted") for kind in ("mean", "rms")
+}
 _BY_ORDER = {"reflectance": "reflected", "transmittance": "transmitted", **_EXITS}
 
 
 def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
     def by_order(title: str, rows: Sequence[Any], digits: int = 6) -> Table:
         columns = (*words("orders"), *numbers(**_BY_ORDER, how={"digits": digits}))
-        return table(title, columns, [{name: row[name] for name in ("orders", *_BY_ORDER)} for row in rows])
+        return table(
+            title, columns, [{name: row[name] for name in ("orders", *_BY_ORDER)} for row in rows]
+        )
 
     six: Mapping[str, Any] = {"digits": 6}
     photons, total = found["photons"], found["total"]
@@ -134,7 +157,9 @@ def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
     if photons:
         yield by_order(f"By {photons['count']} photons", photons["orders"])
         yield by_order("Standard errors of the photons", photons["standard_error"]["orders"], 2)
-    fluence = [{"orders": row["orders"], **each} for row in found["orders"] for each in row["fluence"]]
+    fluence = [
+        {"orders": row["orders"], **each} for row in found["orders"] for each in row["fluence"]
+    ]
     if fluence:
         columns = (*words("orders"), *numbers("depth", "value", "mean", "rms", how=six))
         yield table("Fluence for unit flux across the beam", columns, fluence)
@@ -142,14 +167,19 @@ def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
         title = "Diffuse flux of all orders for a flux of pi across the beam"
         yield table(title, numbers("depth", "up", "down", how=six), total["flux"])
     if total["radiance"]:
-        columns = (*numbers("depth", "mu", "phi", "value", how=six), Column("error", "error", digits=2))
+        columns = (
+            *numbers("depth", "mu", "phi", "value", how=six),
+            Column("error", "error", digits=2),
+        )
         errors = found["error"]["total"]["radiance"]
         rows = [{**row, "error": e["value"]} for row, e in zip(total["radiance"], errors)]
         yield table("Radiance of all orders for a flux of pi across the beam", columns, rows)
 
 
 def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
-    """Return the light that leaves a slab by order, and its distance from the entry, computed and by photons."""
+    """Return the light that leaves a slab by order, and its distance from the entry,
+    computed and by photons.
+    """
     import numpy as np
 
     from airlight.reports.plotting.figure import new_figure
@@ -168,7 +198,9 @@ def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
     def put(panel: Any, name: str, at: Any, label: str | None = None) -> None:
         if walked:
             errors = 2 * np.nan_to_num(values(walked["standard_error"]["orders"], name))
-            panel.errorbar(at, values(walked["orders"], name), errors, capsize=2, label=label, **dots)
+            panel.errorbar(
+                at, values(walked["orders"], name), errors, capsize=2, label=label, **dots
+            )
 
     for number, (name, side, colour) in enumerate(_SIDES):
         at = places + 0.4 * number - 0.2
@@ -176,7 +208,9 @@ def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
         put(fractions, name, at, "photons, ±2 standard errors" if number else None)
         for kind, style in (("mean", "--"), ("rms", "-")):
             key = f"{side}_{kind}"
-            lengths.plot(places, values(rows, key), style, color=COLOURS[colour], label=f"{side}, {kind}")
+            lengths.plot(
+                places, values(rows, key), style, color=COLOURS[colour], label=f"{side}, {kind}"
+            )
             put(lengths, key, places)
     for panel in (fractions, lengths):
         panel.set_xticks(places, [row["orders"] for row in rows], rotation=45)

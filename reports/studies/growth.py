@@ -35,8 +35,8 @@ def scaling(
 ) -> Study:
     """Time methods as their work grows.
 
-    The result has times, memory and exponents by pixels, triangles, lights or texels of the map. The
-    exit status is 1 if a time jumps.
+    The result has times, memory and exponents by pixels, triangles, lights or texels of the map.
+    The exit status is 1 if a time jumps.
 
     Parameters
     ----------
@@ -45,7 +45,8 @@ def scaling(
     kinds
         The kinds of growing work: some of size,triangles,lights,map; all by default.
     method
-        A method, as in `airlight study methods`; by default one configuration of each method with shadows.
+        A method, as in `airlight study methods`; by default one configuration of
+        each method with shadows.
     size
         Width and height [pixels], or WxH.
     progress
@@ -65,12 +66,16 @@ def scaling(
     study = replace(usual.at(pixels_of(size)), configurations=tuple(chosen))
     names = [str(name) for name in several(scenes)] or usual.scenes
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
-    ladders = [(name, kind, ladder(kind, name, study.sizes[0])) for name in names for kind in wanted]
+    ladders = [
+        (name, kind, ladder(kind, name, study.sizes[0])) for name in names for kind in wanted
+    ]
     records: list[Scaling] = []
     with telling(progress, "scaling") as tell:
         for at, (name, kind, steps) in enumerate(ladders):
             part = part_of(tell, at / len(ladders), (at + 1) / len(ladders))
-            found = study_growth(replace(study, scenes=(name,)), kind, steps, progress=counted(part))
+            found = study_growth(
+                replace(study, scenes=(name,)), kind, steps, progress=counted(part)
+            )
             records += found
     return Study(
         name="scaling",
@@ -82,7 +87,9 @@ def scaling(
 
 
 def _draw_scaling(records: list[Scaling], column: str) -> Any:
-    """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
+    """Return the time of a frame over its work, by kind of work, with the fitted
+    exponents and the camera rays.
+    """
     from airlight.reports.plotting.figure import new_figure
     from airlight.reports.plotting.style import WIDTHS, report_styles
     from airlight.reports.tables.costs import WORK
@@ -102,8 +109,12 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
             times = [cost.frame.median_ms for cost in costs]
             panel.plot([cost.work for cost in costs], times, label=label, **styles[record.label])
         rays = [cost.rays.median_ms for cost in costs]
-        panel.plot([cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays")
-        panel.set(xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]")
+        panel.plot(
+            [cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays"
+        )
+        panel.set(
+            xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]"
+        )
         panel.legend(loc="best")
     for panel in panels[len(kinds) :]:
         panel.remove()

@@ -46,8 +46,8 @@ _SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progress = None) -> Study:
     """Time airlight kernels alone and measure their errors.
 
-    ns/ray: the kernel alone by Dr.Jit's history, median. The figure shows time against error in isotropic fog, a line
-    for each kernel over its sizes.
+    ns/ray: the kernel alone by Dr.Jit's history, median. The figure shows time against error in
+    isotropic fog, a line for each kernel over its sizes.
 
     Parameters
     ----------
@@ -74,7 +74,9 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
         data=with_environment(kernels={"costs": found, "levels": levels}),
         tables=tuple(kernel_tables(found, levels)),
         lines=("ns/ray: the kernel alone by Dr.Jit's history, median.",),
-        draw=partial(_draw_costs, [cost for cost in found if cost.phase == phases[0][0] and cost.time]),
+        draw=partial(
+            _draw_costs, [cost for cost in found if cost.phase == phases[0][0] and cost.time]
+        ),
     )
 
 
@@ -92,7 +94,9 @@ def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
             points = sorted(
                 (cost.time.median, error)
                 for cost in costs
-                if cost.family == family and cost.time and (error := getattr(cost, statistic)) is not None
+                if cost.family == family
+                and cost.time
+                and (error := getattr(cost, statistic)) is not None
             )
             times = [point[0] for point in points]
             errors = [min(max(point[1], _SHOWN[0]), _SHOWN[1]) for point in points]
@@ -115,9 +119,9 @@ _TRIED_RAYS = 100_000
 def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     """Look for rays on which kernels break.
 
-    Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each largest error in the
-    format of `airlight study integrals`. The exit status is 1 if a kernel that claims to be exact exceeds
-    the error that it claims.
+    Tries every kernel on certified values and on rays of every magnitude. Prints the ray of each
+    largest error in the format of `airlight study integrals`. The exit status is 1 if a kernel that
+    claims to be exact exceeds the error that it claims.
 
     Parameters
     ----------
@@ -162,7 +166,8 @@ class Integrals(Study):
     """The airlight integral of some cases by a kernel."""
 
     J: "NDArray[np.float64]"  #: by the kernel [1/m], of the shape of the columns that were given
-    value: "NDArray[np.float64] | None"  #: certified, or as given by the file [1/m], of the same shape
+    #: certified, or as given by the file [1/m], of the same shape
+    value: "NDArray[np.float64] | None"
     kernel: str
     precision: str  #: 'single' or 'double'
     cases: "Cases"  #: the cases, one after the other
@@ -175,7 +180,9 @@ class Integrals(Study):
 
     @property
     def error(self) -> "NDArray[np.float64] | None":
-        """The signed relative error (J - value) / value; None where there is nothing to compare with."""
+        """The signed relative error (J - value) / value; None where there is
+        nothing to compare with.
+        """
         import numpy as np
 
         if self.value is None:
@@ -197,7 +204,9 @@ class Integrals(Study):
         return {name: np.asarray(values).tolist() for name, values in names.items()}
 
     def save(self, path: Path | str, column: str = "double") -> Path:
-        """Write the rows with a column `result` (.csv), or what `Study.save` writes; return the path."""
+        """Write the rows with a column `result` (.csv), or what `Study.save`
+        writes; return the path.
+        """
         if Path(path).suffix != ".csv":
             return super().save(path, column)
         from airlight.validation.kernels.cases import write_results
@@ -225,22 +234,25 @@ def integrals(
 ) -> Integrals:
     """Integrate the airlight of each row of a CSV file by a kernel.
 
-    Rows that have a value are compared with it. Results that are not finite are refused, with the first row.
+    Rows that have a value are compared with it. Results that are not finite are
+    refused, with the first row.
 
     Parameters
     ----------
     cases
-        A CSV file with the columns `foot`, `height`, `x0`, `x1` [m] and `sigma_t` [1/m]; x1 may be inf. The column
-        `phase` may name isotropic (the default), rayleigh, hazy, murky, hg (with its mean cosine in a column `g`),
-        hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH or mie-modified; `value` is what to compare with. From Python
-        also columns by name, of any shapes that broadcast together, or a data frame; `origin`, `direction` and
-        `light`, (..., 3), may stand for `foot` and `height`.
+        A CSV file with the columns `foot`, `height`, `x0`, `x1` [m] and `sigma_t` [1/m]; x1 may be
+        inf. The column `phase` may name isotropic (the default), rayleigh, hazy, murky, hg (with
+        its mean cosine in a column `g`), hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH or
+        mie-modified; `value` is what to compare with. From Python also columns by name, of any
+        shapes that broadcast together, or a data frame; `origin`, `direction` and `light`, (...,
+        3), may stand for `foot` and `height`.
     kernel
         Airlight kernel, see `airlight list kernels`.
     precision
         Whether the kernel computes in float32 (single) or float64 (double).
     certify
-        Also integrate by adaptive quadrature in float64, to 1e-10, and compare with that where no value is given.
+        Also integrate by adaptive quadrature in float64, to 1e-10, and compare with that
+        where no value is given.
 
     Examples
     --------
@@ -289,7 +301,9 @@ def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":
     if isinstance(cases, Cases):
         return cases, (len(cases.x0),)
     if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):
-        raise InputError(f"cases: got {type(cases).__name__}, expected columns by name or the path of a CSV file")
+        raise InputError(
+            f"cases: got {type(cases).__name__}, expected columns by name or the path of a CSV file"
+        )
     return cases_from_columns({str(name): cases[name] for name in cases})
 
 

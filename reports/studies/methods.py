@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
 
 def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
-    """Return the scenes, loaded; those for fog by default. Unusable scenes are refused before the work."""
+    """Return the scenes, loaded; those for fog by default. Unusable scenes are
+    refused before the work.
+    """
     from airlight.reports.api.scenes import opened
     from airlight.validation.scenes.registry import FOG_SCENES
 
@@ -47,8 +49,11 @@ def scene_by_scene(loaded: list[Any], title: str, progress: Any) -> Iterator[tup
             yield scene, part
 
 
-def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Callable[[Any], tuple[Any, Any]]]:
-    """Return a scene as methods see it, its reference, and what gives row and frame of a configuration beside it.
+def cells_of(
+    loaded: Any, measure: Any, *, apart: bool
+) -> tuple[Any, Any, Callable[[Any], tuple[Any, Any]]]:
+    """Return a scene as methods see it, its reference, and what gives row and frame of a
+    configuration beside it.
 
     Methods of users run in separate processes if they can be found there, `apart`.
     """
@@ -70,9 +75,16 @@ def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Calla
 
 
 def check_study(
-    what: str, loaded: list[Any], chosen: list[Any], *, frames: float | None = None, progress: Any = None
+    what: str,
+    loaded: list[Any],
+    chosen: list[Any],
+    *,
+    frames: float | None = None,
+    progress: Any = None,
 ) -> None:
-    """Refuse what would take more than an hour; `frames` are those of a configuration, as many as timing takes."""
+    """Refuse what would take more than an hour; `frames` are those of a configuration,
+    as many as timing takes.
+    """
     from airlight.realtime.scene.read_scene import read_scene
     from airlight.validation.study.configuration import configuration_work
     from airlight.validation.study.cost import TIMED, check_work, reference_work
@@ -81,20 +93,25 @@ def check_study(
     for each in loaded:
         scene = read_scene(each.scene)
         note(progress, scene.features.notes)
-        works.append(reference_work(each.size, lights=len(scene.lights), area_lights=len(scene.area_lights)))
+        works.append(
+            reference_work(each.size, lights=len(scene.lights), area_lights=len(scene.area_lights))
+        )
         works += [configuration_work(scene, one, frames or TIMED) for one in chosen]
     check_work(what, works)
 
 
 class MethodsStudy(Study):
-    """Speed against error: a row for each configuration in each scene, a record as those of `airlight sweep`.
+    """Speed against error: a row for each configuration in each scene, a record as
+    those of `airlight sweep`.
 
-    A row has `scene`, `label`, `method`, `kernel`, `times` (such as `times.frame.median_ms`), `error` (such as
-    `error.relative_rmse`), and `reason`, why the method cannot render the scene. Missing values are None.
+    A row has `scene`, `label`, `method`, `kernel`, `times` (such as `times.frame.median_ms`),
+    `error` (such as `error.relative_rmse`), and `reason`, why the method cannot render the scene.
+    Missing values are None.
     """
 
     def fastest(self, error: float, scene: str | None = None) -> "CellRow | None":
-        """Return the row of the fastest frame whose relative RMSE is at most `error`; None where there is none.
+        """Return the row of the fastest frame whose relative RMSE is at most `error`;
+        None where there is none.
 
         Parameters
         ----------
@@ -122,16 +139,18 @@ def methods(
 ) -> MethodsStudy:
     """Time methods and measure their errors.
 
-    Every method is timed in every scene and compared with the reference. `airlight` is the airlight alone (the kernel
-    with its ray set-up), `frame` a frame with static geometry and light, `light moved` a frame after the light moved.
+    Every method is timed in every scene and compared with the reference. `airlight` is the airlight
+    alone (the kernel with its ray set-up), `frame` a frame with static geometry and light, `light
+    moved` a frame after the light moved.
 
     Parameters
     ----------
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
     method
-        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl, or 'all', the
-        default; may be given several times. A name stands for its standard configurations.
+        A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or
+        FILE.glsl, or 'all', the default; may be given several times. A name stands for its standard
+        configurations.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
@@ -181,7 +200,8 @@ def methods(
         tell(0.5, "times")
         timings = time_cells(asked, partial(_same, read), apart=in_own_process if apart else None)
         found = [
-            replace(with_times(row, times), scene=scene.name) for (row, _), times in zip(measured, timings, strict=True)
+            replace(with_times(row, times), scene=scene.name)
+            for (row, _), times in zip(measured, timings, strict=True)
         ]
         rows += found
         title = "{}, {} x {}".format(scene.name, *scene.size)
@@ -203,7 +223,11 @@ def _same(scene: Any, cell: Any) -> Any:
 
 # Errors by cause
 
-_PARTS = {"relative_rmse": FRACTION, "relative_bias": FRACTION, "fraction": {"percent": True, "places": 1}}
+_PARTS = {
+    "relative_rmse": FRACTION,
+    "relative_bias": FRACTION,
+    "fraction": {"percent": True, "places": 1},
+}
 
 
 @with_kernels
@@ -217,15 +241,16 @@ def decomposition(
 ) -> Study:
     """Split the error of methods by its causes.
 
-    The parts add up to the error: they are differences of renders in which one cause after the other is gone. The
-    figure shows image, error and parts of the first scene.
+    The parts add up to the error: they are differences of renders in which one cause after the
+    other is gone. The figure shows image, error and parts of the first scene.
 
     Parameters
     ----------
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
     method
-        A method, as in `airlight study methods`; by default a ray march by a map, min-max and froxel-fog.
+        A method, as in `airlight study methods`; by default a ray march by a
+        map, min-max and froxel-fog.
     settings
         NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     size
@@ -247,7 +272,11 @@ def decomposition(
         tables.append(_cause_table(title, split))
         entries = []
         for each, _, found in split:
-            entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
+            entry: dict[str, Any] = {
+                "label": each.label,
+                "method": each.method,
+                "kernel": each.kernel,
+            }
             entry |= {"parameters": dict(each.parameters)}
             if isinstance(found, str):
                 entries.append(entry | {"refused": found})
@@ -256,7 +285,13 @@ def decomposition(
             entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
             rows += [{"scene": scene.name, "label": each.label, **part} for part in parts]
         data.append({"name": scene.name, "size": list(scene.size), "methods": entries})
-        drawn.append([(each.label, image, found) for each, image, found in split if not isinstance(found, str)])
+        drawn.append(
+            [
+                (each.label, image, found)
+                for each, image, found in split
+                if not isinstance(found, str)
+            ]
+        )
     return Study(
         name="decomposition",
         data=with_environment(scenes=data),
@@ -281,7 +316,9 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
     def airlight(configuration: Any) -> Any:
         row, frame = cell(configuration)
         if frame is None or row.error is None or row.error.nonfinite:
-            raise InputError(row.reason or f"{configuration.label}: its image has values that are not finite")
+            raise InputError(
+                row.reason or f"{configuration.label}: its image has values that are not finite"
+            )
         return frame.airlight
 
     split: Split = []
@@ -289,7 +326,9 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
     for at, each in enumerate(useful):
         progress((1 + at) / (1 + len(useful)), each.label)
         try:
-            split.append((each, reference.airlight, decompose(scene, each, reference.airlight, airlight)))
+            split.append(
+                (each, reference.airlight, decompose(scene, each, reference.airlight, airlight))
+            )
         except InputError as error:
             split.append((each, reference.airlight, str(error)))
     return split
@@ -303,13 +342,18 @@ def _cause_table(title: str, split: Split) -> Table:
         if isinstance(found, str):
             rows.append(Row({"label": each.label}, reason=found))
             continue
-        rows += [Row({**shown_values(part), "label": "" if at else each.label}) for at, part in enumerate(found)]
+        rows += [
+            Row({**shown_values(part), "label": "" if at else each.label})
+            for at, part in enumerate(found)
+        ]
     columns = table_of(title, ErrorPart, (), how=_PARTS).columns
     return table(title, (*words(label="method"), *columns), rows)
 
 
 def _draw_parts(split: list[Any], column: str) -> Any:
-    """Return the image of each method, its error, and the parts that add up to it, on the scale of the page."""
+    """Return the image of each method, its error, and the parts that add up to it,
+    on the scale of the page.
+    """
     import numpy as np
 
     from airlight.reports.plotting.figure import new_figure, show_picture
@@ -327,9 +371,18 @@ def _draw_parts(split: list[Any], column: str) -> Any:
         reference = np.asarray(given, dtype=np.float64)
         factor = exposure(reference)
         show_picture(line[0], tone_mapped(reference, factor), "reference", size)
-        show_picture(line[1], tone_mapped(reference + parts[0].image, factor), label.replace(" (", "\n("), size)
+        show_picture(
+            line[1],
+            tone_mapped(reference + parts[0].image, factor),
+            label.replace(" (", "\n("),
+            size,
+        )
         for panel, part in zip(line[2:], parts):
-            shown = "" if part.fraction is None or part.cause == "whole" else f", {100 * part.fraction:.0f} %"
+            shown = (
+                ""
+                if part.fraction is None or part.cause == "whole"
+                else f", {100 * part.fraction:.0f} %"
+            )
             error = "dark" if part.relative_rmse is None else f"{part.relative_rmse:.1e}"
             title = f"{part.cause}\n{error}{shown}"
             show_picture(panel, error_map(reference, reference + part.image), title, size)

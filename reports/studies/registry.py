@@ -26,7 +26,8 @@ class Study(Said):
 
     #: A record for each measurement; a mapping where the columns of a study are no record's.
     rows: tuple[Any, ...] = ()
-    draw: "Callable[[str], Figure] | None" = None  #: returns the figure for a column, 'single' or 'double'
+    #: returns the figure for a column, 'single' or 'double'
+    draw: "Callable[[str], Figure] | None" = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -54,7 +55,8 @@ class Study(Said):
         return {name: [row.get(name) for row in rows] for name in names}
 
     def save(self, path: Path | str, column: str = "double") -> Path:
-        """Write the tables (.csv, .tex, .md), the data (.json) or the figure (.pdf, .png); return the path.
+        """Write the tables (.csv, .tex, .md), the data (.json) or the figure
+        (.pdf, .png); return the path.
 
         Parameters
         ----------
@@ -74,20 +76,30 @@ class Study(Said):
         target = Path(path)
         if target.suffix in (".pdf", ".png"):
             if self.draw is None:
-                raise InputError(f"{target}: the study {self.name} has no figure; write .csv, .tex, .md or .json")
+                raise InputError(
+                    f"{target}: the study {self.name} has no figure; write .csv, .tex, .md or .json"
+                )
             from airlight.reports.plotting.figure import save_figure
 
             return save_figure(target, self.draw, column)
         if target.suffix == ".csv":
-            write_text(target, _columns_csv(self.columns()) if self.rows else "\n".join(map(csv, self.tables)))
+            write_text(
+                target,
+                _columns_csv(self.columns()) if self.rows else "\n".join(map(csv, self.tables)),
+            )
         elif target.suffix == ".tex":
             write_text(target, "\n".join(latex([table]) for table in self.tables))
         elif target.suffix == ".md":
             write_text(target, "\n".join(map(markdown, self.tables)))
         elif target.suffix == ".json":
-            write_text(target, json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+            write_text(
+                target,
+                json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+            )
         else:
-            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {', '.join(ENDINGS)}")
+            raise InputError(
+                f"output: got {str(path)!r}, expected a name that ends in {', '.join(ENDINGS)}"
+            )
         return target
 
 
@@ -95,7 +107,11 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
     from airlight.reports.tables.drawing import csv
     from airlight.reports.tables.table import Column, table
 
-    filled = {name: values for name, values in columns.items() if any(value is not None for value in values)}
+    filled = {
+        name: values
+        for name, values in columns.items()
+        if any(value is not None for value in values)
+    }
     return csv(table("", [Column(name, name) for name in filled], list(zip(*filled.values()))))
 
 
@@ -130,7 +146,9 @@ def find_study(name: str) -> Callable[..., Any]:
         For an unknown study; the nearest is named.
     """
     if name not in STUDIES:
-        raise InputError(f"study: got {name!r}, expected one of {', '.join(STUDIES)}" + nearest(name, STUDIES))
+        raise InputError(
+            f"study: got {name!r}, expected one of {', '.join(STUDIES)}" + nearest(name, STUDIES)
+        )
     function: Callable[..., Any] = getattr(
         importlib.import_module(f"airlight.reports.studies.{STUDIES[name]}"), name.replace("-", "_")
     )
@@ -145,8 +163,8 @@ def summary(name: str) -> str:
 def study(name: str, *arguments: Any, **named: Any) -> Any:
     """Run a study: measurements of methods and kernels, with tables and a figure.
 
-    `airlight study NAME --help` lists the arguments of a study. It returns rows, tables and data; `save`, or -o, writes
-    tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).
+    `airlight study NAME --help` lists the arguments of a study. It returns rows, tables and data;
+    `save`, or -o, writes tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of errors that vary: from run to run, and from frame to frame under a light that moves."""
+"""Studies of errors that vary: from run to run, and from frame to frame
+under a light that moves.
+"""
 
 import math
 from functools import partial
@@ -41,9 +43,9 @@ def noise(
 ) -> Study:
     """Measure bias and noise of methods that draw random numbers, by independent runs of one frame.
 
-    The reference has no noise. Methods that draw no random numbers stand in the same table: all of their error is bias.
-    docs/your-engine.md explains the numbers; `airlight compare SCENE "runs/####.exr"` has the same for renders of
-    others.
+    The reference has no noise. Methods that draw no random numbers stand in the same table: all of
+    their error is bias. docs/your-engine.md explains the numbers; `airlight compare SCENE
+    "runs/####.exr"` has the same for renders of others.
 
     Parameters
     ----------
@@ -109,7 +111,9 @@ def noise(
 
 
 def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
-    """Return error against time, error spectra, and of each noisy method what is biased and how noisy it is."""
+    """Return error against time, error spectra, and of each noisy method what is
+    biased and how noisy it is.
+    """
     from airlight.reports.plotting.figure import new_figure
     from airlight.reports.plotting.pictures import error_map
     from airlight.reports.plotting.style import WIDTHS
@@ -119,21 +123,35 @@ def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
     panels = figure.subplots(1 + len(noisy), 2, squeeze=False)
     errors, spectra = panels[0]
     for each in found:
-        steps = [10 ** (k / 8) for k in range(1 + round(8 * math.log10(_MOST)) if each.noise.runs > 1 else 1)]
+        steps = [
+            10 ** (k / 8)
+            for k in range(1 + round(8 * math.log10(_MOST)) if each.noise.runs > 1 else 1)
+        ]
         style = {} if each.noise.runs > 1 else {"marker": "o", "linestyle": ""}
         # Without a time there is no place on the axis.
         seconds = math.nan if each.noise.seconds is None else each.noise.seconds
-        errors.plot([seconds * n for n in steps], [each.noise.after(n) for n in steps], label=each.label, **style)
+        errors.plot(
+            [seconds * n for n in steps],
+            [each.noise.after(n) for n in steps],
+            label=each.label,
+            **style,
+        )
         rings = len(each.noise.spectrum)
-        spectra.plot([(k + 0.5) / (2 * rings) for k in range(rings)], each.noise.spectrum, label=each.label)
-    errors.set(xlabel="time [s]", ylabel="relative RMSE of averaged runs [1]", xscale="log", yscale="log")
+        spectra.plot(
+            [(k + 0.5) / (2 * rings) for k in range(rings)], each.noise.spectrum, label=each.label
+        )
+    errors.set(
+        xlabel="time [s]", ylabel="relative RMSE of averaged runs [1]", xscale="log", yscale="log"
+    )
     errors.legend(loc="best")
     spectra.axhline(1.0, color="0.5", linestyle=":")  # white noise
     spectra.set(xlabel="frequency [cycles/pixel]", ylabel="error spectrum [1]")
     for (bias, deviation), each in zip(panels[1:], noisy, strict=True):
         bias.imshow(error_map(each.reference, each.mean), interpolation="nearest")
         bias.set_title("mean of the runs, from two standard errors on", fontsize="small")
-        shown = deviation.imshow(each.deviation.mean(axis=2) / each.reference.mean(), interpolation="nearest")
+        shown = deviation.imshow(
+            each.deviation.mean(axis=2) / each.reference.mean(), interpolation="nearest"
+        )
         deviation.set_title("standard deviation of a run", fontsize="small")
         figure.colorbar(shown, ax=deviation)
         bias.set_ylabel(each.label, fontsize="small")
@@ -160,8 +178,9 @@ def motion(
 ) -> Study:
     """Measure how methods flicker, lag and leave ghosts under a light that moves.
 
-    Each frame is compared with its own reference. A method that keeps history gets it. See docs/your-engine.md for what
-    the numbers are; `airlight compare --frames` has the same for frames of other renderers.
+    Each frame is compared with its own reference. A method that keeps history gets it. See
+    docs/your-engine.md for what the numbers are; `airlight compare --frames` has the same for
+    frames of other renderers.
 
     Parameters
     ----------
@@ -172,7 +191,8 @@ def motion(
     frames
         How many are rendered.
     method
-        As in `airlight study methods`; planes, froxels with and without history, a noisy march with it, by default.
+        As in `airlight study methods`; planes, froxels with and without history, a noisy
+        march with it, by default.
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
@@ -210,13 +230,20 @@ def motion(
     for each in found:
         row: dict[str, Any] = {"label": each.label, "verdict": each.verdict}
         if each.measures:
-            told = {name: getattr(each.measures, name) for name in ("relative_rmse", "bias", "flicker", "ghost")}
+            told = {
+                name: getattr(each.measures, name)
+                for name in ("relative_rmse", "bias", "flicker", "ghost")
+            }
             told["lag"] = each.measures.lag.lag
-            row |= {name: estimate.value for name, estimate in told.items()} | {"pop": each.measures.pop}
+            row |= {name: estimate.value for name, estimate in told.items()} | {
+                "pop": each.measures.pop
+            }
             row |= {f"{name}_se": told[name].error for name in ("lag", "ghost")}
         rows.append(row)
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
-    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=found)
+    data = with_environment(
+        scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=found
+    )
     return Study(
         name="motion",
         data=data,

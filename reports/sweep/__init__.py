@@ -4,7 +4,8 @@
 Read in this order:
 
 - `samples.py`: the Parquet by columns, one sample a scene for each configuration
-- `claims.py`: fractions of scenes within an error, which property of a scene goes with it, with intervals
+- `claims.py`: fractions of scenes within an error, which property of a scene
+  goes with it, with intervals
 - `faults.py`: refusals, what is wrong whatever the error, the worst scenes
 - `summary.py`: all of these, worked out once
 - `tables.py`: tables of them

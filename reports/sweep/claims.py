@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: in what fraction of the scenes a configuration keeps an error, and which property of a scene goes with it.
+"""Claims: in what fraction of the scenes a configuration keeps an error, and which property
+of a scene goes with it.
 
-A scene counts as within an error if its image was made, all its pixels are finite, and the relative RMSE is at most
-the error. A refusal is no try: refused scenes are counted apart, and so are scenes that have no reference. A cell that
-failed, hung or died is a try that missed. Where the target and the error differ by less than the error of the reference
-nothing is decided. Such a scene is within at the upper end of the interval and not at the lower one: the interval holds
-the fraction whatever an exact reference would have said.
+A scene counts as within an error if its image was made, all its pixels are finite, and the relative
+RMSE is at most the error. A refusal is no try: refused scenes are counted apart, and so are scenes
+that have no reference. A cell that failed, hung or died is a try that missed. Where the target and
+the error differ by less than the error of the reference nothing is decided. Such a scene is within
+at the upper end of the interval and not at the lower one: the interval holds the fraction whatever
+an exact reference would have said.
 
-Properties are correlated with errors by ranks, as neither has a natural scale. A property that correlates with an error
-need not cause it. Properties correlate with one another too (more lights, more triangles): among several that say
-nearly the same, the one with the strongest correlation is named. All intervals of correlations hold together with the
-level (Bonferroni): each has the level 1 - (1 - level)/m of m correlations. With hundreds of these, some would be away
-from zero by chance.
+Properties are correlated with errors by ranks, as neither has a natural scale. A property that
+correlates with an error need not cause it. Properties correlate with one another too (more lights,
+more triangles): among several that say nearly the same, the one with the strongest correlation is
+named. All intervals of correlations hold together with the level (Bonferroni): each has the level
+1 - (1 - level)/m of m correlations. With hundreds of these, some would be away from zero by chance.
 """
 
 from collections.abc import Sequence
@@ -51,13 +53,17 @@ class Claim:
             words = f"in {percent(self.fraction, self.tries)} % of {scenes_words(self.tries)}, "
             words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
         if self.undecided:
-            words += f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
+            words += (
+                f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
+            )
         words += f"; {self.refused} more refused" if self.refused else ""
         return words + (f"; no reference of {self.untold} more" if self.untold else "")
 
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
-    """Return in what fraction of the scenes a relative RMSE is at most the target; `level` is of this claim [1]."""
+    """Return in what fraction of the scenes a relative RMSE is at most the target;
+    `level` is of this claim [1].
+    """
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
     surely = finite & (sample.errors + sample.reference_errors <= target)
@@ -87,7 +93,9 @@ def claims(made: Sequence[Sample]) -> list[Claim]:
 
 
 def best_claims(made: Sequence[Claim], target: float) -> list[Claim]:
-    """Return the claims on an error that promise most, by the lower ends of their intervals, with equals."""
+    """Return the claims on an error that promise most, by the lower ends of
+    their intervals, with equals.
+    """
     tried = [each for each in made if each.target == target and each.within]
     most = max((each.low for each in tried), default=0.0)
     return [each for each in tried if each.low == most]
@@ -99,7 +107,9 @@ def scenes_words(count: int) -> str:
 
 
 def percent(fraction: float, trials: int) -> str:
-    """Return a fraction in per cent, to the digits that so many trials tell apart, never rounded up to all or none."""
+    """Return a fraction in per cent, to the digits that so many trials tell apart, never
+    rounded up to all or none.
+    """
     places = max(0, int(np.ceil(np.log10(max(trials, 1)))) - 2)
     text = f"{100 * fraction:.{places}f}"
     if fraction < 1 and float(text) == 100:
@@ -112,7 +122,11 @@ def percent(fraction: float, trials: int) -> str:
 def written(target: float) -> str:
     """Return an error as claims name it: 1e-3, or 0.05 where it is no power of ten."""
     exponent = np.log10(target)
-    return f"1e{exponent:.0f}" if np.isclose(exponent, np.round(exponent), atol=1e-9) else f"{target:g}"
+    return (
+        f"1e{exponent:.0f}"
+        if np.isclose(exponent, np.round(exponent), atol=1e-9)
+        else f"{target:g}"
+    )
 
 
 SAME = 0.8  #: rank correlation of two properties from which on they say nearly the same
@@ -133,7 +147,9 @@ class Correlation:
 
 
 def correlations(sweep: Sweep, made: Sequence[Sample]) -> list[Correlation]:
-    """Return the correlation of every property that varies with the error of every configuration."""
+    """Return the correlation of every property that varies with the
+    error of every configuration.
+    """
     pairs = []
     for sample in made:
         usable = sample.measured & ~np.isnan(sample.errors)
@@ -144,7 +160,10 @@ def correlations(sweep: Sweep, made: Sequence[Sample]) -> list[Correlation]:
             if len(x) >= LEAST and np.ptp(x) > 0 and len(np.unique(y)) > 1:
                 pairs.append((sample, name, x, y))
     each = 1 - (1 - LEVEL) / max(len(pairs), 1)
-    return [Correlation(sample.label, name, len(x), *rank_correlation(x, y, each)) for sample, name, x, y in pairs]
+    return [
+        Correlation(sample.label, name, len(x), *rank_correlation(x, y, each))
+        for sample, name, x, y in pairs
+    ]
 
 
 def sure(found: Correlation) -> bool:
@@ -153,14 +172,17 @@ def sure(found: Correlation) -> bool:
 
 
 def strongest(found: Sequence[Correlation], sweep: Sweep, sample: Sample) -> list[Correlation]:
-    """Return the properties that go with the error of a configuration most, without any that say nearly the same.
+    """Return the properties that go with the error of a configuration most, without any
+    that say nearly the same.
 
     `found` comes from `correlations`.
     """
     own = [each for each in found if each.label == sample.label and sure(each)]
     chosen: list[Correlation] = []
     for each in sorted(own, key=lambda each: (-abs(each.r), each.property)):
-        if len(chosen) < NAMED and all(not _same(sweep, sample, each.property, other.property) for other in chosen):
+        if len(chosen) < NAMED and all(
+            not _same(sweep, sample, each.property, other.property) for other in chosen
+        ):
             chosen.append(each)
     return chosen
 

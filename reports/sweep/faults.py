@@ -3,7 +3,8 @@
 
 Refusals and faults are of all rows, drawn scenes and named ones.
 
-Reasons are counted after their numbers were taken out: "light 3 of 8" and "light 1 of 2" are one reason.
+Reasons are counted after their numbers were taken out: "light 3 of 8" and
+"light 1 of 2" are one reason.
 """
 
 import re
@@ -22,9 +23,17 @@ COUNT = 10  #: worst scenes of a configuration
 #: Possible faults of an image: name, the column that counts the pixels, and a description.
 CHECKS = (
     ("not finite", "error.nonfinite", "pixels of the airlight that are NaN or infinite"),
-    ("surface not finite", "surface_error.nonfinite", "pixels of the lit surfaces that are NaN or infinite"),
+    (
+        "surface not finite",
+        "surface_error.nonfinite",
+        "pixels of the lit surfaces that are NaN or infinite",
+    ),
     ("negative", "error.negative", "pixels with a negative value"),
-    ("outside of the bound", "stated.outside", "pixels whose error is larger than the bound that the method states"),
+    (
+        "outside of the bound",
+        "stated.outside",
+        "pixels whose error is larger than the bound that the method states",
+    ),
 )
 
 
@@ -70,7 +79,9 @@ def reasons(sweep: Sweep) -> list[Reason]:
     groups: dict[tuple[str, str], list[int]] = {}
     texts, status, scenes = sweep["reason"], sweep["status"], sweep["scene"]
     for row in np.flatnonzero(np.isin(status.astype(str), statuses)).tolist():
-        groups.setdefault((status[row], without_numbers(texts[row] or "no reason given", scenes[row])), []).append(row)
+        groups.setdefault(
+            (status[row], without_numbers(texts[row] or "no reason given", scenes[row])), []
+        ).append(row)
     labels, commands = sweep["label"], sweep["command"]
     made = [
         Reason(
@@ -100,20 +111,31 @@ def checks(sweep: Sweep) -> list[Check]:
         pixels, scenes = sweep[counted], sweep["scene"]
         says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
         made.append(
-            Check(name, int(says.sum()), len(set(scenes[says])), int(bad.sum()), len(set(scenes[bad])), meaning)
+            Check(
+                name,
+                int(says.sum()),
+                len(set(scenes[says])),
+                int(bad.sum()),
+                len(set(scenes[bad])),
+                meaning,
+            )
         )
     return made
 
 
 def faults(sweep: Sweep) -> list[Fault]:
     """Return every image that is wrong, those with the most pixels first within a check."""
-    labels, scenes, commands, of = (sweep[name] for name in ("label", "scene", "command", "error.pixels"))
+    labels, scenes, commands, of = (
+        sweep[name] for name in ("label", "scene", "command", "error.pixels")
+    )
     made = []
     for name, counted, _ in CHECKS:
         pixels = np.nan_to_num(sweep[counted])
         for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
             whole = 0 if np.isnan(of[row]) else int(of[row])
-            made.append(Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or ""))
+            made.append(
+                Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or "")
+            )
     return made
 
 
@@ -134,7 +156,9 @@ class Worst:
 
 
 def worst(sweep: Sweep, sample: Sample, properties: Sequence[str]) -> list[Worst]:
-    """Return the worst scenes of a configuration, the worst first, with some of their properties."""
+    """Return the worst scenes of a configuration, the worst first, with
+    some of their properties.
+    """
     errors = np.where(np.isnan(sample.errors), -np.inf, sample.errors)
     order = np.lexsort((-errors, -sample.nonfinite.astype(bool).astype(float)))
     places = [place for place in order if sample.measured[place]][:COUNT]
@@ -148,7 +172,9 @@ def worst(sweep: Sweep, sample: Sample, properties: Sequence[str]) -> list[Worst
             key=sweep["key"][row],
             scene=sample.scenes[place],
             medium=sweep["medium"][row],
-            relative_rmse=float(sample.errors[place]) if np.isfinite(sample.errors[place]) else None,
+            relative_rmse=float(sample.errors[place])
+            if np.isfinite(sample.errors[place])
+            else None,
             p99=known("error.p99", row),
             relative_bias=known("error.relative_bias", row),
             reference_error=known("reference.error", row),

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The files that say what a sweep says, made from its Parquet alone: its page, its figures and its claims.
+"""The files that say what a sweep says, made from its Parquet alone: its page,
+its figures and its claims.
 
-The page is one HTML file that needs no network. A sweep has a thousand scenes and a dozen configurations or more: no
-panel tells a dozen colours apart, so every configuration has a line of the figure.
+The page is one HTML file that needs no network. A sweep has a thousand scenes and a dozen
+configurations or more: no panel tells a dozen colours apart, so every configuration has a line of
+the figure.
 """
 
 import base64
@@ -18,7 +20,13 @@ from airlight.reference.storage.files import ensure_folder, write_bytes, write_t
 from airlight.reports.page.chart import svg_text
 from airlight.reports.page.filters import drawn, facts, percent, unbroken
 from airlight.reports.page.render import page_environment, template_text
-from airlight.reports.plotting.figure import file_bytes, legend_below, new_figure, plain_times, short
+from airlight.reports.plotting.figure import (
+    file_bytes,
+    legend_below,
+    new_figure,
+    plain_times,
+    short,
+)
 from airlight.reports.plotting.style import page_style, report_styles
 from airlight.reports.sweep import tables
 from airlight.reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
@@ -36,9 +44,12 @@ _TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults")
 
 _WIDTH = 10.2  #: of a figure [inches]; the page scales it
 _EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
-_WRONG = 1e3  #: errors above are drawn here: a series that left its range has 1e22, and no other point could be told
+#: errors above are drawn here: a series that left its range has 1e22, and no
+#: other point could be told
+_WRONG = 1e3
 _LABEL = 38  # letters of a label, which may be a path of a user's: room is left for the panel
-_DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
+#: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
+_DOTS = 160
 
 ERROR = "relative RMSE of the airlight [1]"
 TIME = "time of a frame [ms]"
@@ -47,8 +58,8 @@ TIME = "time of a frame [ms]"
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:
     """Write what a sweep says, from its Parquet alone; return that and the path of its page.
 
-    `source` is the folder of a sweep or its Parquet, `target` the folder of the files, the one with the Parquet by
-    default.
+    `source` is the folder of a sweep or its Parquet, `target` the folder of the files, the one
+    with the Parquet by default.
     """
     said = summary_of(read_sweep(source))
     folder = ensure_folder(said.sweep.path.parent if target is None else target)
@@ -57,18 +68,25 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
         charts[name] = svg_text(figure, name)
         write_text(folder / FIGURES / f"{name}.svg", charts[name])
         write_bytes(folder / FIGURES / f"{name}.pdf", file_bytes(figure, ".pdf", dpi=320))
-    write_text(folder / CLAIMS, json.dumps(plain(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(
+        folder / CLAIMS,
+        json.dumps(plain(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+    )
     write_text(folder / PAGE, render_sweep(said, charts))
     return said, folder / PAGE
 
 
 def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
-    """Return the HTML page of a sweep, with its figures as SVG by name, and pictures of the worst scenes."""
+    """Return the HTML page of a sweep, with its figures as SVG by name, and
+    pictures of the worst scenes.
+    """
     from markupsafe import Markup
 
     environment = page_environment()
     environment.filters["error"] = error_words
-    environment.globals |= {f"{name}_table": drawn(getattr(tables, f"{name}_table")) for name in _TABLES}
+    environment.globals |= {
+        f"{name}_table": drawn(getattr(tables, f"{name}_table")) for name in _TABLES
+    }
     environment.globals |= {"facts_table": drawn(facts), "property_words": property_words}
     template = environment.get_template("sweep.html.j2")
     worst = _worst_keys(said)
@@ -104,13 +122,22 @@ def error_words(value: float | None) -> str:
 def _worst_keys(said: Summary) -> list[str]:
     """Return the keys of the worst scenes' rows, the worst of every configuration first."""
     ranks = max((len(several) for several in said.worst.values()), default=0)
-    return [several[rank].key for rank in range(ranks) for several in said.worst.values() if rank < len(several)]
+    return [
+        several[rank].key
+        for rank in range(ranks)
+        for several in said.worst.values()
+        if rank < len(several)
+    ]
 
 
 def _pictures(said: Summary, keys: list[str]) -> dict[str, str]:
     """Return pictures of rows as addresses that hold them, by key."""
     kept: dict[str, Any] = said.sweep.pictures(keys)
-    return {key: f"data:image/webp;base64,{base64.b64encode(kept[key]).decode()}" for key in keys if key in kept}
+    return {
+        key: f"data:image/webp;base64,{base64.b64encode(kept[key]).decode()}"
+        for key in keys
+        if key in kept
+    }
 
 
 # Figures: for the page as SVG, for papers as PDF
@@ -118,7 +145,8 @@ def _pictures(said: Summary, keys: list[str]) -> dict[str, str]:
 
 @page_style()
 def distribution(said: Summary) -> "Figure | None":
-    """Return how the errors of each configuration are spread over the scenes: a line each, the best above.
+    """Return how the errors of each configuration are spread over the scenes: a
+    line each, the best above.
 
     None if nothing was measured.
     """
@@ -131,11 +159,28 @@ def distribution(said: Summary) -> "Figure | None":
     styles = report_styles((sample.method, sample.label) for sample in said.samples)
     for place, sample in enumerate(shown):
         errors, colour = _errors(sample), styles[sample.label]["color"]
-        low, first, middle, third, high = np.quantile(errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest")
+        low, first, middle, third, high = np.quantile(
+            errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest"
+        )
         outside = errors[(errors < low) | (errors > high)]
-        panel.plot(outside, np.full(len(outside), place), "|", color=colour, markersize=5, alpha=0.5, rasterized=True)
+        panel.plot(
+            outside,
+            np.full(len(outside), place),
+            "|",
+            color=colour,
+            markersize=5,
+            alpha=0.5,
+            rasterized=True,
+        )
         panel.plot((low, high), (place, place), color=colour, linewidth=1.2)
-        panel.plot((first, third), (place, place), color=colour, linewidth=7, alpha=0.55, solid_capstyle="butt")
+        panel.plot(
+            (first, third),
+            (place, place),
+            color=colour,
+            linewidth=7,
+            alpha=0.55,
+            solid_capstyle="butt",
+        )
         panel.plot(middle, place, "|", color="black", markersize=9, markeredgewidth=1.6)
     for target in TARGETS:
         panel.axvline(target, color="#666a72", linewidth=0.8, linestyle=":", zorder=0)
@@ -149,7 +194,8 @@ def distribution(said: Summary) -> "Figure | None":
 
 @page_style()
 def medians(said: Summary) -> "Figure | None":
-    """Return speed against error, each configuration as its median and its quartiles over the scenes.
+    """Return speed against error, each configuration as its median and its
+    quartiles over the scenes.
 
     None if nothing was timed with the machine to itself.
     """
@@ -161,9 +207,13 @@ def medians(said: Summary) -> "Figure | None":
     styles = report_styles((sample.method, sample.label) for sample in said.samples)
     for sample in shown:
         times, errors = _points(sample)
-        (x0, x, x1), (y0, y, y1) = (np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors))
+        (x0, x, x1), (y0, y, y1) = (
+            np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors)
+        )
         style = styles[sample.label] | {"linestyle": "none", "markersize": 8}
-        panel.errorbar(x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style)
+        panel.errorbar(
+            x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style
+        )
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
     plain_times(panel)
     keys = {short(each.label, _LABEL): styles[each.label] for each in shown}
@@ -172,7 +222,9 @@ def medians(said: Summary) -> "Figure | None":
 
 
 def drawn_figures(said: Summary) -> Iterator[tuple[str, "Figure"]]:
-    """Yield the figures that the sweep has data for, with the names of their files and their places on the page."""
+    """Yield the figures that the sweep has data for, with the names of their files and
+    their places on the page.
+    """
     for name, draw in (("sweep-errors", distribution), ("sweep-medians", medians)):
         figure = draw(said)
         if figure is not None:
@@ -197,7 +249,9 @@ def _points(sample: Sample) -> tuple[Numbers, Numbers]:
 
 
 def _with_count(sample: Sample) -> str:
-    """Return the name of a configuration, and how many of its scenes have no place in the figure."""
+    """Return the name of a configuration, and how many of its scenes
+    have no place in the figure.
+    """
     away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
     words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
     return f"{short(sample.label, _LABEL)}{f' [{words}]' if words else ''}"

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Parquet of a sweep by columns, and the errors of each configuration over scenes: one sample a scene.
+"""The Parquet of a sweep by columns, and the errors of each configuration over
+scenes: one sample a scene.
 
 Neither Mitsuba nor a scene is needed.
 
-Cells of one scene are not independent of one another, so they do not count twice: the medium with the largest error
-stands for its scene. A configuration is a method with its kernel, its parameters and the size of its image. Scenes that
-were drawn at random are a sample of what their ranges hold, and claims are about these alone; scenes that somebody
-chose are a sample of nothing, and stand in for it only where there are no others.
+Cells of one scene are not independent of one another, so they do not count twice: the medium with
+the largest error stands for its scene. A configuration is a method with its kernel, its parameters
+and the size of its image. Scenes that were drawn at random are a sample of what their ranges hold,
+and claims are about these alone; scenes that somebody chose are a sample of nothing, and stand in
+for it only where there are no others.
 """
 
 import re
@@ -29,19 +31,24 @@ FILE = "sweep.parquet"  #: in the folder of a sweep
 
 Numbers = NDArray[np.float64]
 
-_CELL = ("scene", "medium", "label", "width", "height")  #: what makes a cell one: the label has method and parameters
+#: what makes a cell one: the label has method and parameters
+_CELL = ("scene", "medium", "label", "width", "height")
 _ORDER = ("scene", "method", "label", "medium")
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Rows by columns, one of each cell, sorted: the order in which they were finished is chance."""
+    """Rows by columns, one of each cell, sorted: the order in which they
+    were finished is chance.
+    """
 
     path: Path
     #: Texts as objects, None for null; numbers with NaN, truth values as 0 and 1.
     columns: Mapping[str, NDArray[Any]] = field(repr=False)
-    properties: tuple[str, ...]  #: names of the scenes' properties, without what begins their columns
-    superseded: int = 0  #: rows of cells that were computed again: by newer source code, or to be timed
+    #: names of the scenes' properties, without what begins their columns
+    properties: tuple[str, ...]
+    #: rows of cells that were computed again: by newer source code, or to be timed
+    superseded: int = 0
 
     def __len__(self) -> int:
         return len(self.columns["key"])
@@ -63,7 +70,9 @@ class Sweep:
         with _reading(self.path):
             wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
             columns = ["key", "picture"]
-            found = pq.read_table(self.path, columns=columns, filters=wanted, page_checksum_verification=True)
+            found = pq.read_table(
+                self.path, columns=columns, filters=wanted, page_checksum_verification=True
+            )
             return dict(zip(found["key"].to_pylist(), found["picture"].to_pylist()))
 
 
@@ -80,22 +89,30 @@ def read_sweep(path: Path | str) -> Sweep:
         missing = [column.key for column in COLUMNS if column.key not in names]
         if missing:
             raise InputError(
-                f"{file} has no column {missing[0]!r}, expected the columns of a sweep of this version of airlight; "
+                f"{file} has no column {missing[0]!r}, expected the columns of a sweep of this "
+                "version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
         wanted = [name for name in names if name != "picture"]
         table = pq.read_table(file, columns=wanted, page_checksum_verification=True)
         columns = {name: _array(table[name]) for name in table.column_names}
     if not table.num_rows:
-        raise InputError(f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer")
+        raise InputError(
+            f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer"
+        )
     unknown = sorted(set(columns["status"]) - set(STATUSES))
     if unknown:
-        raise InputError(f"{file} has the status {unknown[0]!r}, expected one of {', '.join(STATUSES)}; run it again")
+        raise InputError(
+            f"{file} has the status {unknown[0]!r}, expected one of {', '.join(STATUSES)}; run it "
+            "again"
+        )
     kept = _current(columns)
     order = {row: tuple(natural(columns[name][row] or "") for name in _ORDER) for row in kept}
     kept.sort(key=order.__getitem__)
     columns = {name: values[kept] for name, values in columns.items()}
-    properties = tuple(sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY)))
+    properties = tuple(
+        sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY))
+    )
     return Sweep(file, columns, properties, superseded=table.num_rows - len(kept))
 
 
@@ -108,20 +125,25 @@ def _reading(file: Path) -> Iterator[None]:
         yield
     except (pa.ArrowException, OSError) as error:
         words = " ".join(str(error).split())
-        raise InputError(f"{file} cannot be read as Parquet: {words[:160]}; run the sweep again") from error
+        raise InputError(
+            f"{file} cannot be read as Parquet: {words[:160]}; run the sweep again"
+        ) from error
 
 
 def natural(text: str) -> tuple[str | int, ...]:
     """Return the key that sorts text as a reader does: random:9 before random:10."""
-    return tuple(int(part) if place % 2 else part for place, part in enumerate(re.split(r"(\d+)", text)))
+    return tuple(
+        int(part) if place % 2 else part for place, part in enumerate(re.split(r"(\d+)", text))
+    )
 
 
 def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
     """Return the rows that count: of each cell one.
 
-    The folder of a sweep keeps what earlier source code computed, with faults that were fixed since, and a cell may
-    have been computed once for its error and once with the machine to itself for its time. The row of the source code
-    that computed the cell last counts; of several such rows one that was timed alone, and else the last.
+    The folder of a sweep keeps what earlier source code computed, with faults that were fixed
+    since, and a cell may have been computed once for its error and once with the machine to itself
+    for its time. The row of the source code that computed the cell last counts; of several such
+    rows one that was timed alone, and else the last.
     """
     started = [each or "" for each in columns["origin.started"]]
     source, alone = columns["origin.source"], columns["cost.alone"] == 1
@@ -142,13 +164,16 @@ def _file_of(path: Path) -> Path:
     file = path / FILE if path.is_dir() else path
     if not file.is_file():
         raise InputError(
-            f"{file} is not there; expected the folder of a sweep, `airlight sweep -o DIR`, or its Parquet"
+            f"{file} is not there; expected the folder of a sweep, `airlight sweep -o DIR`, or its "
+            "Parquet"
         )
     return file
 
 
 def _array(column: Any) -> NDArray[Any]:
-    """Return a column of Arrow as an array: texts as objects, all else as float64 with NaN for null."""
+    """Return a column of Arrow as an array: texts as objects, all else as
+    float64 with NaN for null.
+    """
     import pyarrow as pa
 
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
@@ -177,15 +202,20 @@ class Sample:
     label: str  #: as tables name it in full
     method: str
     counts: Mapping[str, int]  #: scenes that ended so
-    relative_rmse: tuple[Quantile, ...]  #: its median and its 95 % quantile; none if nothing was measured
+    #: its median and its 95 % quantile; none if nothing was measured
+    relative_rmse: tuple[Quantile, ...]
     frame_ms: float | None  #: median of the scenes whose time is known [ms]
     timed: int  #: scenes whose time is known
     scenes: tuple[str, ...] = field(repr=False)
-    rows: tuple[int, ...] = field(repr=False)  #: of the sweep: where each scene's cell with the largest error stands
-    statuses: tuple[str, ...] = field(repr=False)  #: what became of each scene: that of its row, or `UNTOLD`
-    #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured.
+    #: of the sweep: where each scene's cell with the largest error stands
+    rows: tuple[int, ...] = field(repr=False)
+    #: what became of each scene: that of its row, or `UNTOLD`
+    statuses: tuple[str, ...] = field(repr=False)
+    #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN
+    #: where nothing was measured.
     errors: Numbers = field(repr=False)
-    reference_errors: Numbers = field(repr=False)  #: the reference's own, over its mean [1]; 0 where it says nothing
+    #: the reference's own, over its mean [1]; 0 where it says nothing
+    reference_errors: Numbers = field(repr=False)
     nonfinite: Numbers = field(repr=False)  #: pixels with NaN or infinity, in all cells of a scene
     times: Numbers = field(repr=False)  #: of a frame [ms], see `comparable_times`; NaN elsewhere
 
@@ -211,15 +241,24 @@ def samples(sweep: Sweep) -> list[Sample]:
     reference_errors = np.nan_to_num(sweep["reference.error"], nan=0.0)
     nonfinite = np.nan_to_num(sweep["error.nonfinite"], nan=0.0)
     times = np.where(comparable_times(sweep), sweep[FRAME_MS], np.nan)
-    counted = np.isfinite(sweep["seed"]) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
+    counted = (
+        np.isfinite(sweep["seed"]) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
+    )
     groups: dict[tuple[str, str, str], dict[str, list[int]]] = {}
     for row, label in enumerate(labels):
         if counted[row]:
             group = groups.setdefault((label, methods[row], _size(sweep, row)), {})
             group.setdefault(scenes[row], []).append(row)
-    groups = dict(sorted(groups.items(), key=lambda item: tuple(map(natural, (item[0][1], item[0][0], item[0][2])))))
+    groups = dict(
+        sorted(
+            groups.items(),
+            key=lambda item: tuple(map(natural, (item[0][1], item[0][0], item[0][2]))),
+        )
+    )
     several = Counter((label, method) for label, method, _ in groups)
-    full = [f"{label}{size}" if several[label, method] > 1 else label for label, method, size in groups]
+    full = [
+        f"{label}{size}" if several[label, method] > 1 else label for label, method, size in groups
+    ]
     badness = [_badness(status, error) for status, error in zip(statuses, errors.tolist())]
     made = []
     for (_, method, _), whole, group in zip(groups, full, groups.values()):
@@ -255,8 +294,8 @@ def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:
 def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     """Return which rows have times that may be compared with one another.
 
-    Those that were taken in turns while nothing else of the sweep ran on the host, on the host, device and threads that
-    have the most such rows; and of one image those of its last run.
+    Those that were taken in turns while nothing else of the sweep ran on the host, on the host,
+    device and threads that have the most such rows; and of one image those of its last run.
     """
     hosts, devices = sweep["origin.host"], sweep["origin.device"]
     places = list(zip(hosts, devices, np.nan_to_num(sweep["origin.threads"]).tolist()))
@@ -269,14 +308,17 @@ def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]
     for row in np.flatnonzero(counts):
         last[images[row]] = max(last.get(images[row], ""), sweep["times.run.started"][row] or "")
     started = sweep["times.run.started"]
-    return counts & np.array([(when or "") == last.get(image) for image, when in zip(images, started)], dtype=bool)
+    return counts & np.array(
+        [(when or "") == last.get(image) for image, when in zip(images, started)], dtype=bool
+    )
 
 
 def errors_of(sweep: Sweep) -> Numbers:
-    """Return the relative RMSE of every row: NaN where nothing was measured, infinite where the image is unusable.
+    """Return the relative RMSE of every row: NaN where nothing was measured, infinite
+    where the image is unusable.
 
-    Where the reference is black, an image that is black too has no error, and any other an infinite one. An image
-    without a finite pixel has an infinite error.
+    Where the reference is black, an image that is black too has no error, and any other an infinite
+    one. An image without a finite pixel has an infinite error.
     """
     done = sweep["status"] == "done"
     relative, absolute = sweep["error.relative_rmse"], sweep["error.rmse"]
@@ -292,13 +334,19 @@ def _size(sweep: Sweep, row: int) -> str:
 def _statuses(sweep: Sweep) -> NDArray[np.object_]:
     """Return the status of every row; rows whose scene has no reference are `UNTOLD`."""
     reasons = zip(sweep["status"], sweep["reason"])
-    untold = [status in FAULTS and (reason or "").startswith(NO_REFERENCE) for status, reason in reasons]
+    untold = [
+        status in FAULTS and (reason or "").startswith(NO_REFERENCE) for status, reason in reasons
+    ]
     return np.where(untold, UNTOLD, sweep["status"])
 
 
 def _badness(status: str, error: float) -> tuple[int, float]:
-    """Order the cells of a scene: a fault stands for it before any error, the rest only where nothing was measured."""
-    return (2 if status in FAULTS else 1 if status == "done" else 0), 0.0 if np.isnan(error) else error
+    """Order the cells of a scene: a fault stands for it before any error, the rest only
+    where nothing was measured.
+    """
+    return (2 if status in FAULTS else 1 if status == "done" else 0), 0.0 if np.isnan(
+        error
+    ) else error
 
 
 @dataclass(frozen=True)

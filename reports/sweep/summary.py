@@ -20,14 +20,41 @@ from airlight.reports.sweep.claims import (
     strongest,
     written,
 )
-from airlight.reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
-from airlight.reports.sweep.samples import FAULTS, Fastest, Sample, Sweep, drawn_at_random, fastest_within, samples
+from airlight.reports.sweep.faults import (
+    Check,
+    Fault,
+    Reason,
+    Worst,
+    checks,
+    faults,
+    reasons,
+    worst,
+)
+from airlight.reports.sweep.samples import (
+    FAULTS,
+    Fastest,
+    Sample,
+    Sweep,
+    drawn_at_random,
+    fastest_within,
+    samples,
+)
 from airlight.validation.statistics.samples import LEVEL, binomial_interval
 
 SCHEMA = "airlight-sweep/1"
 
 #: Columns of the software and hardware that made the rows.
-_VERSIONS = ("airlight", "commit", "source", "mitsuba", "drjit", "python", "variant", "host", "device")
+_VERSIONS = (
+    "airlight",
+    "commit",
+    "source",
+    "mitsuba",
+    "drjit",
+    "python",
+    "variant",
+    "host",
+    "device",
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +73,8 @@ class Summary:
     reasons: tuple[Reason, ...]
     checks: tuple[Check, ...]
     faults: tuple[Fault, ...]
-    reference_errors: tuple[float, float] | None  #: of the references themselves: median and largest, over the mean [1]
+    #: of the references themselves: median and largest, over the mean [1]
+    reference_errors: tuple[float, float] | None
     versions: Mapping[str, tuple[str, ...]]
     statuses: Mapping[str, int]  #: rows that ended so
     scenes: int  #: that claims are about
@@ -76,7 +104,9 @@ def summary_of(sweep: Sweep) -> Summary:
         correlations=found,
         strongest=goes_with,
         worst={
-            sample.label: tuple(worst(sweep, sample, [each.property for each in goes_with[sample.label]]))
+            sample.label: tuple(
+                worst(sweep, sample, [each.property for each in goes_with[sample.label]])
+            )
             for sample in made
         },
         fastest=tuple(fastest_within(made, target) for target in TARGETS),
@@ -104,7 +134,10 @@ def _headlines(said: Summary) -> list[Headline]:
         best = best_claims(said.claims, target)
         if best:
             others = f" and {len(best) - 1} more" if best[1:] else ""
-            add(f"Most often within {written(target)}", f"{best[0].label}{others}, {best[0].fraction_words}.")
+            add(
+                f"Most often within {written(target)}",
+                f"{best[0].label}{others}, {best[0].fraction_words}.",
+            )
     for each in said.fastest:
         if any(each.counts.values()):
             label = max(each.counts, key=each.counts.__getitem__)
@@ -119,7 +152,8 @@ def _headlines(said: Summary) -> list[Headline]:
         name, count = leading.most_common(1)[0]
         add(
             "Goes with error",
-            f"the {property_words(name)} goes with the error of {count} of {len(said.samples)} configurations more "
+            f"the {property_words(name)} goes with the error of {count} of {len(said.samples)} "
+            "configurations more "
             "than any other property does.",
         )
     for check in said.checks:
@@ -129,12 +163,20 @@ def _headlines(said: Summary) -> list[Headline]:
         add("Sound", sound_words(said), True)
     for name in ("airlight", "source"):
         if len(said.versions[name]) > 1:
-            add("Versions", f"the rows come of several versions: {name} {', '.join(said.versions[name])}.", False)
+            add(
+                "Versions",
+                f"the rows come of several versions: {name} {', '.join(said.versions[name])}.",
+                False,
+            )
     lost = sum(said.statuses.get(status, 0) for status in FAULTS)
-    words = ", ".join(f"{said.statuses[status]} {status}" for status in FAULTS if said.statuses.get(status))
+    words = ", ".join(
+        f"{said.statuses[status]} {status}" for status in FAULTS if said.statuses.get(status)
+    )
     total = f"{len(said.sweep)} cells"
     add(
-        "Not done", f"of {total}: {words}." if lost else f"none of {total} failed, hung or ended its process.", not lost
+        "Not done",
+        f"of {total}: {words}." if lost else f"none of {total} failed, hung or ended its process.",
+        not lost,
     )
     return made
 
@@ -142,19 +184,23 @@ def _headlines(said: Summary) -> list[Headline]:
 def check_words(check: Check) -> str:
     """Return in a sentence how many images have a fault."""
     return (
-        f"{check.faulty_rows} of {check.rows} images have {check.meaning}, in {check.faulty_scenes} of "
+        f"{check.faulty_rows} of {check.rows} images have {check.meaning}, in "
+        f"{check.faulty_scenes} of "
         f"{check.scenes} scenes."
     )
 
 
 def sound_words(said: Summary) -> str:
-    """Return in a sentence that no image has a fault, and in how many scenes it may have been missed."""
+    """Return in a sentence that no image has a fault, and in how many scenes
+    it may have been missed.
+    """
     checked = {check.check: check for check in said.checks}
     most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
     stated = checked["outside of the bound"].rows
     bound = f", or outside of the bound that {stated} of them state" if stated else ""
     return (
-        f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative{bound}; of scenes alike "
+        f"no image of {checked['not finite'].rows} has a pixel that is not finite or "
+        f"negative{bound}; of scenes alike "
         f"at most {most:.2g} % may have one, at {100 * LEVEL:.0f} % confidence."
     )
 

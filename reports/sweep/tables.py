@@ -7,17 +7,34 @@ from airlight.reports.sweep.claims import TARGETS, property_words, written
 from airlight.reports.sweep.faults import Check, Fault
 from airlight.reports.sweep.samples import FAULTS, UNTOLD
 from airlight.reports.sweep.summary import Summary
-from airlight.reports.tables.table import Column, Measured, Name, Table, numbers, table, table_of, words
+from airlight.reports.tables.table import (
+    Column,
+    Measured,
+    Name,
+    Table,
+    numbers,
+    table,
+    table_of,
+    words,
+)
 
 _FRACTION = {"digits": 2, "fraction": True}
 
 
 def errors_table(said: Summary) -> Table:
-    """Return how wrong each configuration is, and in what fraction of the scenes it keeps an error."""
+    """Return how wrong each configuration is, and in what fraction of the
+    scenes it keeps an error.
+    """
     columns = (
         *words(label="method"),
         *(
-            Column(f"within_{target:g}", f"within {written(target)}", percent=True, spread="95 %", places=1)
+            Column(
+                f"within_{target:g}",
+                f"within {written(target)}",
+                percent=True,
+                spread="95 %",
+                places=1,
+            )
             for target in reversed(TARGETS)
         ),
         *numbers(median="median error", most="95 % of scenes below", how=_FRACTION),
@@ -41,12 +58,17 @@ def errors_table(said: Summary) -> Table:
                 row[f"within_{claim.target:g}"] = Measured(claim.fraction, claim.low, claim.high)
         rows.append(row)
     explanation = (
-        "Error: relative RMSE of the airlight. Each fraction has its interval at 95 % confidence. Scenes that are "
-        "refused or have no reference are in no fraction; those that failed, hung or have pixels that are not finite "
+        "Error: relative RMSE of the airlight. Each fraction has its interval at 95 % confidence. "
+        "Scenes that are "
+        "refused or have no reference are in no fraction; those that failed, hung or have pixels "
+        "that are not finite "
         "are not within."
     )
     made = table(
-        "In what fraction of the scenes each method is within an error", columns, rows, explanation=explanation
+        "In what fraction of the scenes each method is within an error",
+        columns,
+        rows,
+        explanation=explanation,
     )
     # A column of zeros, or of the same count in every row, says nothing.
     empty = {key for key in ("refused", "untold", "lost") if not any(row[key] for row in rows)}
@@ -55,13 +77,17 @@ def errors_table(said: Summary) -> Table:
 
 
 def speed_table(said: Summary) -> Table:
-    """Return the cost of each configuration, and in how many scenes it is the fastest within an error."""
+    """Return the cost of each configuration, and in how many scenes it is the
+    fastest within an error.
+    """
     columns = (
         *words(label="method"),
         *numbers(timed="scenes timed"),
         Column("frame", "frame", "ms", spread="quartiles over scenes"),
         *(
-            Column(f"fastest_{each.target:g}", f"fastest within {written(each.target)}", percent=True)
+            Column(
+                f"fastest_{each.target:g}", f"fastest within {written(each.target)}", percent=True
+            )
             for each in said.fastest
         ),
     )
@@ -72,14 +98,20 @@ def speed_table(said: Summary) -> Table:
         if len(known):
             first, middle, third = np.quantile(known, (0.25, 0.5, 0.75)).tolist()
             row["frame"] = Measured(middle, first, third)
-        row |= {f"fastest_{e.target:g}": e.counts[sample.label] / e.scenes if e.scenes else None for e in said.fastest}
+        row |= {
+            f"fastest_{e.target:g}": e.counts[sample.label] / e.scenes if e.scenes else None
+            for e in said.fastest
+        }
         rows.append(row)
     none = ", ".join(f"{each.none} within {written(each.target)}" for each in said.fastest)
     explanation = (
-        f"Of {said.fastest[0].scenes} scenes in which every image was timed with the machine to itself, its methods in "
+        f"Of {said.fastest[0].scenes} scenes in which every image was timed with the machine to "
+        "itself, its methods in "
         f"turns, in one run; scenes in which no method is within the error: {none}."
     )
-    return table("Times, and the fastest method within an error", columns, rows, explanation=explanation)
+    return table(
+        "Times, and the fastest method within an error", columns, rows, explanation=explanation
+    )
 
 
 def correlations_table(said: Summary) -> Table:
@@ -89,7 +121,8 @@ def correlations_table(said: Summary) -> Table:
         Column("r", "correlation", sign=True, spread="interval", places=2),
     )
     rows = [
-        vars(each) | {"property": property_words(each.property), "r": Measured(each.r, each.low, each.high)}
+        vars(each)
+        | {"property": property_words(each.property), "r": Measured(each.r, each.low, each.high)}
         for chosen in said.strongest.values()
         for each in chosen
     ]
@@ -106,7 +139,9 @@ def refusals_table(said: Summary) -> Table:
     )
     rows = []
     for each in said.reasons:
-        shown = ", ".join(each.labels[:3]) + (f" and {len(each.labels) - 3} more" if each.labels[3:] else "")
+        shown = ", ".join(each.labels[:3]) + (
+            f" and {len(each.labels) - 3} more" if each.labels[3:] else ""
+        )
         rows.append(vars(each) | {"methods": shown})
     explanation = "In reasons N stands for a number, SCENE for a scene."
     return table("Refused and not done, by reason", columns, rows, explanation=explanation)
@@ -114,7 +149,11 @@ def refusals_table(said: Summary) -> Table:
 
 def checks_table(said: Summary) -> Table:
     """Return how many images were checked for each fault and how many have it."""
-    how = {"faulty_rows": {"alarm": True}, "faulty_scenes": {"alarm": True}, "meaning": {"long": True, "minor": True}}
+    how = {
+        "faulty_rows": {"alarm": True},
+        "faulty_scenes": {"alarm": True},
+        "meaning": {"long": True, "minor": True},
+    }
     shown = [each for each in said.checks if each.rows]
     return table_of("Images that were checked", Check, shown, how=how)
 

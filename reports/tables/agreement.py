@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference against Monte Carlo, as a table, and the light that single scattering leaves out."""
+"""The reference against Monte Carlo, as a table, and the light that
+single scattering leaves out.
+"""
 
 from collections.abc import Iterable, Sequence
 
@@ -38,10 +40,11 @@ COLUMNS = (
 
 
 def verdict(compared: Agreement) -> bool | None:
-    """Return whether a comparison confirms the reference; None where it ran out of time before it could tell.
+    """Return whether a comparison confirms the reference; None where it ran out of
+    time before it could tell.
 
-    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the reference:
-    by an interval that lies outside the margin as a whole.
+    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak
+    against the reference: by an interval that lies outside the margin as a whole.
     """
     statistics = compared.statistics
     if statistics.equivalent:
@@ -53,14 +56,19 @@ def verdict(compared: Agreement) -> bool | None:
 
 
 def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
-    """Return the comparison whose 95 % interval of the relative bias fills most of its own margin, and the fraction.
+    """Return the comparison whose 95 % interval of the relative bias fills most of its own
+    margin, and the fraction.
 
     One whose interval is not known fills more than any other.
     """
 
     def reach(comparison: Agreement) -> float:
         (low, high), margin = comparison.statistics.relative_bias_ci, comparison.statistics.margin
-        return float("inf") if low is None or high is None or not margin else max(abs(low), abs(high)) / margin
+        return (
+            float("inf")
+            if low is None or high is None or not margin
+            else max(abs(low), abs(high)) / margin
+        )
 
     worst = max(compared, key=reach)
     return worst, reach(worst)
@@ -72,29 +80,45 @@ def margin_words(statistics: Statistics) -> str:
 
 
 def trust_table(scenes: Sequence[Scene]) -> Table:
-    """Return how far the reference of each scene can be trusted: its own bound, its checks, the estimators' intervals.
+    """Return how far the reference of each scene can be trusted: its own bound, its checks,
+    the estimators' intervals.
 
     An estimator has the interval that fills most of its margin, over the layers of a scene.
     """
-    estimators = list(dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values()))
+    estimators = list(
+        dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values())
+    )
     columns = (
         *words("scene"),
         *numbers(bound="its error", how={"fraction": True, "digits": 2}),
         *words(kind="which is"),
         *numbers(left="unresolved shadow rays", how={"alarm": True}),
-        *(Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2) for name in estimators),
+        *(
+            Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2)
+            for name in estimators
+        ),
         *(Column(f"{name} agrees", "inside its margin") for name in estimators),
     )
-    order = ["scene", "bound", "kind", "left", *(key for name in estimators for key in (name, f"{name} agrees"))]
+    order = [
+        "scene",
+        "bound",
+        "kind",
+        "left",
+        *(key for name in estimators for key in (name, f"{name} agrees")),
+    ]
     return table(
         "The reference of each scene",
         columns,
         (_trust(scene, estimators) for scene in scenes),
         explanation=(
-            "The reference is a quadrature in double precision, with its error as a fraction of the mean airlight: "
-            "proven, estimated in density grids, or three standard errors of samples of area lights and skies. Two "
-            "Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of their relative "
-            "bias must lie inside a margin. Among several layers the interval that fills most of its "
+            "The reference is a quadrature in double precision, with its error as a fraction of "
+            "the mean airlight: "
+            "proven, estimated in density grids, or three standard errors of samples of area "
+            "lights and skies. Two "
+            "Monte Carlo estimators, which share no derivation with it, check it: the 95 % "
+            "interval of their relative "
+            "bias must lie inside a margin. Among several layers the interval that fills most of "
+            "its "
             "margin is shown; each scene below has them all."
         ),
     ).only(*order)
@@ -141,7 +165,9 @@ def _values(name: str, comparison: Agreement) -> dict[str, Value]:
 
 
 def left_out_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
-    """Return for every scene of a report the fractions of light that single scattering leaves out."""
+    """Return for every scene of a report the fractions of light that
+    single scattering leaves out.
+    """
     percent = {"percent": True}
     columns = (
         *words("scene"),
@@ -150,7 +176,8 @@ def left_out_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
         *numbers(max_depth="max. edges"),
     )
     explanation = (
-        "Fractions of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces "
+        "Fractions of all light that paths of up to max. edges bring, with 95 % intervals; the "
+        "second adds surfaces "
         "that light one another."
     )
     rows = (_left_out(scene, Name(scene.name) if code else scene.name) for scene in scenes)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""One table drawn five ways: `text` for a terminal, `markdown`, `html`, `latex`, `csv`.
 
-All five show the same cells. Where a cell has no room for quartiles they are a separate column (text, Markdown) or
-two (CSV). Why a row ends early, and remarks on it, stand in the row (HTML, LaTeX), below the table (text, Markdown) or
-in columns at the end (CSV).
+All five show the same cells. Where a cell has no room for quartiles they are a separate column
+(text, Markdown) or two (CSV). Why a row ends early, and remarks on it, stand in the row (HTML,
+LaTeX), below the table (text, Markdown) or in columns at the end (CSV).
 
-LaTeX needs ``\usepackage{booktabs,siunitx}`` in the preamble: numbers are ``\num{...}``, so that siunitx sets powers of
-ten, signs and decimal marks as the rest of the paper has them.
+LaTeX needs ``\usepackage{booktabs,siunitx}`` in the preamble: numbers are ``\num{...}``, so that
+siunitx sets powers of ten, signs and decimal marks as the rest of the paper has them.
 """
 
 import csv as comma_separated
@@ -39,7 +39,12 @@ DASH = "\N{EN DASH}"
 _VERDICTS = {True: ("yes", "good"), False: ("NO", "bad"), None: ("not decided in time", "quiet")}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MARKS = {sign: f"\\{sign}" for sign in "{}$&%#_"}
-_MARKS |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", '"': r"\textquotedbl{}"}
+_MARKS |= {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    '"': r"\textquotedbl{}",
+}
 _MARKS |= {"<": r"\textless{}", ">": r"\textgreater{}", "\n": " ", "\N{EN DASH}": "--"}
 _MARKS |= {"\N{MULTIPLICATION SIGN}": r"$\times$", "\N{PLUS-MINUS SIGN}": r"$\pm$"}
 _LATEX = {ord(sign): written for sign, written in _MARKS.items()}
@@ -56,14 +61,16 @@ class _Style:
     between: str = ".."  #: the ends of an interval
     percent: str = " %"
     fractions: bool = False  #: in per cent
-    zeros: bool = False  #: whether zeros at the end of numbers are kept: they say how exact a number is
+    #: whether zeros at the end of numbers are kept: they say how exact a number is
+    zeros: bool = False
 
 
 def text(table: Table, *, width: int | None = None, styled: bool = False) -> str:
     """Return a table for a terminal of a width [characters]; as wide as the table needs by default.
 
-    Where it is too narrow, sentences are wrapped, and columns that are still too many are left out and named below; a
-    table of sentences becomes a list. With `styled` headings are bold, by the codes of terminals.
+    Where it is too narrow, sentences are wrapped, and columns that are still too many are left out
+    and named below; a table of sentences becomes a list. With `styled` headings are bold, by the
+    codes of terminals.
     """
     from rich import box
     from rich.console import Console
@@ -82,7 +89,9 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
         for cells in rows:
             grid.add_row(*(cells[place] for place in kept))
         drawn = io.StringIO()
-        Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled).print(grid)
+        Console(
+            file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled
+        ).print(grid)
         lines = [
             *(line.rstrip() for line in drawn.getvalue().splitlines()),
             *([*_wrapped(note, width), ""] if note else []),
@@ -97,9 +106,11 @@ _LONGEST = 30  #: a longer word of text, such as a path, may be broken in a narr
 def _fitted(
     columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int | None
 ) -> tuple[list[int], list[int | None], str]:
-    """Return the places of the columns that fit, how wide they are drawn, and in words what is left out.
+    """Return the places of the columns that fit, how wide they are drawn, and
+    in words what is left out.
 
-    Columns that are `minor` and quartiles go first, then those to the right; the first column stays.
+    Columns that are `minor` and quartiles go first, then those to the
+    right; the first column stays.
     """
     places = list(range(len(columns)))
     cells = [[columns[place].title, *(row[place] for row in rows)] for place in places]
@@ -108,10 +119,17 @@ def _fitted(
         return places, [None] * len(places), ""
     # A number is not broken, but its heading may be, between words.
     least = [
-        max([_longest(words) if words is column[0] or columns[place].words else len(words) for words in column])
+        max(
+            [
+                _longest(words) if words is column[0] or columns[place].words else len(words)
+                for words in column
+            ]
+        )
         for place, column in zip(places, cells)
     ]
-    least = [min(wide, _LONGEST) if columns[place].words else wide for place, wide in zip(places, least)]
+    least = [
+        min(wide, _LONGEST) if columns[place].words else wide for place, wide in zip(places, least)
+    ]
     order = sorted(places[1:], key=lambda place: (columns[place].minor, place))
     left: list[int] = []
     while len(places) > 1 and _width([least[place] for place in places]) > width:
@@ -120,14 +138,17 @@ def _fitted(
     room = width - _width([least[place] for place in places])
     wanted = [natural[place] - least[place] for place in places]
     part = min(1.0, max(0, room) / (sum(wanted) or 1))
-    widths: list[int | None] = [least[place] + int(part * more) for place, more in zip(places, wanted)]
+    widths: list[int | None] = [
+        least[place] + int(part * more) for place, more in zip(places, wanted)
+    ]
     if not left:
         return places, widths, ""
     names = ", ".join(columns[place].title for place in sorted(left))
     return (
         places,
         widths,
-        f"Left out at {width} columns: {names}. A pipe (| less -S) or {_width(natural)} columns show all.",
+        f"Left out at {width} columns: {names}. A pipe (| less -S) or {_width(natural)} columns "
+        "show all.",
     )
 
 
@@ -147,8 +168,12 @@ def _wrapped(words: str, width: int | None, indent: str = "") -> list[str]:
     return wrap(words, max(width, 20), subsequent_indent=indent, break_on_hyphens=False)
 
 
-def _records(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int, *, styled: bool) -> list[str]:
-    """Return a table as a list: what the first column names, and under it a line for each other column."""
+def _records(
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int, *, styled: bool
+) -> list[str]:
+    """Return a table as a list: what the first column names, and under it a
+    line for each other column.
+    """
     lines = []
     for cells in rows:
         lines += ["", f"\x1b[1m{cells[0]}\x1b[0m" if styled else cells[0]]
@@ -167,19 +192,28 @@ def markdown(table: Table) -> str:
     lines = [f"**{_in_markdown(table.title)}**", ""] if table.title else []
     lines.append(bar(_in_markdown(column.title) for column in columns))
     lines.append(bar("---" if column.words else "---:" for column in columns))
-    lines += [bar(cells) for cells in _open_rows(table, _Style(_in_markdown, name=_name_in_markdown))]
+    lines += [
+        bar(cells) for cells in _open_rows(table, _Style(_in_markdown, name=_name_in_markdown))
+    ]
     lines += ["", *(f"- {_in_markdown(line)}" for line in below)] if below else []
     return "\n".join(lines) + "\n"
 
 
 def html(table: Table) -> str:
     """Return a table as HTML, in a box that scrolls sideways; fractions are in per cent."""
-    head = "".join(f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>' for column in table.columns)
+    head = "".join(
+        f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>'
+        for column in table.columns
+    )
     named = f' role="group" aria-label="{_in_html(table.title)}"' if table.title else ""
     lines = [f'<div class="scroll" tabindex="0"{named}><table>']
     caption = ". ".join(part for part in (table.title, table.explanation) if part)
     lines += [f"<caption>{_in_html(caption)}</caption>"] if caption else []
-    lines += [f"<thead><tr>{head}</tr></thead>"] if any(column.heading for column in table.columns) else []
+    lines += (
+        [f"<thead><tr>{head}</tr></thead>"]
+        if any(column.heading for column in table.columns)
+        else []
+    )
     lines.append("<tbody>")
     for row in table.rows:
         shown, left = _until_reason(row, table.columns)
@@ -195,27 +229,42 @@ def _meanings(columns: Sequence[Column]) -> list[str]:
     explained = [column for column in columns if column.meaning]
     if not explained:
         return []
-    terms = "".join(f"<dt>{_in_html(column.title)}</dt><dd>{_in_html(column.meaning)}</dd>" for column in explained)
-    return [f'<details class="terms"><summary>Meaning of the columns</summary><dl>{terms}</dl></details>']
+    terms = "".join(
+        f"<dt>{_in_html(column.title)}</dt><dd>{_in_html(column.meaning)}</dd>"
+        for column in explained
+    )
+    return [
+        '<details class="terms"><summary>Meaning of the '
+        f"columns</summary><dl>{terms}</dl></details>"
+    ]
 
 
 def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
-    r"""Return tables with the same columns as one `tabular`, each under its title, below lines of comment."""
+    r"""Return tables with the same columns as one `tabular`, each under its
+    title, below lines of comment.
+    """
 
     def line(cells: Iterable[str]) -> str:
         return " & ".join(cells) + r" \\"
 
     columns = tables[0].columns
     lines = [f"% {words}" for words in (f"Needs {PREAMBLE}.", *comment)]
-    lines += [r"\begin{tabular}{" + "".join("l" if column.words else "r" for column in columns) + "}", r"\toprule"]
+    lines += [
+        r"\begin{tabular}{" + "".join("l" if column.words else "r" for column in columns) + "}",
+        r"\toprule",
+    ]
     lines.append(line(_in_latex(column.heading) for column in columns))
     if any(column.unit for column in columns):
-        lines.append(line(f"[{_in_latex(column.unit)}]" if column.unit else "" for column in columns))
+        lines.append(
+            line(f"[{_in_latex(column.unit)}]" if column.unit else "" for column in columns)
+        )
     lines.append(r"\midrule")
     for place, table in enumerate(tables):
         lines += [r"\addlinespace"] if place else []
         if table.title:
-            about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda match: _num(match[1]), _in_latex(table.explanation))
+            about = re.sub(
+                r"\b([\d.]+e-?\d+)\b", lambda match: _num(match[1]), _in_latex(table.explanation)
+            )
             title = rf"\textit{{{_in_latex(table.title)}}}{f', {about}' if about else ''}"
             lines.append(rf"\multicolumn{{{len(columns)}}}{{l}}{{{title}}} \\")
         for row in table.rows:
@@ -228,16 +277,24 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
 
 
 def csv(table: Table) -> str:
-    """Return a table as CSV: keys above, nine digits of every number, nothing for None and what is not a number."""
+    """Return a table as CSV: keys above, nine digits of every number, nothing for None
+    and what is not a number.
+    """
     rows: list[dict[str, str]] = []
     keys: dict[str, None] = {}
     for column in table.columns:
         kinds = {type(row.values.get(column.key)) for row in table.rows}
         keys |= {} if Interval in kinds else {column.key: None}
-        keys |= dict.fromkeys((f"{column.key}_low", f"{column.key}_high")) if kinds & {Interval, Measured} else {}
+        keys |= (
+            dict.fromkeys((f"{column.key}_low", f"{column.key}_high"))
+            if kinds & {Interval, Measured}
+            else {}
+        )
     for row in table.rows:
         said = {"reason": row.reason, "remarks": "; ".join(row.remarks)}
-        rows.append({key: cell for key, value in row.values.items() for key, cell in _csv_cells(key, value)})
+        rows.append(
+            {key: cell for key, value in row.values.items() for key, cell in _csv_cells(key, value)}
+        )
         rows[-1] |= {key: words for key, words in said.items() if words}
         keys |= dict.fromkeys(key for key in said if said[key])
     buffer = io.StringIO()
@@ -248,7 +305,9 @@ def csv(table: Table) -> str:
 
 
 def typeset(digits: str) -> str:
-    """Return ASCII digits as a reader of HTML sees them: an en dash for none, 1.2e-05 as a power of ten."""
+    """Return ASCII digits as a reader of HTML sees them: an en dash for none,
+    1.2e-05 as a power of ten.
+    """
     mantissa, letter, exponent = digits.partition("e")
     if letter:
         return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
@@ -316,7 +375,10 @@ def _below(table: Table) -> list[str]:
     """Return the remarks on rows and why they end early, a line each."""
     key = table.columns[0].key
     return [
-        f"{text_of(row.values.get(key))}: {said}" for row in table.rows for said in (*row.remarks, row.reason) if said
+        f"{text_of(row.values.get(key))}: {said}"
+        for row in table.rows
+        for said in (*row.remarks, row.reason)
+        if said
     ]
 
 
@@ -339,16 +401,23 @@ def _name_in_markdown(name: Name) -> str:
 
 
 def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column], int]:
-    """Return the columns that a row fills, and over how many the reason stands for which it ends."""
+    """Return the columns that a row fills, and over how many the reason
+    stands for which it ends.
+    """
     if not row.reason:
         return columns, 0
-    filled = max((place for place, column in enumerate(columns) if row.values.get(column.key) is not None), default=0)
+    filled = max(
+        (place for place, column in enumerate(columns) if row.values.get(column.key) is not None),
+        default=0,
+    )
     filled = min(filled + 1, len(columns) - 1)
     return columns[:filled], len(columns) - filled
 
 
 def _in_html(words: str) -> str:
-    """Return text in which nothing is a mark of HTML, with the sign of multiplication in sizes of images."""
+    """Return text in which nothing is a mark of HTML, with the sign of
+    multiplication in sizes of images.
+    """
     return escape(re.sub(r"(?<=\d) x(?= \d|$)|^ x$", " \N{MULTIPLICATION SIGN}", words))
 
 
@@ -366,7 +435,9 @@ _HTML = _Style(_in_html, typeset, _name_in_html, DASH, " … ", fractions=True)
 
 
 def _layout(column: Column) -> str:
-    """Return the attributes of a cell; the style is for notebooks, which do not know the classes of the page."""
+    """Return the attributes of a cell; the style is for notebooks, which do not know
+    the classes of the page.
+    """
     return ' class="words"' if column.long else ' style="text-align:left"' if column.words else ""
 
 
@@ -374,7 +445,9 @@ def _html_cell(row: Row, column: Column, *, first: bool) -> str:
     value = row.values.get(column.key)
     shown = _cell(value, column, _HTML)
     if first:
-        remarks = "".join(f' <span class="quiet">({_in_html(remark)})</span>' for remark in row.remarks)
+        remarks = "".join(
+            f' <span class="quiet">({_in_html(remark)})</span>' for remark in row.remarks
+        )
         return f'<th scope="row"{_layout(column)}>{shown}{remarks}</th>'
     if isinstance(value, Verdict) or (column.alarm and value):
         kind = _VERDICTS[value.good][1] if isinstance(value, Verdict) else "bad"

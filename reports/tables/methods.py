@@ -52,10 +52,14 @@ BENCH = (
 )
 
 
-def methods_table(title: str, methods: Iterable[CellRow | Row], *keys: str, explanation: str = "") -> Table:
-    """Return the table of the `methods` of a scene of report.json, or of rows that have some of `COLUMNS`.
+def methods_table(
+    title: str, methods: Iterable[CellRow | Row], *keys: str, explanation: str = ""
+) -> Table:
+    """Return the table of the `methods` of a scene of report.json, or of rows
+    that have some of `COLUMNS`.
 
-    `keys` are those of `COLUMNS`; `BENCH` by default. Where a shader was timed, its device stands beside its time.
+    `keys` are those of `COLUMNS`; `BENCH` by default. Where a shader was timed, its
+    device stands beside its time.
     """
     rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
     shown = list(keys or BENCH)
@@ -65,9 +69,17 @@ def methods_table(title: str, methods: Iterable[CellRow | Row], *keys: str, expl
 
 
 def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
-    """Return the costs and errors of a method as a row; `shadows` marks a method that knows none."""
+    """Return the costs and errors of a method as a row; `shadows` marks
+    a method that knows none.
+    """
     users = "user's shader" if is_shader(entry.method) else "user's function"
-    remarks = [f"image, {entry.layer}"] if entry.kind == "image" else [users] if entry.kind == "function" else []
+    remarks = (
+        [f"image, {entry.layer}"]
+        if entry.kind == "image"
+        else [users]
+        if entry.kind == "function"
+        else []
+    )
     if shadows and entry.kind != "image" and not entry.knows_shadows:
         remarks.append("no shadows")
     remarks += [entry.note] if entry.note else []
@@ -76,15 +88,26 @@ def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     if entry.reason:
         return Row(values, f"{entry.status}: {entry.reason}", tuple(remarks))
     values |= {name: measured(getattr(entry.times, name, None)) for name in TIMES}
-    values |= {f"{name}_rate": per_second(getattr(entry.times, name, None)) for name in ("frame", "airlight")}
+    values |= {
+        f"{name}_rate": per_second(getattr(entry.times, name, None))
+        for name in ("frame", "airlight")
+    }
     values |= {name: getattr(entry.error, name, None) for name in ERRORS}
-    values |= {"device": entry.device, "memory": entry.memory, "flip": entry.flip.value if entry.flip else None}
+    values |= {
+        "device": entry.device,
+        "memory": entry.memory,
+        "flip": entry.flip.value if entry.flip else None,
+    }
     return Row(values, remarks=tuple(remarks))
 
 
 def runs_of(entries: Iterable[CellRow]) -> list[TimingRun]:
-    """Return the runs in which the times of rows were measured, each once; those of other programs have none."""
-    return list(dict.fromkeys(entry.times.run for entry in entries if entry.times and entry.times.run))
+    """Return the runs in which the times of rows were measured, each once; those of
+    other programs have none.
+    """
+    return list(
+        dict.fromkeys(entry.times.run for entry in entries if entry.times and entry.times.run)
+    )
 
 
 def run_words(run: TimingRun) -> str:
@@ -92,9 +115,12 @@ def run_words(run: TimingRun) -> str:
     words = f"measured in turns in one run of {run.rounds} rounds, {run.started}"
     if run.steady is None or run.between is None or run.within is None:
         return words
-    verdict = "stayed as it was" if run.steady else "CHANGED meanwhile: compare ratios, not milliseconds"
+    verdict = (
+        "stayed as it was" if run.steady else "CHANGED meanwhile: compare ratios, not milliseconds"
+    )
     return (
-        f"{words}; the machine {verdict} (the anchor, camera rays alone: medians within a factor of {run.between:.2f} "
+        f"{words}; the machine {verdict} (the anchor, camera rays alone: medians within a factor "
+        f"of {run.between:.2f} "
         f"over the run, quartiles of {run.within:.2f} in a round)"
     )
 
@@ -107,11 +133,15 @@ def times_words(entries: Iterable[CellRow]) -> str:
         sentences = [f"Times: {run_words(runs[0])}."]
     else:
         sentences = [
-            f"Times of {', '.join(e.label for e in entries if e.times and e.times.run == run)}: {run_words(run)}."
+            f"Times of {', '.join(e.label for e in entries if e.times and e.times.run == run)}: "
+            f"{run_words(run)}."
             for run in runs
         ]
     if any(entry.times and entry.times.run is None for entry in entries):
-        sentences.append("What is marked `timed elsewhere` is of another run, on another machine or by other rules.")
+        sentences.append(
+            "What is marked `timed elsewhere` is of another run, on another machine or by other "
+            "rules."
+        )
     return " ".join(sentences)
 
 
@@ -126,10 +156,12 @@ def rate_words(milliseconds: float) -> str:
 
 
 def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, float] | None:
-    """Return the row of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
+    """Return the row of the fastest frame [ms] among those with at most a relative RMSE;
+    None where there is none.
 
-    Shaders run on another device, and engines in a run of their own: both are in no race with others. Pixels that are
-    not finite are left out of the RMSE: a method that has any must not win by it.
+    Shaders run on another device, and engines in a run of their own: both are in no race with
+    others. Pixels that are not finite are left out of the RMSE: a method that has any must not win
+    by it.
     """
 
     def reaches(entry: CellRow) -> bool:
@@ -139,13 +171,19 @@ def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, f
             return False
         return entry.error.relative_rmse <= error and not entry.error.nonfinite
 
-    raced = [(entry, entry.times.frame.median_ms) for entry in entries if entry.times and reaches(entry)]
+    raced = [
+        (entry, entry.times.frame.median_ms) for entry in entries if entry.times and reaches(entry)
+    ]
     return min(raced, key=lambda pair: pair[1], default=None)
 
 
 def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
-    """Return for every scene of a report the fastest method within each relative RMSE of `TARGETS`."""
-    columns = [Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS]
+    """Return for every scene of a report the fastest method within each
+    relative RMSE of `TARGETS`.
+    """
+    columns = [
+        Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS
+    ]
     rows = (
         (
             Name(scene.name) if code else scene.name,
@@ -154,10 +192,16 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
         for scene in scenes
     )
     explanation = (
-        "Relative RMSE of the airlight; median time of a frame with static geometry. The times of a scene are of one "
+        "Relative RMSE of the airlight; median time of a frame with static geometry. The times of "
+        "a scene are of one "
         "run."
     )
-    return table("The fastest method within an error", (*words("scene"), *columns), rows, explanation=explanation)
+    return table(
+        "The fastest method within an error",
+        (*words("scene"), *columns),
+        rows,
+        explanation=explanation,
+    )
 
 
 def _name_and_time(found: tuple[CellRow, float] | None) -> str:
@@ -187,6 +231,14 @@ _VALUES = {
 
 
 def published_as(entry: CellRow) -> str:
-    """Return which paper a method of report.json reproduces with its errors, and what is wrong; else nothing."""
-    values = (_VALUES.get((name, str(value)), "") for name, value in json.loads(entry.parameters).items())
-    return next(filter(None, values), "") or _METHODS.get(entry.method, "") or _KERNELS.get(entry.kernel or "", "")
+    """Return which paper a method of report.json reproduces with its errors, and
+    what is wrong; else nothing.
+    """
+    values = (
+        _VALUES.get((name, str(value)), "") for name, value in json.loads(entry.parameters).items()
+    )
+    return (
+        next(filter(None, values), "")
+        or _METHODS.get(entry.method, "")
+        or _KERNELS.get(entry.kernel or "", "")
+    )

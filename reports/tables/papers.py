@@ -24,24 +24,39 @@ _COLUMNS = (
 
 
 def paper_tables(rows: Sequence[Claim], *, plain: bool = True) -> list[Table]:
-    """Return for each paper a table of verdicts, then with `plain` one of its numbers without a verdict."""
+    """Return for each paper a table of verdicts, then with `plain` one of its
+    numbers without a verdict.
+    """
     made = []
     names = dict.fromkeys(row.paper for row in rows)
     for judged, paper in itertools.product((True, False) if plain else (True,), names):
-        several = [row for row in rows if row.paper == paper and (row.verdict is not None) == judged]
+        several = [
+            row for row in rows if row.paper == paper and (row.verdict is not None) == judged
+        ]
         name = papers().get(paper, paper)
         if several and judged:
-            made.append(table(name, _COLUMNS, map(_cells, several), explanation=f"{count_words(several)}."))
+            made.append(
+                table(name, _COLUMNS, map(_cells, several), explanation=f"{count_words(several)}.")
+            )
         elif several:
             shown = table(f"{name}: numbers beside ours", _COLUMNS, map(_cells, several))
-            made.append(shown.only("item", "words", "published", "measured", "ends", "interval", "unit", "why"))
+            made.append(
+                shown.only(
+                    "item", "words", "published", "measured", "ends", "interval", "unit", "why"
+                )
+            )
     return made
 
 
 def _cells(row: Claim) -> dict[str, Value]:
     ends = Interval.of((row.low, row.high))
-    values = {name: getattr(row, name) for name in ("item", "words", "verdict", "published", "measured", "unit", "why")}
-    return values | ({"ends": ends, "interval": row.interval} if ends and ends.low < ends.high else {})
+    values = {
+        name: getattr(row, name)
+        for name in ("item", "words", "verdict", "published", "measured", "unit", "why")
+    }
+    return values | (
+        {"ends": ends, "interval": row.interval} if ends and ends.low < ends.high else {}
+    )
 
 
 def count_words(rows: Sequence[Claim]) -> str:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The results of public functions, with their tables, words and data.
 
-A terminal, a notebook, Markdown and JSON show the same result; `reports.commands.main` prints it, and ends with the
-status 1 where it did not pass.
+A terminal, a notebook, Markdown and JSON show the same result; `reports.commands.main` prints it,
+and ends with the status 1 where it did not pass.
 """
 
 import base64
@@ -20,7 +20,9 @@ from airlight.reports.tables.table import Table
 
 
 def colours_wanted() -> bool:
-    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or empty (https://no-color.org)."""
+    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or
+    empty (https://no-color.org).
+    """
     return not os.environ.get("NO_COLOR")
 
 
@@ -38,7 +40,9 @@ def print_json(data: Any) -> None:
     except ValueError:
         from airlight.errors import InputError
 
-        raise InputError("a result is not finite, and is not printed; a number of the input may be too large") from None
+        raise InputError(
+            "a result is not finite, and is not printed; a number of the input may be too large"
+        ) from None
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
@@ -46,7 +50,8 @@ def print_json(data: Any) -> None:
     print(text)
 
 
-#: Pictures narrower than this are enlarged by a whole factor, so that single pixels can be seen [CSS pixels].
+#: Pictures narrower than this are enlarged by a whole factor, so that single pixels
+#: can be seen [CSS pixels].
 _NARROW = 240
 
 
@@ -152,7 +157,9 @@ def paragraph(words: str) -> str:
 
 
 def bullets(items: Sequence[str]) -> str:
-    """Return a list of sentences, in which what stands in backticks is code; nothing for no items."""
+    """Return a list of sentences, in which what stands in backticks is
+    code; nothing for no items.
+    """
     inside = "".join(f"<li>{sentence_in_html(item)}</li>" for item in items)
     return f"<ul>{inside}</ul>" if items else ""
 
@@ -163,7 +170,8 @@ def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
     style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return (
-        f'<figure style="display:inline-block;width:{times * width}px;max-width:100%;margin:0 1em 0.5em 0;'
+        f'<figure style="display:inline-block;width:{times * width}px;max-width:100%;margin:0 1em '
+        "0.5em 0;"
         'vertical-align:top">'
         f'<img src="{source}" alt="{escape(alt)}" style="{style}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"

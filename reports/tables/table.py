@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A table as data: columns that say what their values are, and rows of values with nothing rounded.
 
-`reports.tables.drawing` draws it: on a terminal, as Markdown, HTML, LaTeX and CSV. The rules that all of these share
-are here: which columns there are, and how a number becomes digits.
+`reports.tables.drawing` draws it: on a terminal, as Markdown, HTML, LaTeX and CSV. The rules that
+all of these share are here: which columns there are, and how a number becomes digits.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -74,7 +74,8 @@ class Column:
     sign: bool = False  #: positive numbers have a plus
     percent: bool = False  #: a fraction, written in per cent
     fraction: bool = False  #: a fraction that HTML writes in per cent and the others as it is
-    spread: str = ""  #: heading of the quartiles of `Measured`, in a separate column where cells have no room
+    #: heading of the quartiles of `Measured`, in a separate column where cells have no room
+    spread: str = ""
     alarm: bool = False  #: anything but zero is bad
     meaning: str = ""  #: what its values are, in words; HTML explains it below the table
     minor: bool = False  #: left out first where a terminal is narrow
@@ -114,7 +115,10 @@ class Table:
     def only(self, *keys: str) -> "Table":
         """Return the table with these columns alone, in this order."""
         column_of = {column.key: column for column in self.columns}
-        rows = (replace(row, values={k: v for k, v in row.values.items() if k in keys}) for row in self.rows)
+        rows = (
+            replace(row, values={k: v for k, v in row.values.items() if k in keys})
+            for row in self.rows
+        )
         return replace(self, columns=tuple(column_of[key] for key in keys), rows=tuple(rows))
 
 
@@ -125,7 +129,9 @@ def table(
     *,
     explanation: str = "",
 ) -> Table:
-    """Return a table; a row may be its values in the order of the columns, or a mapping that has them by key."""
+    """Return a table; a row may be its values in the order of the columns, or a
+    mapping that has them by key.
+    """
     known = tuple(columns)
 
     def row(given: Row | Sequence[Value] | Mapping[str, Any]) -> Row:
@@ -146,14 +152,17 @@ def table_of(
     explanation: str = "",
     how: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> Table:
-    """Return the table of some records, or of mappings; `how` are other fields of a column by its key."""
+    """Return the table of some records, or of mappings; `how` are other
+    fields of a column by its key.
+    """
     columns = [replace(each, **how.get(each.key, {})) for each in fields_of(record)]
     values = [row if isinstance(row, Mapping) else vars(row) for row in rows]
     return table(title, columns, values, explanation=explanation)
 
 
 def fields_of(record: type, *keys: str, **how: Any) -> tuple[Column, ...]:
-    """Return columns of fields of a record, by default of all texts and numbers; `how` are other fields of `Column`.
+    """Return columns of fields of a record, by default of all texts and numbers; `how` are
+    other fields of `Column`.
 
     Their headings, units and meanings stand at the fields.
     """
@@ -179,14 +188,20 @@ def words(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> 
     return numbers(*keys, how={"words": True, **(how or {})}, **headings)
 
 
-def numbers(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> tuple[Column, ...]:
-    """Return columns that are written alike, named as those of `words`; `how` are the other fields of `Column`."""
+def numbers(
+    *keys: str, how: Mapping[str, Any] | None = None, **headings: str
+) -> tuple[Column, ...]:
+    """Return columns that are written alike, named as those of `words`; `how` are the
+    other fields of `Column`.
+    """
     named = dict.fromkeys(keys, "") | headings
     return tuple(Column(key, heading or key, **(how or {})) for key, heading in named.items())
 
 
 def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
-    """Return a number with some significant digits, a hyphen for none; `zeros` at the end say how exact a number is."""
+    """Return a number with some significant digits, a hyphen for none; `zeros` at the end
+    say how exact a number is.
+    """
     if value is None:
         return "-"
     if value == 0:
@@ -209,12 +224,18 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
         text = f"{shown:.0f}" if abs(shown) >= 10 else f"{shown:.1f}"
     else:
         # Fractions in per cent have at least three digits.
-        text = number(shown, max(column.digits, 3) if percent and column.fraction else column.digits, zeros=zeros)
+        text = number(
+            shown,
+            max(column.digits, 3) if percent and column.fraction else column.digits,
+            zeros=zeros,
+        )
     return f"+{text}" if column.sign and shown > 0 else text
 
 
 def with_spread(median: float, low: float, high: float) -> tuple[str, str, str]:
-    """Return a median and the distances to its quartiles, to one digit behind the first of the wider distance."""
+    """Return a median and the distances to its quartiles, to one digit behind the
+    first of the wider distance.
+    """
     from math import floor, log10
 
     widest = max(high - median, median - low, abs(median) * 1e-3)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene that changes from frame to frame, of which only changed parts are made again; its stages timed one by one.
+"""A scene that changes from frame to frame, of which only changed parts are made again; its
+stages timed one by one.
 
-Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its own recorded
-functions: they are kept for the last few configurations, which share the functions that cast and shade. These depend on
-a method only in whether it finds out which surfaces are lit. Hits of camera rays are kept while the camera stands
-still.
+Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its
+own recorded functions: they are kept for the last few configurations, which share the functions
+that cast and shade. These depend on a method only in whether it finds out which surfaces are lit.
+Hits of camera rays are kept while the camera stands still.
 """
 
 from collections import OrderedDict
@@ -37,10 +38,14 @@ WORDS = {
 
 
 def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, float]]:
-    """Return a renderer that does the same, and a dictionary that its next frame fills with the time of stages [ms]."""
+    """Return a renderer that does the same, and a dictionary that its next frame fills with
+    the time of stages [ms].
+    """
     times: dict[str, float] = {}
 
-    timed: dict[str, Any] = {name: _clocked(name, getattr(renderer.stages, name), times) for name in WORDS}
+    timed: dict[str, Any] = {
+        name: _clocked(name, getattr(renderer.stages, name), times) for name in WORDS
+    }
     return replace(renderer, stages=replace(renderer.stages, **timed)), times
 
 
@@ -67,7 +72,8 @@ _KEPT = 6  # configurations of which the recorded functions are kept
 class Shown:
     """A frame on the device, and what it cost."""
 
-    stages: tuple[Any, Any, Any]  #: distance, surface, airlight, as `realtime.frame.renderer.run_stages` returns them
+    #: distance, surface, airlight, as `realtime.frame.renderer.run_stages` returns them
+    stages: tuple[Any, Any, Any]
     frame_ms: float  #: until the arrays are ready
     stages_ms: dict[str, float]  #: by stage; empty where they were not timed
 
@@ -75,7 +81,9 @@ class Shown:
 class LiveScene:
     """A scene, its configuration, and what the last frame left to the next."""
 
-    def __init__(self, name: str, size: tuple[int, int], chosen: Configuration, changes: Mapping[str, Values]) -> None:
+    def __init__(
+        self, name: str, size: tuple[int, int], chosen: Configuration, changes: Mapping[str, Values]
+    ) -> None:
         self.name, self.size = name, size
         self.chosen, self.changes = chosen, dict(changes)
         self._isotropic = isotropic_media(load_scene(name, size).scene)
@@ -97,7 +105,9 @@ class LiveScene:
         self._surfaces.clear()
 
     def _lobes(self, changes: Mapping[str, Values]) -> set[str]:
-        """Return which isotropic media changes give a lobe: the scene is loaded again for others."""
+        """Return which isotropic media changes give a lobe: the scene is
+        loaded again for others.
+        """
         return {name for name, value in changes.items() if name in self._isotropic and any(value)}
 
     @property
@@ -107,19 +117,27 @@ class LiveScene:
 
     @property
     def goes_on(self) -> bool:
-        """Whether frames differ while nothing moves: they build on the last one, or draw random numbers."""
+        """Whether frames differ while nothing moves: they build on the last
+        one, or draw random numbers.
+        """
         made = self.renderer
         return made.method.carries or made.method.noisy or made.history is not None
 
     def begin_mean(self) -> None:
-        """Forget the mean of the frames of a method that draws random numbers: from now on they show another thing."""
+        """Forget the mean of the frames of a method that draws random numbers: from now on
+        they show another thing.
+        """
         self._sum: Any = None
         self.summed = 0  # frames
 
     def mean(self, shown: Shown) -> Shown:
-        """Return the last frame with the mean airlight of the frames of a noisy method since something changed."""
+        """Return the last frame with the mean airlight of the frames of a noisy method
+        since something changed.
+        """
         distance, surface, airlight = shown.stages
-        return replace(shown, stages=(distance, surface, self._sum / self.summed if self.summed else airlight))
+        return replace(
+            shown, stages=(distance, surface, self._sum / self.summed if self.summed else airlight)
+        )
 
     def choose(self, chosen: Configuration) -> float:
         """Render by another configuration from now on; return what its preparation takes [ms].
@@ -138,8 +156,12 @@ class LiveScene:
         return took().ms
 
     def shader_stamp(self) -> tuple[Any, ...]:
-        """Return a stamp of the files of the shader that is shown, which changes with them; None for another method."""
-        files = self.renderer.method.shader.files if isinstance(self.renderer.method, Shader) else ()
+        """Return a stamp of the files of the shader that is shown, which changes with them;
+        None for another method.
+        """
+        files = (
+            self.renderer.method.shader.files if isinstance(self.renderer.method, Shader) else ()
+        )
         return tuple((str(file), file.stat().st_mtime_ns) for file in files if file.is_file())
 
     def read_shader(self) -> None:
@@ -154,7 +176,9 @@ class LiveScene:
         self._renderers[chosen, self._code()] = made
 
     def change(self, changes: Mapping[str, Values]) -> None:
-        """Change the scene; names that are not given are as they were. If scene or method refuse, all is as it was."""
+        """Change the scene; names that are not given are as they were. If scene or method
+        refuse, all is as it was.
+        """
         before, renderer = self.changes, self.renderer
         wanted = before | dict(changes)
         moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}
@@ -175,7 +199,9 @@ class LiveScene:
         self._other_method |= renderer is not self.renderer
         self.renderer = renderer
         self._moved["camera_moved"] |= any(name.startswith("camera") for name in moved)
-        self._moved["light_moved"] |= any(name.endswith((".position", ".direction")) for name in moved)
+        self._moved["light_moved"] |= any(
+            name.endswith((".position", ".direction")) for name in moved
+        )
 
     def reset(self) -> None:
         """Make the scene as it was read, without any change."""
@@ -198,7 +224,10 @@ class LiveScene:
         self._moved = dict.fromkeys(self._moved, False)
         shown = Shown(stages, took().ms, times)
         if self.renderer.method.noisy:
-            self._sum, self.summed = stages[2] + (0 if self._sum is None else self._sum), self.summed + 1
+            self._sum, self.summed = (
+                stages[2] + (0 if self._sum is None else self._sum),
+                self.summed + 1,
+            )
             dr.eval(self._sum)
         return shown
 
@@ -207,7 +236,9 @@ class LiveScene:
         return image_frame(replace(self.renderer, scene=self.scene), shown.stages)
 
     def _code(self) -> tuple[Any, ...]:
-        """Return a key of the code that the scene needs: a change may add or take a channel, or a light's falloff."""
+        """Return a key of the code that the scene needs: a change may add or take a
+        channel, or a light's falloff.
+        """
         return (*describe(self.scene).values(), self.scene.medium.vacuum)
 
     def _find_renderer(self) -> FrameRenderer:
@@ -222,7 +253,9 @@ class LiveScene:
         return self._renderers[key]
 
     def _with_known_surface(self, made: FrameRenderer) -> FrameRenderer:
-        """Return a renderer that casts and shades by the functions that another one has recorded."""
+        """Return a renderer that casts and shades by the functions that
+        another one has recorded.
+        """
         key = self._code(), made.method.provides_visibility, made.method.by_source
         known = self._surfaces.setdefault(key, made)
         stages = replace(made.stages, surface=known.stages.surface, shade=known.stages.shade)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames as pictures, made on the device: the curve of `reports.plotting.pictures.tone_mapped`, read from a table."""
+"""Frames as pictures, made on the device: the curve of
+`reports.plotting.pictures.tone_mapped`, read from a table.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +14,8 @@ from numpy.typing import NDArray
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.reports.plotting.pictures import NOT_FINITE, tone_mapped
 
-LAYERS = {"total": (1.0, 1.0), "airlight": (1.0, 0.0), "surface": (0.0, 1.0)}  #: weights of airlight and surface
+#: weights of airlight and surface
+LAYERS = {"total": (1.0, 1.0), "airlight": (1.0, 0.0), "surface": (0.0, 1.0)}
 _BRIGHTEST = 8.0  # times white: the table ends here
 _ENTRIES = 2**16  # so that a step is at most half a level of the picture, in the dark
 
@@ -32,14 +35,21 @@ class Pictures:
         self._draw: Callable[..., Any] = Frozen(_drawn)
 
     def of_frame(self, pixel, surface, airlight, *, layer: str, factor: float) -> memoryview:
-        """Return the picture of a frame on the device, 8-bit RGBA row by row; `pixel` numbers its lanes."""
+        """Return the picture of a frame on the device, 8-bit RGBA row by row;
+        `pixel` numbers its lanes.
+        """
         weights = [dr.opaque(mi.Float, factor * weight) for weight in LAYERS[layer]]
         return np.array(self._draw(self._levels, pixel, surface, airlight, *weights)).data.cast("B")
 
     def of_image(self, radiance: NDArray[np.float64], factor: float) -> bytes:
-        """Return the picture of an image on the host, (height, width, 3) [W/(m^2 sr)], in the same form."""
+        """Return the picture of an image on the host, (height, width, 3)
+        [W/(m^2 sr)], in the same form.
+        """
         finite = np.asarray(np.isfinite(radiance).all(axis=-1))
-        place = np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, _BRIGHTEST) * _PER_ENTRY + 0.5
+        place = (
+            np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, _BRIGHTEST) * _PER_ENTRY
+            + 0.5
+        )
         picture = self._table[place.astype(np.int64)]
         picture[~finite] = NOT_FINITE
         return rgba(picture)
@@ -47,7 +57,9 @@ class Pictures:
 
 def rgba(picture: NDArray[np.uint8]) -> bytes:
     """Return an 8-bit picture, (height, width, 3), as bytes with a fourth channel that is full."""
-    return np.concatenate([picture, np.full((*picture.shape[:2], 1), 255, np.uint8)], axis=2).tobytes()
+    return np.concatenate(
+        [picture, np.full((*picture.shape[:2], 1), 255, np.uint8)], axis=2
+    ).tobytes()
 
 
 _PER_ENTRY = (_ENTRIES - 1) / _BRIGHTEST
@@ -60,7 +72,9 @@ def _drawn(levels, pixel, surface, airlight, airlight_weight, surface_weight):
     for channel, value in enumerate(color):
         value = mi.Float(value)
         finite &= dr.isfinite(value)
-        place = mi.UInt32(dr.fma(dr.clip(dr.select(dr.isfinite(value), value, 0), 0, _BRIGHTEST), _PER_ENTRY, 0.5))
+        place = mi.UInt32(
+            dr.fma(dr.clip(dr.select(dr.isfinite(value), value, 0), 0, _BRIGHTEST), _PER_ENTRY, 0.5)
+        )
         picture |= dr.gather(mi.UInt32, levels, place) << (8 * channel)
         wrong |= int(NOT_FINITE[channel]) << (8 * channel)
     image = dr.zeros(mi.UInt32, dr.width(pixel))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of what is shown: in which order its pixels come, and the process that computes it.
 
-Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is random, so that
-what is known is a fair sample of the image at any time, and the picture of it grows sharper. The process yields the
-processor to the view. A new task ends the one before it, at the next of its chunks; the process ends with the other end
-of its pipe, however the view has ended.
+Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is
+random, so that what is known is a fair sample of the image at any time, and the picture of it grows
+sharper. The process yields the processor to the view. A new task ends the one before it, at the
+next of its chunks; the process ends with the other end of its pipe, however the view has ended.
 """
 
 import os
@@ -44,7 +44,8 @@ class KnownReference:
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     surface: Array  #: [W/(m^2 sr)]
-    bound: Array  #: of the error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
+    #: of the error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
+    bound: Array
 
     @staticmethod
     def of_size(width: int, height: int) -> "KnownReference":
@@ -58,11 +59,17 @@ class KnownReference:
 
     def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, bound: Array) -> None:
         """Note the reference of some pixels, (pixels, 3) each."""
-        for layer, values in ((self.airlight, airlight), (self.surface, surface), (self.bound, bound)):
+        for layer, values in (
+            (self.airlight, airlight),
+            (self.surface, surface),
+            (self.bound, bound),
+        ):
             layer.reshape(-1, 3)[pixels] = values
 
     def filled(self, layer: Array) -> Array:
-        """Return a layer of the reference, or of a frame; pixels that are not known take a near one that is."""
+        """Return a layer of the reference, or of a frame; pixels that are not known
+        take a near one that is.
+        """
         known = self.known
         step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
         if step is None:
@@ -73,19 +80,25 @@ class KnownReference:
 
 @dataclass(frozen=True)
 class ViewError:
-    """The error of the airlight of a frame against what is known of its reference, over the mean of that."""
+    """The error of the airlight of a frame against what is known of its
+    reference, over the mean of that.
+    """
 
     relative_rmse: float | None
-    interval: float | None  #: half of the 95 % interval of that, for the pixels that are not known yet
+    #: half of the 95 % interval of that, for the pixels that are not known yet
+    interval: float | None
     relative_bias: float | None
     p99: float | None  #: see `validation.metrics.errors`
-    bound: float | None  #: root mean square of the reference's own bound: the most by which it changes the error
+    #: root mean square of the reference's own bound: the most by which it changes the error
+    bound: float | None
     known: int  #: pixels
     pixels: int
 
 
 def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
-    """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)]; None if nothing is known."""
+    """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)];
+    None if nothing is known.
+    """
     known = found.known
     count, pixels = int(known.sum()), known.size
     if count == 0:
@@ -110,8 +123,12 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
 
 
 def motion_error(errors: Sequence[ViewError]) -> tuple[float, float]:
-    """Return the root mean square of the errors of frames, and half of its 95 % interval for the pixels left out."""
-    rmse, halves = (np.array([getattr(each, name) for each in errors]) for name in ("relative_rmse", "interval"))
+    """Return the root mean square of the errors of frames, and half of its 95 % interval
+    for the pixels left out.
+    """
+    rmse, halves = (
+        np.array([getattr(each, name) for each in errors]) for name in ("relative_rmse", "interval")
+    )
     mean = float(np.sqrt(np.mean(rmse**2)))
     return mean, float(np.linalg.norm(rmse * halves)) / (len(errors) * mean) if mean > 0 else 0.0
 
@@ -139,13 +156,16 @@ class Answer:
     pixels: Any = None  #: numbers of pixels, (rays,)
     airlight: Any = None  #: (rays, 3) [W/(m^2 sr)]
     surface: Any = None  #: (rays, 3) [W/(m^2 sr)]
-    bound: Any = None  #: of the error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
+    #: of the error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
+    bound: Any = None
     done: bool = False
     failure: str = ""
 
 
 def yield_processor() -> None:
-    """Let this process run only when nothing else wants to, where the system knows that, else seldom."""
+    """Let this process run only when nothing else wants to, where the system
+    knows that, else seldom.
+    """
     with suppress(OSError, AttributeError):
         os.nice(19)
     with suppress(OSError, AttributeError):
@@ -229,7 +249,13 @@ class ReferenceInBackground:
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
-    def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values], most: int | None = None) -> None:
+    def start(
+        self,
+        scene: str,
+        size: tuple[int, int],
+        changes: Mapping[str, Values],
+        most: int | None = None,
+    ) -> None:
         """Compute the reference of a scene from now on, of all pixels or of so many by chance."""
         with self._lock:
             self._number += 1
@@ -258,7 +284,10 @@ class ReferenceInBackground:
             while True:
                 self._take(self._pipe.recv())
         with self._lock:
-            self.failure = self.failure or "the process that computes the reference has ended; start the view again"
+            self.failure = (
+                self.failure
+                or "the process that computes the reference has ended; start the view again"
+            )
         self._told()
 
     def _take(self, answer: Answer) -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page and its socket over HTTP: nothing is served to anyone who does not know the token in the address."""
+"""The page and its socket over HTTP: nothing is served to anyone who does not know
+the token in the address.
+"""
 
 import http
 import json
@@ -23,7 +25,8 @@ _HEADERS = (
     ("X-Content-Type-Options", "nosniff"),
     (
         "Content-Security-Policy",
-        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; "
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src "
+        "data:; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     ),
 )
@@ -60,8 +63,8 @@ class Page:
 class Server:
     """The server of one view; port 0 is any free one.
 
-    `opened`, `told`, `closed` are called in separate threads: with a page that was opened, with a page and what it
-    says, with a closed page.
+    `opened`, `told`, `closed` are called in separate threads: with a page that was opened, with a
+    page and what it says, with a closed page.
     """
 
     def __init__(
@@ -78,7 +81,13 @@ class Server:
         self._token = secrets.token_urlsafe(24)
         self._opened, self._told, self._closed = opened, told, closed
         self._server = serve(
-            self._talk, host, port, process_request=self._answer, compression=None, max_size=2**16, server_header=None
+            self._talk,
+            host,
+            port,
+            process_request=self._answer,
+            compression=None,
+            max_size=2**16,
+            server_header=None,
         )
         self.port = self._server.socket.getsockname()[1]
         shown = f"[{host}]" if ":" in host else host
@@ -109,7 +118,11 @@ class Server:
             return connection.respond(http.HTTPStatus.NOT_FOUND, "not found\n")
         name, kind = _FILES[file]
         body = (_PAGE / name).read_bytes()
-        shape = (("Content-Type", kind), ("Content-Length", str(len(body))), ("Connection", "close"))
+        shape = (
+            ("Content-Type", kind),
+            ("Content-Length", str(len(body))),
+            ("Connection", "close"),
+        )
         headers = Headers([*_HEADERS, *shape])
         return Response(200, "OK", headers, body)
 

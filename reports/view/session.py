@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop of the view: it draws what the page asks for, and computes its reference while nothing moves.
+"""The loop of the view: it draws what the page asks for, and computes its
+reference while nothing moves.
 
-While the scene changes, one frame at a time is judged as it was shown, with its noise and its history, by its own
-reference in some pixels; the next one when that is known.
+While the scene changes, one frame at a time is judged as it was shown, with its noise and its
+history, by its own reference in some pixels; the next one when that is known.
 
-Threads of the server put what the page says into a list; this loop alone touches Dr.Jit. It takes all that has come
-since the last frame at once, so frames that nobody would see are not drawn, and it waits for the page to show a frame
-before it sends the next but one.
+Threads of the server put what the page says into a list; this loop alone touches Dr.Jit. It takes
+all that has come since the last frame at once, so frames that nobody would see are not drawn, and
+it waits for the page to show a frame before it sends the next but one.
 """
 
 import threading
@@ -23,10 +24,21 @@ from airlight.errors import InputError, nearest
 from airlight.realtime.methods.interface.method import method_parameters
 from airlight.realtime.methods.registry import METHODS, find_method
 from airlight.realtime.parameters import defaults, values
-from airlight.reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
+from airlight.reports.plotting.pictures import (
+    ERROR_CEILING,
+    ERROR_FLOOR,
+    error_map,
+    error_scale,
+    exposure,
+)
 from airlight.reports.view.live_scene import WORDS, LiveScene, Shown
 from airlight.reports.view.picture import LAYERS, Pictures, rgba
-from airlight.reports.view.reference import ReferenceInBackground, ViewError, motion_error, view_error
+from airlight.reports.view.reference import (
+    ReferenceInBackground,
+    ViewError,
+    motion_error,
+    view_error,
+)
 from airlight.reports.view.server import Page
 from airlight.reports.view.widgets import (
     ViewState,
@@ -61,7 +73,12 @@ class Session:
         self._condition = threading.Condition()
         self._said: list[tuple[Page, dict[str, Any]]] = []
         self._page: Page | None = None
-        self._show: dict[str, Any] = {"layer": "total", "exposure": 0.0, "other": "none", "run": False}
+        self._show: dict[str, Any] = {
+            "layer": "total",
+            "exposure": 0.0,
+            "other": "none",
+            "run": False,
+        }
         self._factor: float | None = None
         self._sent = self._drawn = self._wanted = 0
         self._moves = 0  # of the camera that the page has sent and that are taken
@@ -72,13 +89,15 @@ class Session:
         self._told = self._news_at = 0.0
         self._reference_of: Any = None
         self._news = False
-        self._moves_on = False  # whether the scene has changed since the last reference of a scene at rest
-        self._judged: Any = None  # airlight of the frame of a scene that changes whose reference is computed
+        # whether the scene has changed since the last reference of a scene at rest
+        self._moves_on = False
+        # airlight of the frame of a scene that changes whose reference is computed
+        self._judged: Any = None
         self._last_judged = 0  # number of that frame
         self._in_motion: list[ViewError] = []
         self._shader = self.live.shader_stamp()
 
-    # Called by the server's threads -----------------------------------------------------------------------------------
+    # Called by the server's threads ---------------------------------------------------------------
 
     def opened(self, page: Page) -> None:
         """Show this page what there is from now on, and no other."""
@@ -108,7 +127,7 @@ class Session:
             self._news = True
             self._condition.notify()
 
-    # The loop ---------------------------------------------------------------------------------------------------------
+    # The loop -------------------------------------------------------------------------------------
 
     def run(self) -> None:
         """Draw until the process ends."""
@@ -153,7 +172,9 @@ class Session:
         return max(min(waits), 0.001)
 
     def _take(self, page: Page, said: list[tuple[Page, dict[str, Any]]]) -> None:
-        """Do what the page asks; changes that follow one another are one, and of values of one parameter the last."""
+        """Do what the page asks; changes that follow one another are one, and of values
+        of one parameter the last.
+        """
         changes: dict[str, Values] = {}
         own = [message for sender, message in said if sender is page]
         for message, following in zip(own, [*own[1:], {}]):
@@ -190,9 +211,14 @@ class Session:
         self._touch()
 
     def _follow_shader(self, page: Page) -> None:
-        """Read the shader that is shown again where one of its files has changed; a mistake leaves the picture."""
+        """Read the shader that is shown again where one of its files has changed; a
+        mistake leaves the picture.
+        """
         now = self.live.shader_stamp()
-        changed, self._shader = bool(now) and bool(self._shader) and now != self._shader, now or self._shader
+        changed, self._shader = (
+            bool(now) and bool(self._shader) and now != self._shader,
+            now or self._shader,
+        )
         if changed:
             self._try(page, self.live.read_shader, of_scene=False)
             self._tell_state(page)
@@ -239,15 +265,22 @@ class Session:
         self.live.choose(sparing(method, kernel, given))
 
     def _check_choice(self, method: str, kernel: Any) -> None:
-        """Refuse what is neither built in nor named by the user at the start: a page must not choose code to run."""
+        """Refuse what is neither built in nor named by the user at the start: a page
+        must not choose code to run.
+        """
         own = self._given.chosen
         if method not in METHODS and method != own.method:
             wanted = ", ".join([*METHODS, *([own.method] if own.method not in METHODS else [])])
-            raise InputError(f"method: got {method!r}, expected one of {wanted}" + nearest(method, METHODS))
+            raise InputError(
+                f"method: got {method!r}, expected one of {wanted}" + nearest(method, METHODS)
+            )
         if kernel and ":" in str(kernel) and kernel != own.kernel:
-            raise InputError(f"kernel: got {kernel!r}, expected one that is built in, or that of the command line")
+            raise InputError(
+                f"kernel: got {kernel!r}, expected one that is built in, or that of the command "
+                "line"
+            )
 
-    # Messages to the page ---------------------------------------------------------------------------------------------
+    # Messages to the page -------------------------------------------------------------------------
 
     def _open(self, page: Page) -> None:
         page.tell(
@@ -259,7 +292,11 @@ class Session:
             layers=list(LAYERS),
             stages=WORDS,
             show=self._show,
-            scale={"colours": error_scale()[0].tolist(), "floor": ERROR_FLOOR, "ceiling": ERROR_CEILING},
+            scale={
+                "colours": error_scale()[0].tolist(),
+                "floor": ERROR_FLOOR,
+                "ceiling": ERROR_CEILING,
+            },
         )
         self._tell_state(page)
         self._touch()
@@ -273,7 +310,9 @@ class Session:
             method=live.chosen.method,
             kernel=live.chosen.kernel,
             calls_kernel=calls_kernel(live.chosen),
-            parameters=plain(parameter_widgets(live.chosen, area_lights=bool(live.scene.area_lights))),
+            parameters=plain(
+                parameter_widgets(live.chosen, area_lights=bool(live.scene.area_lights))
+            ),
             changeable=plain(list(live.there.values())),
             changed=list(live.changes),
             commands={name: state.command(name) for name in ("view", "render", "reference")},
@@ -318,36 +357,63 @@ class Session:
         self._asked_at = None
 
     def _after(self, page: Page) -> None:
-        """Tell where all stands, begin the reference and show what is known of it, when it is time."""
+        """Tell where all stands, begin the reference and show what is
+        known of it, when it is time.
+        """
         now = time.perf_counter()
         if self._told < self._changed_at and now >= self._changed_at + _QUIET:
             self._tell_state(page)
         if self._moves_on:
             self._judge_motion(page)
-        if self._reference_of is None and now >= self._changed_at + _STILL and self._shown is not None:
+        if (
+            self._reference_of is None
+            and now >= self._changed_at + _STILL
+            and self._shown is not None
+        ):
             self._reference_of = dict(self.live.changes)
             self._moves_on, self._judged = False, None
             self.reference.start(self._given.scene, self._given.size, self._reference_of)
-        if self._news and now >= self._news_at + _NEWS and self._reference_of is not None and self._shown is not None:
+        if (
+            self._news
+            and now >= self._news_at + _NEWS
+            and self._reference_of is not None
+            and self._shown is not None
+        ):
             self._news, self._news_at = False, now
             self._tell_error(page, self._shown)
 
     def _judge_motion(self, page: Page) -> None:
-        """Tell the error of the frame that is judged when its reference is known, then begin with the newest one."""
+        """Tell the error of the frame that is judged when its reference is known, then
+        begin with the newest one.
+        """
         known = self.reference.known
-        if self._judged is not None and known is not None and (self.reference.done or self.reference.failure):
+        if (
+            self._judged is not None
+            and known is not None
+            and (self.reference.done or self.reference.failure)
+        ):
             error, self._judged = view_error(known, self._judged), None
             if self.reference.done and error is not None and error.relative_rmse is not None:
                 self._in_motion.append(error)
                 rmse, interval = motion_error(self._in_motion)
-                told = {"rmse": rmse, "interval": interval, "frames": len(self._in_motion), "pixels": error.known}
+                told = {
+                    "rmse": rmse,
+                    "interval": interval,
+                    "frames": len(self._in_motion),
+                    "pixels": error.known,
+                }
                 page.tell("motion", **plain(told))
         # A change that no frame shows yet has another reference.
         new = self._sent > self._last_judged and self._asked_at is None
         if self._judged is None and self._shown is not None and new:
             with suppress(InputError):
-                self._last_judged, self._judged = self._sent, self.live.on_host(self._shown).airlight
-                self.reference.start(self._given.scene, self._given.size, self.live.changes, _IN_MOTION)
+                self._last_judged, self._judged = (
+                    self._sent,
+                    self.live.on_host(self._shown).airlight,
+                )
+                self.reference.start(
+                    self._given.scene, self._given.size, self.live.changes, _IN_MOTION
+                )
 
     def _tell_error(self, page: Page, shown: Shown) -> None:
         found = self.reference.known
@@ -365,7 +431,8 @@ class Session:
             failure="",
             error=plain(asdict(error)) if error else None,
             done=self.reference.done,
-            frames=self.live.summed,  # that the mean is of; 0 for a method whose frames are all the same
+            # that the mean is of; 0 for a method whose frames are all the same
+            frames=self.live.summed,
             mean=plain(left.relative_rmse) if left else None,
         )
         if error is None or self._show["other"] == "none":
@@ -376,7 +443,9 @@ class Session:
         else:
             weights = LAYERS[self._show["layer"]]
             layers = found.filled(found.airlight), found.filled(found.surface)
-            radiance = sum(weight * layer for weight, layer in zip(weights, layers, strict=True) if weight)
+            radiance = sum(
+                weight * layer for weight, layer in zip(weights, layers, strict=True) if weight
+            )
             picture = self._pictures.of_image(np.asarray(radiance), self._exposed())
         page.show(picture, kind="other", size=self._size(), known=error.known, pixels=error.pixels)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Data for the widgets of the page, and the commands that show or render its frame again.
 
-All of it follows from typed records, nothing is listed here. Functions return dictionaries: the messages of the page,
-which a script reads and no Python.
+All of it follows from typed records, nothing is listed here. Functions return dictionaries: the
+messages of the page, which a script reads and no Python.
 """
 
 import shlex
@@ -43,21 +43,31 @@ class ViewState:
 
 
 def method_widgets(own: str) -> list[dict[str, Any]]:
-    """Return the methods; `own` is the one that the user named, which may not be in the registry."""
+    """Return the methods; `own` is the one that the user named, which
+    may not be in the registry.
+    """
     names = [*METHODS, *([own] if own not in METHODS else [])]
     return [{"name": name, "summary": find_method(name).summary} for name in names]
 
 
 def kernel_widgets() -> list[dict[str, Any]]:
-    """Return the kernels, each with the name and the default of the number that may follow its name."""
+    """Return the kernels, each with the name and the default of the number
+    that may follow its name.
+    """
     return [
-        {"name": kernel.name, "summary": kernel.summary, "number": next(iter(kernel.parameters.items()), None)}
+        {
+            "name": kernel.name,
+            "summary": kernel.summary,
+            "number": next(iter(kernel.parameters.items()), None),
+        }
         for kernel in KERNELS.values()
     ]
 
 
 def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[str, Any]]:
-    """Return the parameters of a method with values, ranges and help; for area lights also of their points."""
+    """Return the parameters of a method with values, ranges and help; for area
+    lights also of their points.
+    """
     method = find_method(chosen.method)
     own, light_samples = method_parameters(method, dict(chosen.parameters))
     widgets = [_parameter(item, getattr(own, item.name)) for item in fields(own)]
@@ -75,7 +85,12 @@ def calls_kernel(chosen: Configuration) -> bool:
 
 def _parameter(item: Field, value: Any) -> dict[str, Any]:
     limits = limits_of(item)
-    widget: dict[str, Any] = {"name": item.name, "value": value, "help": limits.help, "unit": limits.unit}
+    widget: dict[str, Any] = {
+        "name": item.name,
+        "value": value,
+        "help": limits.help,
+        "unit": limits.unit,
+    }
     if limits.choices:
         return widget | {"kind": "choice", "choices": limits.choices}
     if isinstance(item.default, bool):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """airlight: how fast, accurate and robust is a real-time method for volumetric light?
 
-The public Python API, re-exported from the packages that implement it.
-Names are imported when they are first used, so that `airlight --help` imports neither Mitsuba nor SciPy: `__init__.pyi`
-beside this file says where each is, to editors and type checkers too.
+The public Python API, re-exported from the packages that implement it. Names are imported when they
+are first used, so that `airlight --help` imports neither Mitsuba nor SciPy: `__init__.pyi` beside
+this file says where each is, to editors and type checkers too.
 
 >>> import airlight
 >>> exact = airlight.reference("open-fog", size=(32, 24))  # a built-in scene, or the path of a Mitsuba XML file
@@ -24,7 +24,9 @@ __version__ = "0.9.0.dev0"  #: of the next release until it is made, see docs/to
 
 
 class _Package(ModuleType):
-    """A package whose function `reference` stays one: an import of the folder of this name does not replace it."""
+    """A package whose function `reference` stays one: an import of the folder of this
+    name does not replace it.
+    """
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name != "reference" or not isinstance(value, ModuleType):

@@ -38,7 +38,9 @@ from .reports.studies.registry import STUDIES as STUDIES
 from .reports.studies.registry import study as study
 from .validation.certified.files import certified_data as certified_data
 from .validation.estimates.images import Budget as Budget
-from .validation.estimates.multiple_scattering import multiple_scattering_fraction as multiple_scattering_fraction
+from .validation.estimates.multiple_scattering import (
+    multiple_scattering_fraction as multiple_scattering_fraction,
+)
 from .validation.metrics.errors import error_metrics as error_metrics
 from .validation.scenes.registry import SCENES as SCENES
 from .validation.study.configuration import configuration as configuration

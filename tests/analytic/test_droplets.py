@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mie's theory and the droplets of clouds and fog: published values, another program, moments, full and modified."""
+"""Mie's theory and the droplets of clouds and fog: published values, another program,
+moments, full and modified.
+"""
 
 import numpy as np
 import pytest
@@ -56,14 +58,20 @@ def test_a_sphere_without_absorption_scatters_all_that_it_takes():
 
 @pytest.mark.parametrize(
     ("size", "index", "words"),
-    [(0, 1.3, "size"), (3e4, 1.3, "size"), (5, 1.3 - 0.1j, "absorption"), (5, 1, "not 1"), (5, -1.3, "n > 0")],
+    [
+        (0, 1.3, "size"),
+        (3e4, 1.3, "size"),
+        (5, 1.3 - 0.1j, "absorption"),
+        (5, 1, "not 1"),
+        (5, -1.3, "n > 0"),
+    ],
 )
 def test_spheres_without_a_series_are_refused(size, index, words):
     with pytest.raises(InputError, match=words):
         efficiencies(size, index)
 
 
-# Droplets ------------------------------------------------------------------------------------------------------------
+# Droplets -----------------------------------------------------------------------------------------
 
 
 _SMALL = Droplets(2.0, 8.0)  # as quick as allowed
@@ -87,8 +95,11 @@ def test_an_average_is_over_single_spheres():
     single = efficiencies(2 * np.pi * radius / 0.55, 1.333)
     assert found.q_extinction == pytest.approx(weight @ single.extinction, rel=1e-12)
     assert found.q_scattering == pytest.approx(found.q_extinction, rel=1e-10)
-    # g, which comes from angles, is that of the efficiencies, which comes from products of coefficients.
-    assert found.g == pytest.approx(weight @ (single.scattering * single.g) / found.q_scattering, rel=1e-10)
+    # g, which comes from angles, is that of the efficiencies, which comes from
+    # products of coefficients.
+    assert found.g == pytest.approx(
+        weight @ (single.scattering * single.g) / found.q_scattering, rel=1e-10
+    )
 
 
 def test_the_phase_function_has_mean_one_and_its_moments():
@@ -111,8 +122,11 @@ def test_what_is_cut_is_what_the_density_loses():
     assert 0.5 * half * weights @ cut(-1 + half * (nodes + 1)) == pytest.approx(1, abs=1e-9)
     assert cut(1.0) == 0
     assert cut.removed == pytest.approx(0.444, abs=0.001)
-    # As much light as before is scattered outside of the peak, by a density that is lowered by what is cut.
-    assert (1 - cut.removed) * cut(np.array([0.3])) == pytest.approx(full(np.array([0.3])), rel=1e-9)
+    # As much light as before is scattered outside of the peak, by a density that
+    # is lowered by what is cut.
+    assert (1 - cut.removed) * cut(np.array([0.3])) == pytest.approx(
+        full(np.array([0.3])), rel=1e-9
+    )
 
 
 @pytest.mark.claim("droplets-refused")
@@ -129,14 +143,16 @@ def test_impossible_droplets_are_refused(arguments, words):
         Droplets(**arguments)
 
 
-# Phase functions of droplets by their names --------------------------------------------------------------------------
+# Phase functions of droplets by their names -------------------------------------------------------
 
 
 FILE = certified_data("airlight_integral_droplets.csv")
 
 
 @pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")
-@pytest.mark.parametrize("diameter", [12, *(pytest.param(d, marks=pytest.mark.slow) for d in (5, 23.5))])
+@pytest.mark.parametrize(
+    "diameter", [12, *(pytest.param(d, marks=pytest.mark.slow) for d in (5, 23.5))]
+)
 def test_hg_draine_has_mean_one_and_its_moments(diameter):
     phase = HgDraine(diameter)
     expected = legendre_moments(phase, 8, breaks=(1.0, 10.0), degree=2000)
@@ -153,7 +169,9 @@ def test_mpmath_twin_agrees(words):
     assert phase(cosines) == pytest.approx(expected, rel=2e-8, abs=1e-14)
 
 
-@pytest.mark.claim("droplets-certified", tolerance="3e-8 relative: of the spline through Mie's series")
+@pytest.mark.claim(
+    "droplets-certified", tolerance="3e-8 relative: of the spline through Mie's series"
+)
 def test_certified_values():
     cases = read_cases(FILE)
     found, _ = integrate_cases(cases)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight in height fog: certified rays, the laws, and quadratures that know no closed form of an optical depth."""
+"""Airlight in height fog: certified rays, the laws, and quadratures that know no closed
+form of an optical depth.
+"""
 
 import itertools
 from dataclasses import replace
@@ -10,13 +12,21 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.analytic.geometry import foot_and_height
-from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun, phi
+from airlight.analytic.height_fog import (
+    HeightFog,
+    HeightRays,
+    Layer,
+    height_fog_segments,
+    height_fog_sun,
+    phi,
+)
 from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import Isotropic
 from airlight.errors import InputError
 from tests.helpers.height_fog import drawn, rows
 
-# Height, foot and exponents are rounded: 1e-11 where heights are tens of scale heights, as among these rays.
+# Height, foot and exponents are rounded: 1e-11 where heights are tens of scale
+# heights, as among these rays.
 LAW = 1e-10
 
 
@@ -24,7 +34,9 @@ def close(a, b, relative=LAW):
     return abs(a - b) <= relative * max(abs(a), abs(b))
 
 
-@pytest.mark.claim("height-fog-certified", tolerance="1e-12 relative under the sun, 1e-10 under lights at places")
+@pytest.mark.claim(
+    "height-fog-certified", tolerance="1e-12 relative under the sun, 1e-10 under lights at places"
+)
 def test_certified_rays():
     certified = rows()
     assert len(certified) == 400
@@ -34,11 +46,14 @@ def test_certified_rays():
 
 def test_the_estimate_covers_the_error():
     for row in rows():
-        if not row.sun and row.tag != "near-light":  # there the rounding of foot and height counts, which are given
+        # there the rounding of foot and height counts, which are given
+        if not row.sun and row.tag != "near-light":
             foot, height = foot_and_height(row.origin, row.direction, row.light)
             rays = HeightRays(row.origin[2], row.direction[2], foot, height, row.light[2])
             for rtol in (1e-3, 1e-10):
-                value, error = height_fog_segments(row.fog, rays, row.x0, row.x1, row.phase, rtol=rtol)
+                value, error = height_fog_segments(
+                    row.fog, rays, row.x0, row.x1, row.phase, rtol=rtol
+                )
                 assert abs(value[0] - row.value) <= error[0], (row, rtol)
 
 
@@ -64,15 +79,21 @@ def _density(fog, origin, rise, x):
 def test_phi_near_zero_and_far_out():
     # (1 - e^-u)/u = 1 - u/2 + u^2/6 - ..., and 1/u
     u = np.array([0.0, 1e-300, 1e-12, 1e-4, 800.0, 1e300])
-    np.testing.assert_allclose(phi(u), [1, 1, 1 - 5e-13, 1 - 5e-5 + 1e-8 / 6, 1 / 800, 1e-300], rtol=1e-12)
+    np.testing.assert_allclose(
+        phi(u), [1, 1, 1 - 5e-13, 1 - 5e-5 + 1e-8 / 6, 1 / 800, 1e-300], rtol=1e-12
+    )
 
 
-@pytest.mark.claim("height-fog-laws", tolerance="1e-8 at H = 1e9 m, the difference from homogeneous fog")
+@pytest.mark.claim(
+    "height-fog-laws", tolerance="1e-8 at H = 1e9 m, the difference from homogeneous fog"
+)
 def test_a_large_scale_height_is_homogeneous_fog():
     for ray in (each for each in drawn(2) if not each.sun):
         foot, height = foot_and_height(ray.origin, ray.direction, ray.light)
         sigma_t = 0.13
-        expected = sigma_t * airlight_segments(foot, height, ray.x0, ray.x1, sigma_t, ray.phase)[0][0]
+        expected = (
+            sigma_t * airlight_segments(foot, height, ray.x0, ray.x1, sigma_t, ray.phase)[0][0]
+        )
         deep = replace(ray, fog=HeightFog((Layer(sigma_t, 0.0, 1e9),)))
         assert close(deep.airlight(), expected, 1e-7)
         assert close(replace(ray, fog=HeightFog((), sigma_t)).airlight(), expected, 3e-10)
@@ -88,7 +109,10 @@ def test_intervals_add_up_and_layers_have_two_degrees_of_freedom():
         halves = tuple(replace(each, sigma_t=each.sigma_t / 2) for each in layers for _ in range(2))
         assert close(value, replace(ray, fog=replace(ray.fog, layers=halves)).airlight(), 3e-10)
         if not ray.fog.clamped:
-            moved = tuple(Layer(e.sigma_t * np.exp(0.7), e.base - 0.7 * e.scale_height, e.scale_height) for e in layers)
+            moved = tuple(
+                Layer(e.sigma_t * np.exp(0.7), e.base - 0.7 * e.scale_height, e.scale_height)
+                for e in layers
+            )
             assert close(value, replace(ray, fog=replace(ray.fog, layers=moved)).airlight(), 3e-10)
 
 
@@ -100,15 +124,23 @@ def test_scaling_turning_about_the_vertical_and_moving():
         layers = tuple(Layer(e.sigma_t / k, e.base * k, e.scale_height * k) for e in ray.fog.layers)
         fog = replace(ray.fog, layers=layers, constant=ray.fog.constant / k)
         light = ray.light if ray.sun else k * ray.light
-        scaled = replace(ray, fog=fog, origin=k * ray.origin, light=light, x0=k * ray.x0, x1=k * ray.x1)
+        scaled = replace(
+            ray, fog=fog, origin=k * ray.origin, light=light, x0=k * ray.x0, x1=k * ray.x1
+        )
         assert close(scaled.airlight() * (1 if ray.sun else k * k), value, 3e-10)
         for matrix in (turn, np.diag([1.0, -1.0, 1.0])):
             turned = [matrix @ part for part in (ray.origin, ray.direction, ray.light)]
-            assert close(replace(ray, origin=turned[0], direction=turned[1], light=turned[2]).airlight(), value, 3e-10)
+            assert close(
+                replace(ray, origin=turned[0], direction=turned[1], light=turned[2]).airlight(),
+                value,
+                3e-10,
+            )
         moved = tuple(replace(each, base=each.base + 1.9) for each in ray.fog.layers)
         by = np.array([4.0, -3.0, 1.9])
         light = ray.light if ray.sun else ray.light + by
-        lifted = replace(ray, fog=replace(ray.fog, layers=moved), origin=ray.origin + by, light=light)
+        lifted = replace(
+            ray, fog=replace(ray.fog, layers=moved), origin=ray.origin + by, light=light
+        )
         assert close(lifted.airlight(), value, 3e-10)
 
 
@@ -123,7 +155,9 @@ def test_the_sun_by_quadrature_of_depths():
 
         marks = sorted((z - ray.origin[2]) / rise for z in fog.kinks)
         ends = [ray.x0, *(x for x in marks if ray.x0 < x < ray.x1), ray.x1]
-        sums = sum(quad(integrand, a, b, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(ends))
+        sums = sum(
+            quad(integrand, a, b, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(ends)
+        )
         assert close(ray.airlight(), sums * ray.phase(ray.light @ ray.direction), 1e-8)
 
 
@@ -132,7 +166,9 @@ def test_the_sun_is_continuous_through_the_horizon_and_through_the_suns_own_heig
     fog = HeightFog((Layer(0.11, 1.3, 4.1), Layer(0.02, -0.7, 19.0)))
     for rise in (0.0, 0.3):
         for end in (7.0, np.inf):
-            nearby = height_fog_sun(fog, 0.4, rise + np.array([-1e-8, 0.0, 1e-8]), 0.0, end, sun=0.3, phase=1.0)
+            nearby = height_fog_sun(
+                fog, 0.4, rise + np.array([-1e-8, 0.0, 1e-8]), 0.0, end, sun=0.3, phase=1.0
+            )
             assert np.ptp(nearby) < 1e-6 * nearby[1]
     down = np.linspace(-1, 0, 21)
     bound = 0.3 / (0.3 - down)
@@ -155,7 +191,9 @@ def test_a_high_cap_an_empty_layer_and_a_low_clamp_change_nothing():
 
 def _lowered(layer: Layer) -> Layer:
     """The same layer by a base below everything."""
-    return Layer(layer.sigma_t * np.exp((layer.base + 60) / layer.scale_height), -60.0, layer.scale_height)
+    return Layer(
+        layer.sigma_t * np.exp((layer.base + 60) / layer.scale_height), -60.0, layer.scale_height
+    )
 
 
 def test_a_light_in_the_interval_and_lights_beyond_the_cap():
@@ -182,7 +220,10 @@ def test_a_light_in_the_interval_and_lights_beyond_the_cap():
         (lambda: HeightFog((Layer(-0.1, 0.0, 1.0),)), "extinction of 0 or more"),
         (lambda: HeightFog((Layer(0.1, 0.0, 0.0),)), "scale height"),
         (lambda: HeightFog(floor=1.0, cap=1.0), "cap"),
-        (lambda: height_fog_sun(HeightFog(), 0, 0, 0, 1, sun=0.0, phase=1), "at or below the horizon"),
+        (
+            lambda: height_fog_sun(HeightFog(), 0, 0, 0, 1, sun=0.0, phase=1),
+            "at or below the horizon",
+        ),
         (lambda: height_fog_sun(HeightFog((), 0.1), 0, 0, 0, 1, sun=0.5, phase=1), "no cap"),
     ],
 )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight integral: every certified value, three forms, the laws, weights, shortened shadow rays, hard corners."""
+"""The airlight integral: every certified value, three forms, the laws, weights, shortened
+shadow rays, hard corners.
+"""
 
 import itertools
 from itertools import pairwise
@@ -32,26 +34,35 @@ def worst_by_tag(cases, relative):
     return {str(tag): float(relative[tags == tag].max()) for tag in np.unique(tags)}
 
 
-# Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has the largest fraction
-# (1e-14); the rays add the rounding of the foot point, eps |light - origin|, times the steepness of the integrand.
+# Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has
+# the largest fraction (1e-14); the rays add the rounding of the foot point, eps |light - origin|,
+# times the steepness of the integrand.
 @pytest.mark.claim(
-    "integral-certified", tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for"
+    "integral-certified",
+    tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for",
 )
 @pytest.mark.claim(
-    "integral-tolerance", tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for"
+    "integral-tolerance",
+    tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for",
 )
 @pytest.mark.parametrize(
     ("name", "tolerance"), [("airlight_integral.csv", 2e-14), ("airlight_integral_rays.csv", 1e-12)]
 )
 def test_every_certified_value(data_folder, name, tolerance):
     cases = read_cases(data_folder / name)
-    assert len(cases.phase) == {"airlight_integral.csv": 2004, "airlight_integral_rays.csv": 1002}[name]
+    assert (
+        len(cases.phase)
+        == {"airlight_integral.csv": 2004, "airlight_integral_rays.csv": 1002}[name]
+    )
     value, error = integrate_cases(cases)
     relative = np.abs(value - cases.value) / cases.value
     assert relative.max() < tolerance, worst_by_tag(cases, relative)
-    # the error estimate meets the tolerance asked for and covers the error (except for the rounding of the geometry)
+    # the error estimate meets the tolerance asked for and covers the error (except for the
+    # rounding of the geometry)
     assert (error <= 1.01e-10 * value).all()
-    assert (np.abs(value - cases.value) <= error + (0 if "rays" not in name else tolerance * value)).all()
+    assert (
+        np.abs(value - cases.value) <= error + (0 if "rays" not in name else tolerance * value)
+    ).all()
 
 
 @pytest.mark.claim("integral-tolerance", tolerance="the estimate itself")
@@ -86,7 +97,12 @@ def test_segments_add_up(segment, fraction):
     foot, height, x0, length, sigma_t, phase = segment
     middle = x0 + fraction * length
     value, error = airlight_segments(
-        foot, height, np.array([x0, x0, middle]), np.array([x0 + length, middle, x0 + length]), sigma_t, phase
+        foot,
+        height,
+        np.array([x0, x0, middle]),
+        np.array([x0 + length, middle, x0 + length]),
+        sigma_t,
+        phase,
     )
     assert abs(value[0] - value[1] - value[2]) <= error.sum() + 1e-15 * value[0]
 
@@ -98,8 +114,11 @@ def test_in_a_vacuum_a_ray_run_backwards_swaps_forward_and_backward(segment, g):
     foot, height, x0, length, _, _ = segment
     forward, _ = airlight_segments(foot, height, x0, x0 + length, 0.0, HenyeyGreenstein(g))
     mirrored = 2 * foot - x0
-    backward, _ = airlight_segments(foot, height, mirrored - length, mirrored, 0.0, HenyeyGreenstein(-g))
-    # 2 foot - x0 - length is rounded, which moves the ends by an ulp of 150 in a segment of 1e-3 at the least
+    backward, _ = airlight_segments(
+        foot, height, mirrored - length, mirrored, 0.0, HenyeyGreenstein(-g)
+    )
+    # 2 foot - x0 - length is rounded, which moves the ends by an ulp of 150 in a
+    # segment of 1e-3 at the least
     assert close(forward, backward, relative=1e-9)
 
 
@@ -118,9 +137,19 @@ def test_shadow_scale_and_weight_against_plain_quadrature(phase, shadow_scale):
 
     kinks = [foot - height * c / np.sqrt(1 - c * c) for c in phase.kinks]
     ends = [x0, *sorted(k for k in [*kinks, foot] if x0 < k < x1), x1]
-    expected = sum(quad(integrand, a, b, epsabs=0, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(ends))
+    expected = sum(
+        quad(integrand, a, b, epsabs=0, epsrel=1e-11, limit=200)[0]
+        for a, b in itertools.pairwise(ends)
+    )
     value, error = airlight_segments(
-        foot, height, x0, x1, sigma_t, phase, shadow_scale=shadow_scale, weight=lambda x, index: profile(x)
+        foot,
+        height,
+        x0,
+        x1,
+        sigma_t,
+        phase,
+        shadow_scale=shadow_scale,
+        weight=lambda x, index: profile(x),
     )
     assert value[0] == pytest.approx(expected, rel=1e-10)  # both to 1e-11
     assert error[0] < 1.01e-10 * value[0]
@@ -130,7 +159,9 @@ def test_corners():
     through_light = {"foot": 5.0, "height": 0.0}
     empty, _ = airlight_segments(5.0, 0.0, 5.0, 5.0, 0.3, ISOTROPIC)
     assert empty.tolist() == [0.0]
-    on_segment, error = airlight_segments(**through_light, x0=0.0, x1=9.0, sigma_t=0.3, phase=ISOTROPIC)
+    on_segment, error = airlight_segments(
+        **through_light, x0=0.0, x1=9.0, sigma_t=0.3, phase=ISOTROPIC
+    )
     assert np.isposinf(on_segment[0])
     assert np.isposinf(error[0])
     # before the light the path is `foot` all along: J = exp(-sigma_t foot) p(1) (1/1 - 1/5)
@@ -138,9 +169,12 @@ def test_corners():
     assert before[0] == pytest.approx(np.exp(-1.5) * 5.0 * 0.8, rel=1e-13)
     behind, _ = airlight_segments(**through_light, x0=6.0, x1=np.inf, sigma_t=0.3, phase=Hazy())
     # behind it the path is 2 x - foot, and light is scattered back
-    expected, _ = quad(lambda x: np.exp(-0.3 * (2 * x - 5)) / (x - 5) ** 2, 6, np.inf, epsabs=0, epsrel=1e-11)
+    expected, _ = quad(
+        lambda x: np.exp(-0.3 * (2 * x - 5)) / (x - 5) ** 2, 6, np.inf, epsabs=0, epsrel=1e-11
+    )
     assert behind[0] == pytest.approx(float(Hazy()(-1.0)) * expected, rel=1e-10)
-    # a ray without end in a vacuum sees half the sphere of angles behind the foot, all of it from far enough before
+    # a ray without end in a vacuum sees half the sphere of angles behind the foot, all of
+    # it from far enough before
     unbounded, _ = airlight_segments(np.array([0.0, 1e9]), 1.0, 0.0, np.inf, 0.0, ISOTROPIC)
     np.testing.assert_allclose(unbounded, [np.pi / 2, np.pi - 1e-9], rtol=1e-12)
     # so thick that nothing is left: no NaN, no warning
@@ -160,12 +194,19 @@ def test_corners():
     ],
 )
 def test_refusals(change, message):
-    arguments = {"foot": 1.0, "height": 1.0, "x0": 0.0, "x1": 2.0, "sigma_t": 0.1, "phase": ISOTROPIC}
+    arguments = {
+        "foot": 1.0,
+        "height": 1.0,
+        "x0": 0.0,
+        "x1": 2.0,
+        "sigma_t": 0.1,
+        "phase": ISOTROPIC,
+    }
     with pytest.raises(InputError, match=message):
         airlight_segments(**(arguments | change))
 
 
-# In the distance, the angle and the path -----------------------------------------------------------------------------
+# In the distance, the angle and the path ----------------------------------------------------------
 
 
 FORM_PHASES = [
@@ -201,12 +242,14 @@ def test_three_forms_are_one_integral(phase):
         forms = (distance, s), (angle, np.arctan(s / height)), (path, s + np.hypot(s, height))
         expected, _ = airlight_segments(foot, height, x0, x0 + length, sigma_t, phase)
         for form, ends in forms:
-            pieces = [quad(form, a, b, epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(ends) if b > a]
+            pieces = [
+                quad(form, a, b, epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(ends) if b > a
+            ]
             # The tolerance of the panels; the pieces are right to 1e-12.
             assert sum(pieces) == pytest.approx(expected[0], rel=1e-10)
 
 
-# Geometry: no digits are lost close to the light ---------------------------------------------------------------------
+# Geometry: no digits are lost close to the light --------------------------------------------------
 
 
 EPSILON = np.finfo(float).eps
@@ -230,13 +273,16 @@ def test_foot_and_height_against_mpmath(miss):
     foot, height = foot_and_height(origin, direction, light)
     for row in range(50):
         with workdps(60):
-            o, d, p = (matrix([mpf(float(v)) for v in column[row]]) for column in (origin, direction, light))
+            o, d, p = (
+                matrix([mpf(float(v)) for v in column[row]])
+                for column in (origin, direction, light)
+            )
             length = mp.norm(d)
             v = p - o
             along = (v.T * d)[0] / length
             across = mp.norm(v - d * (along / length))
-            # The height is right to a few ulp however close the ray passes (light - origin is exact for most float32
-            # numbers, else it costs one rounding of the larger coordinate).
+            # The height is right to a few ulp however close the ray passes (light - origin is exact
+            # for most float32 numbers, else it costs one rounding of the larger coordinate).
             slack = 8 * EPSILON * across + EPSILON * mp.norm(v)
             assert abs(mpf(float(height[row])) - across) <= slack
             assert abs(mpf(float(foot[row])) - along) <= 4 * EPSILON * mp.norm(v)
@@ -251,7 +297,8 @@ positive_heights = st.floats(min_value=1e-6, max_value=1e3)
 def test_the_path_satisfies_its_equation(x, foot, height):
     s, q = x - foot, height * float(log_distance(*np.array([foot, height, x, x + 1]))[1])
     assert q > 0
-    # (q - s)^2 = r^2 is where q came from; written as q^2 - 2 q s = h^2 and scaled by its largest term
+    # (q - s)^2 = r^2 is where q came from; written as q^2 - 2 q s = h^2 and
+    # scaled by its largest term
     assert abs(q * q - 2 * q * s - height**2) <= 12 * EPSILON * (q * q + 2 * abs(q * s) + height**2)
 
 

@@ -40,7 +40,8 @@ def moment(phase, power):
 @pytest.mark.claim("phase-mean-one", tolerance="1e-12")
 @pytest.mark.parametrize("phase", ALL, ids=str)
 def test_mean_over_the_sphere_is_one(phase):
-    assert moment(phase, 0) == pytest.approx(1.0, abs=1e-12)  # rounding of 200 weights, of which a lobe counts few
+    # rounding of 200 weights, of which a lobe counts few
+    assert moment(phase, 0) == pytest.approx(1.0, abs=1e-12)
 
 
 # Mean cosines: (1/2) int c up^n dc / (mean), with int of c ((1+c)/2)^n = 2 n / ((n+1)(n+2)).

@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The power series: against mpmath's Taylor coefficients and the derived column of the list of misprints."""
+"""The power series: against mpmath's Taylor coefficients and the derived column
+of the list of misprints.
+"""
 
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import Hazy, HenyeyGreenstein, Isotropic, Murky, Rayleigh, phase_from_words
+from airlight.analytic.phase import (
+    Hazy,
+    HenyeyGreenstein,
+    Isotropic,
+    Murky,
+    Rayleigh,
+    phase_from_words,
+)
 from airlight.analytic.series import taylor_coefficients
 
 PHASES = [
@@ -25,12 +34,17 @@ def test_against_mpmath(phase, a):
 
     with mpmath.workdps(40):
         expected = mpmath.taylor(
-            lambda theta: mpmath.exp(a - a * mpmath.tan(theta / 2 + mpmath.pi / 4)) * phase.mp(-mpmath.sin(theta)),
+            lambda theta: (
+                mpmath.exp(a - a * mpmath.tan(theta / 2 + mpmath.pi / 4))
+                * phase.mp(-mpmath.sin(theta))
+            ),
             0,
             9,
         )
     # coefficients are sums of terms up to a^9/9!, of both signs
-    np.testing.assert_allclose(taylor_coefficients(a, phase, 9), [float(c) for c in expected], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        taylor_coefficients(a, phase, 9), [float(c) for c in expected], rtol=1e-12, atol=1e-13
+    )
 
 
 A = np.array([0.0, 0.13, 1.9])
@@ -50,7 +64,8 @@ A = np.array([0.0, 0.13, 1.9])
     ],
 )
 def test_derived_forms_of_what_is_printed_wrong(name, mean, order, derived):
-    # Biri 2006, annex, as corrected in DESIGN section 3; hazy and murky there are not divided by their means.
+    # Biri 2006, annex, as corrected in DESIGN section 3; hazy and murky there are
+    # not divided by their means.
     ours = taylor_coefficients(A, phase_from_words(name)) * mean
     assert ours.shape == (3, 5)
     np.testing.assert_allclose(ours[:, order], derived, rtol=1e-14, atol=1e-15)

@@ -24,18 +24,27 @@ from tests.helpers.shaders import need_opengl
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 #: By renderer: its module, and the variable that names a Python that has it.
-RENDERERS = {"cycles": ("bpy", "AIRLIGHT_CYCLES_PYTHON"), "luxcore": ("pyluxcore", "AIRLIGHT_LUXCORE_PYTHON")}
+RENDERERS = {
+    "cycles": ("bpy", "AIRLIGHT_CYCLES_PYTHON"),
+    "luxcore": ("pyluxcore", "AIRLIGHT_LUXCORE_PYTHON"),
+}
 
 
 def blocks(page, language, after=""):
-    text = page.read_text(encoding="utf-8").partition(after)[2] if after else page.read_text(encoding="utf-8")
+    text = (
+        page.read_text(encoding="utf-8").partition(after)[2]
+        if after
+        else page.read_text(encoding="utf-8")
+    )
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
 
 
 @pytest.mark.claim("snippet-of-the-readme")
 def test_python_of_the_readme(tmp_path):
     for code in blocks(ROOT / "README.md", "python"):
-        ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+        ran = subprocess.run(
+            [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        )
         printed = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", ran.stdout)
         assert printed, ran.stdout
         assert 0 < float(printed[1]) < 0.02  # 64 equi-angular steps against shadow edges
@@ -43,7 +52,9 @@ def test_python_of_the_readme(tmp_path):
 
 
 def run_commands(page, capfd):
-    """Run every command of a page in its order; status 1 is a check of the reference that --quick had no time for."""
+    """Run every command of a page in its order; status 1 is a check of the reference that
+    --quick had no time for.
+    """
     for line in "".join(blocks(page, "sh")).splitlines():
         program, *words = shlex.split(line)
         assert program == "airlight"
@@ -61,27 +72,37 @@ def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
     for name in ("gate.png", "reference.exr", "gate-report/report.html", "gate-report/strip.pdf"):
         assert (tmp_path / name).stat().st_size > 1000, name
     # Several per cent with 32 steps, as the page says.
-    (relative,) = re.findall(r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE)
+    (relative,) = re.findall(
+        r"^rmse .* relative ([\d.]+) %$", capfd.readouterr().out, flags=re.MULTILINE
+    )
     assert 1 < float(relative) < 10
 
 
 @pytest.mark.claim("own-method", "engine-pixels")
 @pytest.mark.slow
-def test_a_method_and_an_image_are_validated_as_the_page_says(variant, tmp_path, monkeypatch, capfd):
+def test_a_method_and_an_image_are_validated_as_the_page_says(
+    variant, tmp_path, monkeypatch, capfd
+):
     """Both end in a report and a chart: the function with its point, the image without a time."""
     monkeypatch.chdir(tmp_path)
     page = DOCS / "validate-your-method.md"
 
     def methods_of(folder):
-        return json.loads((tmp_path / folder / "report.json").read_text(encoding="utf-8"))["scenes"][0]["methods"]
+        return json.loads((tmp_path / folder / "report.json").read_text(encoding="utf-8"))[
+            "scenes"
+        ][0]["methods"]
 
     need_opengl()
     shutil.copy(DOCS / "examples" / "marcher.glsl", tmp_path / "fog.glsl")
     (tmp_path / "fog.py").write_text(blocks(page, "python")[0], encoding="utf-8")
     run_commands(page, capfd)
     assert (tmp_path / "validation/frame-speed.pdf").stat().st_size > 1000
-    assert "fog.py:marched" in (tmp_path / "validation/methods-table.tex").read_text(encoding="utf-8")
-    (marched,) = (entry for entry in methods_of("validation") if entry["label"].startswith("fog.py:marched"))
+    assert "fog.py:marched" in (tmp_path / "validation/methods-table.tex").read_text(
+        encoding="utf-8"
+    )
+    (marched,) = (
+        entry for entry in methods_of("validation") if entry["label"].startswith("fog.py:marched")
+    )
     assert marched["times"]["frame"]["median_ms"] > 0
     assert marched["error"]["relative_rmse"] > 0
     (shader,) = (entry for entry in methods_of("shader") if entry["method"] == "fog.glsl")
@@ -99,13 +120,17 @@ def test_the_notebook_runs_and_prints_what_it_says(variant, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     cells = json.loads((DOCS / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
     notebook = types.ModuleType("notebook_of_the_docs")
-    monkeypatch.setitem(sys.modules, notebook.__name__, notebook)  # methods are functions at the top of a module
+    # methods are functions at the top of a module
+    monkeypatch.setitem(sys.modules, notebook.__name__, notebook)
     space, displayed = vars(notebook), []
     for cell in (each for each in cells if each["cell_type"] == "code"):
         capsys.readouterr()
         code = "".join(cell["source"])
         exec(compile(code, "cell", "exec"), space)
-        said, now = ("".join(line for o in cell["outputs"] for line in o.get("text", ())), capsys.readouterr().out)
+        said, now = (
+            "".join(line for o in cell["outputs"] for line in o.get("text", ())),
+            capsys.readouterr().out,
+        )
         assert _without_numbers(now) == _without_numbers(said)
         # Nothing here depends on the machine but rounding, and what samples and kernels make of it.
         np.testing.assert_allclose(_numbers(now), _numbers(said), rtol=0.5, atol=2e-3)
@@ -130,14 +155,18 @@ def _numbers(text):
 @pytest.fixture
 def fog(tmp_path):
     """The examples of docs/your-method.md as files; the first one's path."""
-    for name, block in zip(("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True):
+    for name, block in zip(
+        ("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True
+    ):
         (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
     return tmp_path / "fog.py"
 
 
 @pytest.mark.claim("own-method")
 def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
-    """Steps in the angle without shifts are `ray-march`; twice as many come closer to the reference."""
+    """Steps in the angle without shifts are `ray-march`; twice as many come
+    closer to the reference.
+    """
 
     from airlight.realtime.scene.read_scene import read_scene
     from airlight.validation.estimates.quadrature import reference_image
@@ -150,12 +179,17 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
     size = scene.camera.width, scene.camera.height
 
     def measured(method, **parameters):
-        cell = Cell("tiny", size, (), configuration(method, None, parameters), Measure("stages", 0.01))
+        cell = Cell(
+            "tiny", size, (), configuration(method, None, parameters), Measure("stages", 0.01)
+        )
         row, frame = run(cell, scene, reference)
         assert (row.reason, row.note) == (None, None)
         return row.error.relative_rmse, frame.airlight
 
-    own, built_in = measured(f"{fog}:interleaved", steps=16, jitter="no"), measured("ray-march", steps=16)
+    own, built_in = (
+        measured(f"{fog}:interleaved", steps=16, jitter="no"),
+        measured("ray-march", steps=16),
+    )
     # The same sum in another order, in float32.
     np.testing.assert_allclose(own[1], built_in[1], rtol=2e-5)
     shifted, finer = (measured(f"{fog}:interleaved", steps=steps)[0] for steps in (16, 64))
@@ -251,7 +285,12 @@ def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     python = interpreter("cycles")
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     render_faults = importlib.import_module("cycles_round_trips").render_faults
-    render_faults(python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(injected))
+    render_faults(
+        python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(injected)
+    )
     images = {fault: tmp_path / f"{fault}.exr" for fault in injected}
-    named = {fault: diagnose_file(image, "sphere-spot", pixel="area")[0].first for fault, image in images.items()}
+    named = {
+        fault: diagnose_file(image, "sphere-spot", pixel="area")[0].first
+        for fault, image in images.items()
+    }
     assert named == injected

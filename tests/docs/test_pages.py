@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: the pages build without a warning, load nothing from a network, and name only commands that exist."""
+"""Claims: the pages build without a warning, load nothing from a network, and name
+only commands that exist.
+"""
 
 import importlib
 import re
@@ -25,7 +27,13 @@ class Loaded(HTMLParser):
 
     def handle_starttag(self, tag, attributes):
         values = dict(attributes)
-        if tag == "link" and values.get("rel") not in ("index", "search", "next", "prev", "canonical"):
+        if tag == "link" and values.get("rel") not in (
+            "index",
+            "search",
+            "next",
+            "prev",
+            "canonical",
+        ):
             self.resources.append(values["href"])
         if tag in ("script", "img", "iframe", "source", "video", "audio", "embed", "object", "use"):
             addresses = ("src", "data", "srcset", "href", "xlink:href")
@@ -36,8 +44,21 @@ class Loaded(HTMLParser):
 @pytest.mark.claim("docs-without-a-network")
 def test_pages_build_and_load_nothing_from_a_network(tmp_path):
     """Sphinx checks links, names of functions, formulas, and that each claim has a test."""
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "-d", str(tmp_path / "trees")]
-    ran = subprocess.run([*command, str(DOCS), str(tmp_path / "pages")], capture_output=True, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-b",
+        "html",
+        "-d",
+        str(tmp_path / "trees"),
+    ]
+    ran = subprocess.run(
+        [*command, str(DOCS), str(tmp_path / "pages")], capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     pages = list((tmp_path / "pages").glob("*.html"))
     assert len(pages) > 15
@@ -49,7 +70,10 @@ def test_pages_build_and_load_nothing_from_a_network(tmp_path):
         for address in loaded.resources:
             assert not re.match(r"(https?:)?//", address), (page.name, address)
             local = address.split("?")[0].split("#")[0]
-            assert not local or local.startswith("data:") or (page.parent / local).exists(), (page.name, address)
+            assert not local or local.startswith("data:") or (page.parent / local).exists(), (
+                page.name,
+                address,
+            )
     for path in (tmp_path / "pages").rglob("*.css"):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"(url\(\s*['\"]?|@import\s+['\"])(https?:)?//", text), path
@@ -59,7 +83,11 @@ def test_pages_build_and_load_nothing_from_a_network(tmp_path):
 def test_commands_and_options_that_documents_name_exist():
     """In blocks of shell and in code between backticks that begins with `airlight`."""
     known = {
-        " ".join(words): {name for each in find_command(words).assemble_argument_collection() for name in each.names}
+        " ".join(words): {
+            name
+            for each in find_command(words).assemble_argument_collection()
+            for name in each.names
+        }
         for words in command_names()
     } | {"study": set()}
     found, wrong = 0, []
@@ -69,9 +97,13 @@ def test_commands_and_options_that_documents_name_exist():
         text = document.read_text(encoding="utf-8")
         blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
         lines = [line for block in blocks for line in block.splitlines()]
-        lines += re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE))
+        lines += re.findall(
+            r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+        )
         for line in lines:
-            match = re.match(r"(?:\./)?airlight\s+(study [a-z-]+|[a-z]+)\b(.*)", line, flags=re.DOTALL)
+            match = re.match(
+                r"(?:\./)?airlight\s+(study [a-z-]+|[a-z]+)\b(.*)", line, flags=re.DOTALL
+            )
             if match is None or match[1] == "test":
                 continue
             found += 1
@@ -84,15 +116,23 @@ def test_commands_and_options_that_documents_name_exist():
 
 def test_links_of_the_readme_lead_somewhere():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"https?:", target)]
+    targets = [
+        target
+        for target in re.findall(r"\]\(([^)\s]+)\)", text)
+        if not re.match(r"https?:", target)
+    ]
     assert targets
     for target in targets:
         path, _, anchor = target.partition("#")
         linked = ROOT / (path or "README.md")
         assert linked.exists(), target
         if anchor:
-            headings = re.findall(r"^#+ (.*)", linked.read_text(encoding="utf-8"), flags=re.MULTILINE)
-            assert anchor in [re.sub(r"[^\w -]", "", words.lower()).replace(" ", "-") for words in headings], target
+            headings = re.findall(
+                r"^#+ (.*)", linked.read_text(encoding="utf-8"), flags=re.MULTILINE
+            )
+            assert anchor in [
+                re.sub(r"[^\w -]", "", words.lower()).replace(" ", "-") for words in headings
+            ], target
 
 
 def test_formulas_are_mathml_and_slips_are_named(monkeypatch):
@@ -120,7 +160,9 @@ def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
         for a in (0.3, 1.7):
             coefficients = taylor_coefficients(a, phase_from_words(name.lower()))
             expected = float(coefficients[..., int(index)]) * means[name.lower()]
-            assert _value(printed if same else derived.strip("$"), a) == pytest.approx(expected, rel=1e-7)
+            assert _value(printed if same else derived.strip("$"), a) == pytest.approx(
+                expected, rel=1e-7
+            )
             assert same or abs(_value(printed, a) - expected) > 1e-8
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: the stamp, the changelog and the citation say one thing; a release is refused where it would say too much.
+"""Claims: the stamp, the changelog and the citation say one thing; a release is refused
+where it would say too much.
 
 A toy repository stands for that of airlight; the tool is `docs/tools/release.py`.
 """
@@ -28,7 +29,9 @@ FILES = {
     tool.STAMP: '__version__ = "0.9.0.dev0"  # until it is released\n',
     f"src/airlight/{COMMIT}": "$Format:%H$\n",
     "src/airlight/py.typed": "",
-    tool.CHANGELOG: "# Changelog\n\n## [Unreleased]\n\n- `ray-march` is faster.\n\n## Before\n\n- It began.\n",
+    tool.CHANGELOG: (
+        "# Changelog\n\n## [Unreleased]\n\n- `ray-march` is faster.\n\n## Before\n\n- It began.\n"
+    ),
     tool.CITATION: "title: airlight\nversion: 0.9.0.dev0\nlicense: BSD-3-Clause\n",
     "LICENSE": "BSD-3-Clause\n",
     "README.md": "airlight\n",
@@ -49,17 +52,29 @@ def _tester(monkeypatch):
 
 def baseline(rmse: float) -> str:
     errors = {"relative_rmse": rmse, "mean": 0.3}
-    return json.dumps({"because": "x", "configurations": {"light-volumes (exact)": {"airlight": errors}}})
+    return json.dumps(
+        {"because": "x", "configurations": {"light-volumes (exact)": {"airlight": errors}}}
+    )
 
 
 def report(rmse: float, frame_ms: float) -> str:
-    row = {"label": "soft-shafts (exact)", "error": {"relative_rmse": rmse}, "times": {"frame": {"mean": frame_ms}}}
+    row = {
+        "label": "soft-shafts (exact)",
+        "error": {"relative_rmse": rmse},
+        "times": {"frame": {"mean": frame_ms}},
+    }
     return json.dumps({"scenes": [{"name": "hall", "methods": [row]}]})
 
 
 def recorded(root: Path, **changes: object) -> None:
     """Write and commit the record of a run of all tests of the current commit."""
-    run = {"commit": git(root, "rev-parse", "HEAD"), "changed": False, "compilation": "full", "passed": 9, "failed": 0}
+    run = {
+        "commit": git(root, "rev-parse", "HEAD"),
+        "changed": False,
+        "compilation": "full",
+        "passed": 9,
+        "failed": 0,
+    }
     write(root, {tool.RECORD: json.dumps(run | changes)})
     commit(root, "the record of all tests")
 
@@ -152,7 +167,8 @@ def test_an_error_that_moved_since_the_last_release_needs_an_entry_that_names_it
     recorded(ready)
     assert said(ready) == ""
     git(ready, "tag", "v0.8.0")
-    write(ready, {BASELINE: baseline(3.01e-4), REPORT: report(2e-3, 9.0)})  # within the band; a time of another hour
+    # within the band; a time of another hour
+    write(ready, {BASELINE: baseline(3.01e-4), REPORT: report(2e-3, 9.0)})
     commit(ready, "noise")
     recorded(ready)
     assert said(ready) == ""
@@ -178,7 +194,9 @@ def test_a_shallow_clone_is_refused(ready, tmp_path):
 
 @pytest.fixture
 def distributions(monkeypatch):
-    """Archives in place of those that setuptools builds, which takes seconds; a test below builds them."""
+    """Archives in place of those that setuptools builds, which takes seconds;
+    a test below builds them.
+    """
 
     def written(tree, files):
         (files / "airlight.whl").write_text(
@@ -192,15 +210,29 @@ def distributions(monkeypatch):
 def test_a_release_is_a_commit_with_a_tag_and_files_of_nothing_else(ready, tmp_path, distributions):
     before = git(ready, "rev-parse", "HEAD")
     tool.release(ready, tmp_path / "dry", dry_run=True, site=False)
-    assert (git(ready, "rev-parse", "HEAD"), git(ready, "tag"), git(ready, "status", "--porcelain")) == (before, "", "")
-    names = {path.name: path for path in tool.release(ready, tmp_path / "dist", dry_run=False, site=False)}
-    assert set(names) == {"SHA256SUMS", "airlight-0.9.0-certified.tar.gz", "airlight-0.9.0.md", "airlight.whl"}
+    assert (
+        git(ready, "rev-parse", "HEAD"),
+        git(ready, "tag"),
+        git(ready, "status", "--porcelain"),
+    ) == (before, "", "")
+    names = {
+        path.name: path
+        for path in tool.release(ready, tmp_path / "dist", dry_run=False, site=False)
+    }
+    assert set(names) == {
+        "SHA256SUMS",
+        "airlight-0.9.0-certified.tar.gz",
+        "airlight-0.9.0.md",
+        "airlight.whl",
+    }
     assert {path.name for path in (tmp_path / "dry/0.9.0").iterdir()} == set(names)
     # The files are of the tagged commit, in which stamp, changelog and citation say one thing.
     tagged = git(ready, "rev-parse", "v0.9.0^{commit}")
     assert names["airlight.whl"].read_text() == FILES[tool.STAMP].replace(".dev0", "") + tagged
     assert names["airlight-0.9.0.md"].read_text() == "- `ray-march` is faster.\n"
-    assert "- `ray-march` is faster." in git(ready, "tag", "--list", "--format=%(contents)", "v0.9.0")
+    assert "- `ray-march` is faster." in git(
+        ready, "tag", "--list", "--format=%(contents)", "v0.9.0"
+    )
     git(ready, "checkout", "--quiet", "v0.9.0")
     assert list(tool.stamp_problems(ready)) == []
     assert 'version: 0.9.0\ndate-released: "' in (ready / tool.CITATION).read_text()
@@ -210,7 +242,9 @@ def test_a_release_is_a_commit_with_a_tag_and_files_of_nothing_else(ready, tmp_p
     assert list(tool.stamp_problems(ready)) == []
     assert "nothing to release" in said(ready)
     write(ready, {tool.STAMP: '__version__ = "0.9.0"\n', "analytic/panels.py": "NODES = 7\n"})
-    assert "the tag v0.9.0 is of other code than this: the next stamp is due" in list(tool.stamp_problems(ready))
+    assert "the tag v0.9.0 is of other code than this: the next stamp is due" in list(
+        tool.stamp_problems(ready)
+    )
     with tarfile.open(names["airlight-0.9.0-certified.tar.gz"]) as archive:
         held = {name.removeprefix("airlight-0.9.0-certified/") for name in archive.getnames()}
     assert held == {"CITATION.cff", "LICENSE", "formats.md", "rays.csv"}
@@ -233,7 +267,9 @@ def test_wheel_and_source_distribution_of_airlight_name_its_commit_and_its_diges
     (source,) = (tmp_path / "source").iterdir()
     assert build_of(source / "src/airlight", "") == of
     (tmp_path / "again").mkdir()
-    tool._run(source, "the wheel", "-c", "import setuptools.build_meta as b; b.build_wheel('../../again')")
+    tool._run(
+        source, "the wheel", "-c", "import setuptools.build_meta as b; b.build_wheel('../../again')"
+    )
     for wheel in (next(tmp_path.glob("*.whl")), next((tmp_path / "again").glob("*.whl"))):
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(wheel.with_suffix(""))
@@ -250,5 +286,9 @@ def test_a_release_that_is_refused_or_fails_leaves_nothing(ready, tmp_path, monk
     with pytest.raises(tool.RefusedError, match="could not be made"):
         tool.release(ready, tmp_path / "dist", dry_run=False, site=False)
     assert list((tmp_path / "dist").iterdir()) == []
-    assert (git(ready, "rev-parse", "HEAD"), git(ready, "tag"), git(ready, "status", "--porcelain")) == (before, "", "")
+    assert (
+        git(ready, "rev-parse", "HEAD"),
+        git(ready, "tag"),
+        git(ready, "status", "--porcelain"),
+    ) == (before, "", "")
     assert len(git(ready, "worktree", "list").splitlines()) == 1

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Accuracy baselines: the known errors of every configuration, one text file per scene, and the tool that writes them.
+"""Accuracy baselines: the known errors of every configuration, one text file per scene, and
+the tool that writes them.
 
     python -m tests.evidence.baselines [SCENE ...]                          # says what moved
     python -m tests.evidence.baselines [SCENE ...] --update --because "..."   # writes what moved, with its reason
 
-A file `baselines/SCENE.json` holds the errors of the airlight and of the lit surface against the reference for each
-configuration, at a small image size. Each line holds one number and the keys are sorted, so that a diff of the file
-shows what a change moved. Errors depend on the machine by rounding alone, so the comparison is strict, with the band
-and the floor of `validation.statistics.noise`. It fails in both directions: if nobody recorded an improvement, a later
-fault of the same size would go unseen. Every file has a revision and the reason for it.
+A file `baselines/SCENE.json` holds the errors of the airlight and of the lit surface against the
+reference for each configuration, at a small image size. Each line holds one number and the keys are
+sorted, so that a diff of the file shows what a change moved. Errors depend on the machine by
+rounding alone, so the comparison is strict, with the band and the floor of
+`validation.statistics.noise`. It fails in both directions: if nobody recorded an improvement, a
+later fault of the same size would go unseen. Every file has a revision and the reason for it.
 """
 
 import argparse
@@ -44,8 +46,9 @@ _SURFACE = ("relative_rmse", "max", "nonfinite")  # methods change the surface o
 
 Baseline = Mapping[str, Any]
 
-#: The scenes that scatter light once; methods that refuse height fog or grids say why in their baseline. Scenes of many
-#: lights are for methods with noise, which have no baselines; the others take minutes in them.
+#: The scenes that scatter light once; methods that refuse height fog or grids say why in their
+#: baseline. Scenes of many lights are for methods with noise, which have no baselines; the others
+#: take minutes in them.
 SCATTER_ONCE = tuple(name for name, record in SCENES.items() if not (record.clouds or record.many))
 
 
@@ -68,7 +71,9 @@ def read_baseline(scene: str) -> Baseline | None:
 
 
 def baseline_configurations(name: str, scene: Scene) -> tuple[Configuration, ...]:
-    """Return what the baseline of a scene holds: the standard configurations, and every kernel in one scene."""
+    """Return what the baseline of a scene holds: the standard configurations, and
+    every kernel in one scene.
+    """
     kernels = [Configuration("unshadowed", kernel) for kernel in KERNELS] if name == FOG else []
     return tuple(dict.fromkeys((*configurations_for(scene, STANDARD), *kernels)))
 
@@ -82,17 +87,24 @@ def measure_baseline(name: str) -> dict[str, Any]:
     return {
         "scene": name,
         "size": list(SIZE),
-        "reference": {layer: _rounded({"mean": getattr(reference, layer).mean()}) for layer in ("airlight", "surface")},
+        "reference": {
+            layer: _rounded({"mean": getattr(reference, layer).mean()})
+            for layer in ("airlight", "surface")
+        },
         "configurations": {each.label: _entry(scene, each, reference) for each in chosen},
     }
 
 
 def _entry(scene: Scene, chosen: Configuration, reference: ReferenceImage) -> dict[str, Any]:
     """Return the errors of one configuration, or why it was refused."""
-    row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(reference))
+    row, frame = run(
+        Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(reference)
+    )
     if row.error is None or frame is None:
         return {"refused": row.reason}
-    numbers = plain(row.error) | {"mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))}
+    numbers = plain(row.error) | {
+        "mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))
+    }
     entry: dict[str, Any] = {"airlight": _rounded({name: numbers[name] for name in ERRORS})}
     if row.surface_error is not None:
         surface = plain(row.surface_error)
@@ -117,19 +129,39 @@ def compare_baseline(kept: Baseline | None, measured: Baseline) -> list[Move]:
     for layer in ("airlight", "surface"):
         # The reference is float64: it has no band, and no floor.
         moves += _numbers(
-            scene, "", f"reference of the {layer}", kept["reference"][layer], measured["reference"][layer], 0.0, 0
+            scene,
+            "",
+            f"reference of the {layer}",
+            kept["reference"][layer],
+            measured["reference"][layer],
+            0.0,
+            0,
         )
     before, after = kept["configurations"], measured["configurations"]
-    moves += [Move(scene, label, "a baseline without its configuration") for label in before if label not in after]
-    moves += [Move(scene, label, "a configuration without baseline") for label in after if label not in before]
+    moves += [
+        Move(scene, label, "a baseline without its configuration")
+        for label in before
+        if label not in after
+    ]
+    moves += [
+        Move(scene, label, "a configuration without baseline")
+        for label in after
+        if label not in before
+    ]
     pixels = measured["size"][0] * measured["size"][1]
     for label in [label for label in before if label in after]:
         old, new = before[label], after[label]
         if old.get("refused") != new.get("refused"):
-            moves.append(Move(scene, label, f"refused: {old.get('refused')} before, {new.get('refused')} now"))
+            moves.append(
+                Move(
+                    scene, label, f"refused: {old.get('refused')} before, {new.get('refused')} now"
+                )
+            )
             continue
         for layer in ("airlight", "surface"):
-            moves += _numbers(scene, label, layer, old.get(layer, {}), new.get(layer, {}), ERROR_TOLERANCE, pixels)
+            moves += _numbers(
+                scene, label, layer, old.get(layer, {}), new.get(layer, {}), ERROR_TOLERANCE, pixels
+            )
     return moves
 
 
@@ -145,7 +177,10 @@ def _numbers(
             continue
         scale = abs(before) if name == "mean" else 1.0  # its floor is relative to itself
         rmse = old.get("relative_rmse") or 0.0
-        band = error_band(name, before / (scale or 1.0), tolerance=tolerance, pixels=pixels, rmse=rmse) * scale
+        band = (
+            error_band(name, before / (scale or 1.0), tolerance=tolerance, pixels=pixels, rmse=rmse)
+            * scale
+        )
         # The file keeps six digits: allow half a unit of the last one.
         band += 0.5e-5 * abs(before)
         if abs(after - before) > band:
@@ -155,7 +190,8 @@ def _numbers(
 def updated(kept: Baseline | None, measured: Baseline, because: str) -> Baseline | None:
     """Return the next revision of a baseline, or None if nothing moved.
 
-    Entries whose numbers did not move beyond the noise keep their old numbers, so that a diff shows only what moved.
+    Entries whose numbers did not move beyond the noise keep their old numbers, so that a
+    diff shows only what moved.
     """
     moves = compare_baseline(kept, measured)
     if not moves:
@@ -167,7 +203,12 @@ def updated(kept: Baseline | None, measured: Baseline, because: str) -> Baseline
         for label, entry in measured["configurations"].items()
     }
     revision = 1 + (kept["revision"] if kept else 0)
-    return {**measured, "configurations": entries, "revision": revision, "because": " ".join(because.split())}
+    return {
+        **measured,
+        "configurations": entries,
+        "revision": revision,
+        "because": " ".join(because.split()),
+    }
 
 
 def main() -> int:
@@ -178,7 +219,10 @@ def main() -> int:
     parser.add_argument("--because", default="", help="why numbers moved; --update needs it")
     asked = parser.parse_args()
     if unknown := set(asked.scenes) - set(SCATTER_ONCE):
-        parser.error(f"no built-in scene of fog: {', '.join(sorted(unknown))}; expected: {', '.join(SCATTER_ONCE)}")
+        parser.error(
+            f"no built-in scene of fog: {', '.join(sorted(unknown))}; expected: "
+            f"{', '.join(SCATTER_ONCE)}"
+        )
     if asked.update and not asked.because.strip():
         parser.error("--update needs --because")
     from airlight.reports.machine.environment import activate
@@ -189,9 +233,15 @@ def main() -> int:
         kept, measured = read_baseline(name), measure_baseline(name)
         moves = compare_baseline(kept, measured)
         found += len(moves)
-        print(f"{name}: {len(measured['configurations'])} configurations, {len(moves)} numbers moved")
+        print(
+            f"{name}: {len(measured['configurations'])} configurations, {len(moves)} numbers moved"
+        )
         for move in moves:
-            numbers = "" if move.old is None or move.new is None else f": {move.old:.6g} -> {move.new:.6g}"
+            numbers = (
+                ""
+                if move.old is None or move.new is None
+                else f": {move.old:.6g} -> {move.new:.6g}"
+            )
             print(f"    {move.label}: {move.what}{numbers}")
         if asked.update and (new := updated(kept, measured, asked.because)) is not None:
             text = json.dumps(new, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Closed forms for area lights: the known answers of scenes.
 
-**A sphere next to a ray, in unbounded fog of isotropic scattering.** A point at the distance d from the centre of a
-sphere of radius R and radiance Le receives the fluence
+**A sphere next to a ray, in unbounded fog of isotropic scattering.** A point at the distance d from
+the centre of a sphere of radius R and radiance Le receives the fluence
 
     Phi = Le int exp(-sigma_t r) domega
 
-over the directions that meet the sphere. A direction at the angle psi from the centre meets it first at the distance r
-with cos(psi) = (r^2 + T^2)/(2 d r), T^2 = d^2 - R^2, so that with r in the place of psi
+over the directions that meet the sphere. A direction at the angle psi from the centre meets it
+first at the distance r with cos(psi) = (r^2 + T^2)/(2 d r), T^2 = d^2 - R^2, so that with r in the
+place of psi
 
     domega = 2 pi |dcos(psi)| = (pi/d) (T^2/r^2 - 1) dr,      d - R <= r <= T:
     Phi = Le (pi/d) int_{d-R}^{T} (T^2/r^2 - 1) exp(-sigma_t r) dr.
@@ -17,11 +18,11 @@ ray at the height h over the centre, whose foot is at the distance `foot`, is
 
     L = albedo sigma_t/(4 pi) int_{x0}^{x1} exp(-sigma_t x) Phi(sqrt(h^2 + (x - foot)^2)) dx = albedo sigma_t/(4 pi) K.
 
-**How much of a flat light a surface point sees.** Seen from the point, an edge of an occluder falls on a line in the
-plane of the light, and a convex polygon on a convex polygon. A line at the signed distance u (in radii) from the centre
-of a disk leaves the fraction (acos u - u sqrt(1 - u^2))/pi; the area that a polygon covers is added up edge by edge as
-signed triangles and sectors. On a rectangle, polygons are clipped (Sutherland, Hodgman 1974) and measured (Gauss's
-shoelace).
+**How much of a flat light a surface point sees.** Seen from the point, an edge of an occluder falls
+on a line in the plane of the light, and a convex polygon on a convex polygon. A line at the signed
+distance u (in radii) from the centre of a disk leaves the fraction (acos u - u sqrt(1 - u^2))/pi;
+the area that a polygon covers is added up edge by edge as signed triangles and sectors. On a
+rectangle, polygons are clipped (Sutherland, Hodgman 1974) and measured (Gauss's shoelace).
 """
 
 import math
@@ -37,7 +38,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
 _PANEL = 0.5  # of the distance between ray and sphere: panels of x
 
 
-def sphere_airlight(sigma_t: float, height: float, radius: float, *, foot: float, x0: float, x1: float) -> float:
+def sphere_airlight(
+    sigma_t: float, height: float, radius: float, *, foot: float, x0: float, x1: float
+) -> float:
     """Return K of a sphere of radiance 1 beside a ray [m].
 
     Parameters
@@ -63,8 +66,11 @@ def sphere_airlight(sigma_t: float, height: float, radius: float, *, foot: float
     Valid for isotropic scattering, to 1e-12, where sigma_t times the panels' width is below 10.
     """
     if not height > radius > 0:
-        raise InputError(f"height is {height} and radius {radius}; expected a ray that passes beside the sphere")
-    # In w = asinh((x - foot)/(height - radius)) the peak beside the sphere is as wide as everything else.
+        raise InputError(
+            f"height is {height} and radius {radius}; expected a ray that passes beside the sphere"
+        )
+    # In w = asinh((x - foot)/(height - radius)) the peak beside the sphere is as
+    # wide as everything else.
     scale = height - radius
     ends = np.arcsinh((x0 - foot) / scale), np.arcsinh((x1 - foot) / scale)
     count = max(1, math.ceil((ends[1] - ends[0]) / _PANEL))
@@ -73,14 +79,23 @@ def sphere_airlight(sigma_t: float, height: float, radius: float, *, foot: float
     w = (middle[:, None] + half * _NODES).ravel()
     s = scale * np.sinh(w)
     weight = np.tile(half * _WEIGHTS, count) * scale * np.cosh(w)
-    return float(np.sum(weight * np.exp(-sigma_t * (foot + s)) * sphere_fluence(sigma_t, np.hypot(height, s), radius)))
+    return float(
+        np.sum(
+            weight
+            * np.exp(-sigma_t * (foot + s))
+            * sphere_fluence(sigma_t, np.hypot(height, s), radius)
+        )
+    )
 
 
 def sphere_fluence(sigma_t: float, distance: ArrayLike, radius: float) -> Array:
-    """Return the fluence [1] that a sphere of radiance 1 gives at distances above its radius from its centre, (n,)."""
+    """Return the fluence [1] that a sphere of radiance 1 gives at distances above its
+    radius from its centre, (n,).
+    """
     d = np.asarray(distance, dtype=np.float64)
     tangent = np.sqrt((d - radius) * (d + radius))
-    # In t = log(r/T) the integrand is as wide near the sphere as far from it; T/(d - R) = (d + R)/T.
+    # In t = log(r/T) the integrand is as wide near the sphere as far from
+    # it; T/(d - R) = (d + R)/T.
     width = np.log((d + radius) / tangent)
     t = -0.5 * width[:, None] * (1 - _NODES)
     r = tangent[:, None] * np.exp(t)
@@ -114,7 +129,10 @@ def _edge_area(start: Array, end: Array) -> float:
     way = end - start
     a, b, c = way @ way, start @ way, start @ start - 1
     root = math.sqrt(max(float(b * b - a * c), 0.0))
-    low, high = (min(max(float(end / a), 0.0), 1.0) if root > 0 and a > 0 else 0.0 for end in (-b - root, -b + root))
+    low, high = (
+        min(max(float(end / a), 0.0), 1.0) if root > 0 and a > 0 else 0.0
+        for end in (-b - root, -b + root)
+    )
     first, last = start + low * way, start + high * way
     inside = 0.5 * _cross(first, last)
     return inside + 0.5 * (_angle(start, first) + _angle(last, end))
@@ -129,7 +147,9 @@ def _angle(a: Array, b: Array) -> float:
 
 
 def polygon_overlap(first: ArrayLike, second: ArrayLike) -> float:
-    """Return the area that two convex polygons have in common, corners in order and counter-clockwise, (n, 2) each."""
+    """Return the area that two convex polygons have in common, corners in order and
+    counter-clockwise, (n, 2) each.
+    """
     part = [np.asarray(point, dtype=np.float64) for point in np.asarray(first)]
     corners = np.asarray(second, dtype=np.float64)
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):

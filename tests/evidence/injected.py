@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a fault is injected into running code, and taken out again: hooks around functions, and patterns of expressions.
+"""How a fault is injected into running code, and taken out again: hooks around functions, and
+patterns of expressions.
 
-A hook wraps a function at the place of its definition and in every module that imported it. A pattern is an expression
-in Python, looked for in all functions of a package or module, whatever its format and its place: a name that ends with
-an underscore stands for any expression, the same one wherever it occurs. The code of the function that holds the
-expression is replaced, so every reference to the function sees the fault.
+A hook wraps a function at the place of its definition and in every module that imported it. A
+pattern is an expression in Python, looked for in all functions of a package or module, whatever its
+format and its place: a name that ends with an underscore stands for any expression, the same one
+wherever it occurs. The code of the function that holds the expression is replaced, so every
+reference to the function sees the fault.
 
-The target of a hook or a pattern must exist, and a pattern must match exactly as often as it says: a fault cannot
-vanish when code moves.
+The target of a hook or a pattern must exist, and a pattern must match exactly as often as it says:
+a fault cannot vanish when code moves.
 """
 
 import ast
@@ -28,7 +30,9 @@ PACKAGES = ("analytic", "reference")
 
 @dataclass(frozen=True)
 class Wrap:
-    """Call `around(function, *arguments, **named)` in the place of a function, method or property."""
+    """Call `around(function, *arguments, **named)` in the place of a
+    function, method or property.
+    """
 
     where: str  # module:function or module:Class.method
     around: Callable[..., Any]
@@ -85,7 +89,9 @@ def replacements(change: Wrap | Put) -> list[tuple[Any, str, Any]]:
         return [(owner, name, property(_around(before.fget, change.around)))]
     after = _around(before, change.around)
     users = [] if classes else [user for user in _loaded(PACKAGES) if user is not owner]
-    others = [(user, key, after) for user in users for key, value in vars(user).items() if value is before]
+    others = [
+        (user, key, after) for user in users for key, value in vars(user).items() if value is before
+    ]
     return [(owner, name, after), *others]
 
 
@@ -111,7 +117,9 @@ def rewritten(change: Rewrite) -> list[tuple[FunctionType, Any]]:
                 places += replacer.count
                 found.append((_function(owner, definition.name), _code(module, changed)))
     if places != change.times:
-        raise LookupError(f"{change.where} holds {change.old!r} {places} times; expected {change.times}")
+        raise LookupError(
+            f"{change.where} holds {change.old!r} {places} times; expected {change.times}"
+        )
     return found
 
 
@@ -127,7 +135,11 @@ class _Replacer(ast.NodeTransformer):
             self.count += 1
             # Parsed again: a tree must not hold one node twice.
             return (
-                ast.parse(ast.unparse(_Filler(bound).visit(ast.parse(ast.unparse(self._new), mode="eval")).body))
+                ast.parse(
+                    ast.unparse(
+                        _Filler(bound).visit(ast.parse(ast.unparse(self._new), mode="eval")).body
+                    )
+                )
                 .body[0]
                 .value
             )
@@ -149,9 +161,13 @@ def _matches(pattern: Any, node: Any, bound: dict[str, ast.AST]) -> bool:
     if isinstance(pattern, ast.AST):
         if type(pattern) is not type(node):
             return False
-        return all(_matches(getattr(pattern, name), getattr(node, name), bound) for name in pattern._fields)
+        return all(
+            _matches(getattr(pattern, name), getattr(node, name), bound) for name in pattern._fields
+        )
     if isinstance(pattern, list):
-        return len(pattern) == len(node) and all(_matches(a, b, bound) for a, b in zip(pattern, node))
+        return len(pattern) == len(node) and all(
+            _matches(a, b, bound) for a, b in zip(pattern, node)
+        )
     return bool(pattern == node)
 
 
@@ -185,7 +201,9 @@ def _modules(where: str) -> list[ModuleType]:
     if not hasattr(top, "__path__"):
         return [top]
     names = [found.name for found in pkgutil.walk_packages(top.__path__, f"{where}.")]
-    return [module for module in map(importlib.import_module, names) if not hasattr(module, "__path__")]
+    return [
+        module for module in map(importlib.import_module, names) if not hasattr(module, "__path__")
+    ]
 
 
 def _loaded(rooms: tuple[str, ...]) -> list[ModuleType]:

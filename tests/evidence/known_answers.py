@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes on which laws of airlight are tried, as dictionaries for Mitsuba, and what the laws do to such dictionaries.
+"""Scenes on which laws of airlight are tried, as dictionaries for Mitsuba, and what the laws
+do to such dictionaries.
 
-`{"matrix": rows}` stands for a transform. Scale factors are powers of two and coordinates multiples of 1/1024, so that
-float32 scenes obey the laws exactly, too. No occluder is a sphere: these are met in float32.
+`{"matrix": rows}` stands for a transform. Scale factors are powers of two and coordinates multiples
+of 1/1024, so that float32 scenes obey the laws exactly, too. No occluder is a sphere: these are met
+in float32.
 """
 
 from collections.abc import Callable
@@ -17,13 +19,22 @@ from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene.read import ReferenceScene, read_reference
-from tests.evidence.certified.model import FogBox, FogScene, FogScreen, fog_scenes, load_fog, mitsuba_dict
+from tests.evidence.certified.model import (
+    FogBox,
+    FogScene,
+    FogScreen,
+    fog_scenes,
+    load_fog,
+    mitsuba_dict,
+)
 
 Scene = dict[str, Any]
 
 PLAN = PointPlan(error=0.0, first=16, most=16)  # points enough for a law, which holds for any
-TURN = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # the axes change places
-BOX = np.array([0.125, 0.25, 1.0]), np.array([1.0, 0.75, 0.875])  # centre, half edges of the fog under the sun
+# the axes change places
+TURN = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+# centre, half edges of the fog under the sun
+BOX = np.array([0.125, 0.25, 1.0]), np.array([1.0, 0.75, 0.875])
 G = 0.375  # of that fog
 _BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
 _EMITTERS = ("point", "spot", "directional")
@@ -45,20 +56,34 @@ def lamps() -> Scene:
 
 
 def panel(kind: str = "rectangle") -> Scene:
-    """Return the box on the floor under an area light, its disk or sphere of the same first side."""
+    """Return the box on the floor under an area light, its disk or
+    sphere of the same first side.
+    """
     lamp = np.eye(4)
     # The third axis looks down and inwards; all numbers are multiples of 1/16.
     sides = [0.5, 0.25 if kind == "rectangle" else 0.5, 1.0]
     lamp[:3, :3] = np.array([[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [0.0, -0.8, -0.6]]) * sides
     lamp[:3, 3] = 1.375, 0.375, 2.25
     emitter = {"type": "area", "radiance": rgb(4.0, 3.0, 2.0)}
-    entry = {"type": kind, "to_world": {"matrix": lamp.tolist()}, "bsdf": _BLACK, "emitter": emitter}
+    entry = {
+        "type": kind,
+        "to_world": {"matrix": lamp.tolist()},
+        "bsdf": _BLACK,
+        "emitter": emitter,
+    }
     return mitsuba_dict(replace(fog_scene(), lights=())) | {"lamp": entry}
 
 
 def sun() -> Scene:
     """Return a slab that shadows a box of fog under a directional light, and a camera outside."""
-    away = np.array([[0.48, 0.6, 0.64, 0.0], [-0.36, 0.8, -0.48, 0.0], [-0.8, 0.0, 0.6, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    away = np.array(
+        [
+            [0.48, 0.6, 0.64, 0.0],
+            [-0.36, 0.8, -0.48, 0.0],
+            [-0.8, 0.0, 0.6, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
     mist = {
         "type": "homogeneous",
         "sigma_t": rgb(0.375, 0.5, 0.75),
@@ -74,7 +99,9 @@ def sun() -> Scene:
             "fov_axis": "x",
             "near_clip": 0.0001,
             # Along +y from before the box: columns left, up, forward, position.
-            "to_world": {"matrix": [[-1.0, 0, 0, 0.25], [0, 0, 1, -3.5], [0, 1, 0, 1.125], [0, 0, 0, 1]]},
+            "to_world": {
+                "matrix": [[-1.0, 0, 0, 0.25], [0, 0, 1, -3.5], [0, 1, 0, 1.125], [0, 0, 0, 1]]
+            },
             "film": {"type": "hdrfilm", "width": 12, "height": 12, "rfilter": {"type": "box"}},
         },
         "sun": {
@@ -104,21 +131,30 @@ def changed(entry: Any, names: tuple[str, ...], change: Callable[[Any], Any]) ->
     """Return a dictionary in which all entries of some names are changed, however deep."""
     if not isinstance(entry, dict):
         return entry
-    return {name: change(value) if name in names else changed(value, names, change) for name, value in entry.items()}
+    return {
+        name: change(value) if name in names else changed(value, names, change)
+        for name, value in entry.items()
+    }
 
 
 def brighter(scene: Scene, factor: float) -> Scene:
     """Multiply what all lights send."""
-    return changed(scene, _POWERS, lambda colour: rgb(*(factor * value for value in colour["value"])))
+    return changed(
+        scene, _POWERS, lambda colour: rgb(*(factor * value for value in colour["value"]))
+    )
 
 
 def darker(scene: Scene, factor: float) -> Scene:
     """Multiply the albedo."""
-    return changed(scene, ("albedo",), lambda colour: rgb(*(factor * value for value in colour["value"])))
+    return changed(
+        scene, ("albedo",), lambda colour: rgb(*(factor * value for value in colour["value"]))
+    )
 
 
 def mapped(scene: Scene, matrix: np.ndarray) -> Scene:
-    """Apply a similarity to everything; cameras and lights stay rotations, with a left that stays left."""
+    """Apply a similarity to everything; cameras and lights stay rotations,
+    with a left that stays left.
+    """
 
     def placed(entry: Any) -> Any:
         if not isinstance(entry, dict):
@@ -145,16 +181,27 @@ def in_units(scene: Scene, k: float) -> Scene:
 
 def one_light_each(scene: Scene) -> list[Scene]:
     """Return the scene with one of its lights at a time."""
-    lights = [name for name, entry in scene.items() if isinstance(entry, dict) and entry["type"] in _EMITTERS]
-    return [{name: entry for name, entry in scene.items() if name not in lights or name == one} for one in lights]
+    lights = [
+        name
+        for name, entry in scene.items()
+        if isinstance(entry, dict) and entry["type"] in _EMITTERS
+    ]
+    return [
+        {name: entry for name, entry in scene.items() if name not in lights or name == one}
+        for one in lights
+    ]
 
 
 def enclosed(name: str) -> Scene:
     """Return `lamps` with its light in a closed box, or `sun` in one."""
     if name == "sun":
-        return sun() | {"shell": cube([0.0, 0.0, 0.0], [16.0, 16.0, 16.0]) | {"bsdf": {"type": "diffuse"}}}
+        return sun() | {
+            "shell": cube([0.0, 0.0, 0.0], [16.0, 16.0, 16.0]) | {"bsdf": {"type": "diffuse"}}
+        }
     light = replace(fog_scene().lights[0], position=(0.125, 0.25, 1.0))
-    box = FogBox((0.125, 0.25, 1.0), ((0.25, 0.0625, 0.0), (-0.0625, 0.25, 0.03125), (0.0, 0.0, 0.25)))
+    box = FogBox(
+        (0.125, 0.25, 1.0), ((0.25, 0.0625, 0.0), (-0.0625, 0.25, 0.03125), (0.0, 0.0, 0.25))
+    )
     return white(mitsuba_dict(replace(fog_scene(), lights=(light,), occluders=(floor(), box))))
 
 
@@ -166,7 +213,10 @@ def floor() -> FogScreen:
 def white(scene: Scene) -> Scene:
     """Return a dictionary whose occluders reflect half of the light."""
     half = {"type": "diffuse", "reflectance": rgb(0.5, 0.5, 0.5)}
-    return {name: entry | {"bsdf": half} if name.startswith("occluder") else entry for name, entry in scene.items()}
+    return {
+        name: entry | {"bsdf": half} if name.startswith("occluder") else entry
+        for name, entry in scene.items()
+    }
 
 
 def reference_of(scene: Scene | FogScene) -> ReferenceScene:

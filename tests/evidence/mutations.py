@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults of the physics, one at a time, that the comparisons of the estimators must find.
 
-A fault is given as hooks and patterns (`tests.evidence.injected`), most of them at what one part of an estimator hands
-to the next: the scene that was read, lit intervals, the integrals over them, the points of a light. `stage` is the
-scene on which the fault must be found. The margins of a stage are those of `tests.evidence.stages`.
+A fault is given as hooks and patterns (`tests.evidence.injected`), most of them at what one part of
+an estimator hands to the next: the scene that was read, lit intervals, the integrals over them, the
+points of a light. `stage` is the scene on which the fault must be found. The margins of a stage are
+those of `tests.evidence.stages`.
 """
 
 from collections.abc import Callable
@@ -58,11 +59,15 @@ def _brighter(factor: float) -> Wrap:
 def _first_extinction(function, reference, *others, **named):
     medium = reference.medium
     first = replace(reference, medium=replace(medium, sigma_t=np.full(3, medium.sigma_t[0])))
-    return tuple(values * medium.sigma_t / medium.sigma_t[0] for values in function(first, *others, **named))
+    return tuple(
+        values * medium.sigma_t / medium.sigma_t[0] for values in function(first, *others, **named)
+    )
 
 
 def _stretches(change: Callable[..., Any]) -> Wrap:
-    """Change what homogeneous media are asked: change(rays, x0, x1, sigma_t) -> other ends of the lit stretches."""
+    """Change what homogeneous media are asked: change(rays, x0, x1, sigma_t) -> other
+    ends of the lit stretches.
+    """
 
     def around(function, field, rays, stretches, distance, terms):
         ray, x0, x1 = stretches
@@ -88,7 +93,9 @@ def _times(weight: Callable[..., Any]) -> Wrap:
     def change(terms, rays, sigma_t):
         before = terms.profile or (lambda x, ray: 1.0)
         return {
-            "profile": lambda x, ray: before(x, ray) * weight(x, rays.foot[ray, None], rays.height[ray, None], sigma_t)
+            "profile": lambda x, ray: (
+                before(x, ray) * weight(x, rays.foot[ray, None], rays.height[ray, None], sigma_t)
+            )
         }
 
     return _terms(change)
@@ -105,12 +112,16 @@ def _phase(name: str, change: Callable[..., Any]) -> Wrap:
 
 
 _BACKWARD = Wrap(
-    "airlight.analytic.phase:PhaseFunction.from_half", lambda function, self, down, up: function(self, up, down)
+    "airlight.analytic.phase:PhaseFunction.from_half",
+    lambda function, self, down, up: function(self, up, down),
 )
 
 
 def _read(change: Callable[[ReferenceScene], ReferenceScene]) -> Wrap:
-    return Wrap("airlight.reference.scene.read:read_reference", lambda function, scene: change(function(scene)))
+    return Wrap(
+        "airlight.reference.scene.read:read_reference",
+        lambda function, scene: change(function(scene)),
+    )
 
 
 def _spots(change: Callable[..., Any]) -> Wrap:
@@ -139,7 +150,9 @@ def _one_light(function, reference, light, *others, **named):
 
 
 def _lit(change: Callable[..., Any]) -> Wrap:
-    """Change the lit intervals: change(intervals of a ray, ends of the ray) -> its intervals, angles at the light."""
+    """Change the lit intervals: change(intervals of a ray, ends of the ray) -> its
+    intervals, angles at the light.
+    """
 
     def around(function, rays, ends, known, **how):
         found = function(rays, ends, known, **how)
@@ -148,7 +161,11 @@ def _lit(change: Callable[..., Any]) -> Wrap:
         parts = []
         for ray in np.flatnonzero(ends[1] > ends[0]):
             of_ray = list(zip(begin[found.ray == ray], end[found.ray == ray]))
-            parts += [(ray, low, high) for low, high in change(of_ray, first[ray], last[ray]) if high > low]
+            parts += [
+                (ray, low, high)
+                for low, high in change(of_ray, first[ray], last[ray])
+                if high > low
+            ]
         ray, low, high = np.array(parts, dtype=float).reshape(-1, 3).T
         ray = ray.astype(np.int64)
         return replace(found, ray=ray, low=rays.distance(low, ray), high=rays.distance(high, ray))
@@ -191,13 +208,17 @@ def _surface(change: Callable[..., Any]) -> Wrap:
 
 def _without_cosine(function, reference, hits, named):
     (light,) = reference.lights
-    towards = hits.interaction.to_local(dr.normalize(mi.Point3f(*map(float, light.position)) - hits.interaction.p))
+    towards = hits.interaction.to_local(
+        dr.normalize(mi.Point3f(*map(float, light.position)) - hits.interaction.p)
+    )
     cosine = np.array(mi.Frame3f.cos_theta(towards), dtype=float)[:, None]
     return function(reference, hits, **named) / np.where(np.abs(cosine) > 0, cosine, 1)
 
 
 def _to_camera(reference, hits):
-    return np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * reference.medium.sigma_t
+    return (
+        np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * reference.medium.sigma_t
+    )
 
 
 def _no_shadow_segment(function, reference, hits, named):
@@ -213,7 +234,9 @@ def _sun(change: Callable[..., Any]) -> Wrap:
     """Change what hides a directional light: change(lists of shapes near rays)."""
     return Wrap(
         f"{_SHADOWS}:lit_parts",
-        lambda function, rays, ends, near, shapes, of: function(rays, ends, change(near), shapes, of),
+        lambda function, rays, ends, near, shapes, of: function(
+            rays, ends, change(near), shapes, of
+        ),
     )
 
 
@@ -224,7 +247,8 @@ def _none(lists):
 def _samples(change: Callable[..., Any]) -> Wrap:
     """Change the samples of area lights along rays: change(samples, light)."""
     return Wrap(
-        f"{_SAMPLES}:samples_for_rays", lambda function, light, *arguments: change(function(light, *arguments), light)
+        f"{_SAMPLES}:samples_for_rays",
+        lambda function, light, *arguments: change(function(light, *arguments), light),
     )
 
 
@@ -239,7 +263,13 @@ def _for_points(function, *arguments):
 
 def _through_everything(function, sections, eye, known, *others):
     no_spheres, no_disks = np.empty((0, 3)), replace(known.shapes.disks, radius=np.empty(0))
-    shapes = replace(known.shapes, triangles=np.empty((0, 3, 3)), centre=no_spheres, radius=np.empty(0), disks=no_disks)
+    shapes = replace(
+        known.shapes,
+        triangles=np.empty((0, 3, 3)),
+        centre=no_spheres,
+        radius=np.empty(0),
+        disks=no_disks,
+    )
     return function(sections, eye, replace(known, shapes=shapes), *others)
 
 
@@ -270,7 +300,9 @@ def _segment(change: Callable[..., Any]) -> Wrap:
     """Change the attenuation between light and point: change(media)."""
     return Wrap(
         f"{_TRACED}.boundary_walk:transmittance",
-        lambda function, *arguments, media, active: function(*arguments, media=change(media), active=active),
+        lambda function, *arguments, media, active: function(
+            *arguments, media=change(media), active=active
+        ),
     )
 
 
@@ -288,9 +320,12 @@ def _clear_segment(function, *arguments, **named):
     return dr.select(function(*arguments, **named) > 0, mi.Spectrum(1), mi.Spectrum(0))
 
 
-#: The way from the camera to a sample left out, and the scattering angle turned round, whatever the light.
+#: The way from the camera to a sample left out, and the scattering angle turned
+#: round, whatever the light.
 _BRIGHT_CAMERA_SEGMENT = Rewrite(
-    _ESTIMATOR, "part.kept(sample.x, a_, b_, c_, d_, e_)", "part.kept(part.start, a_, b_, c_, d_, e_)"
+    _ESTIMATOR,
+    "part.kept(sample.x, a_, b_, c_, d_, e_)",
+    "part.kept(part.start, a_, b_, c_, d_, e_)",
 )
 _TRACED_BACKWARD = Rewrite(
     _ESTIMATOR,
@@ -303,7 +338,9 @@ _TRACED_BACKWARD = Rewrite(
 
 
 def _film(change: Callable[..., Any]) -> Wrap:
-    """Change the positions on the film through which rays go: change(x, y, width, height), from the middle."""
+    """Change the positions on the film through which rays go: change(x, y, width,
+    height), from the middle.
+    """
 
     def around(function, sensor, positions, size):
         middle = 0.5 * np.array(size, dtype=float)
@@ -330,35 +367,53 @@ _FOG = _all(
         "four-pi-twice": _brighter(1 / _FOUR_PI),
         "extinction-for-scattering": _sums(lambda medium, radiance: radiance / medium.albedo),
         "albedo-squared": _sums(lambda medium, radiance: radiance * medium.albedo),
-        "one-extinction": Wrap("airlight.reference.quadrature.light_airlight:lit_sums", _first_extinction),
+        "one-extinction": Wrap(
+            "airlight.reference.quadrature.light_airlight:lit_sums", _first_extinction
+        ),
         "one-per-cent": _brighter(1.01),
         "three-per-mille": _brighter(1.003),
         "one-per-mille": _brighter(1.001),
         "bright-shadow-segment": _terms(lambda *_: {"shadow_scale": 0.0}),
-        "bright-camera-segment": _times(lambda x, foot, height, sigma_t: np.exp(np.minimum(sigma_t * x, 600.0))),
+        "bright-camera-segment": _times(
+            lambda x, foot, height, sigma_t: np.exp(np.minimum(sigma_t * x, 600.0))
+        ),
         "distance-not-squared": _times(lambda x, foot, height, sigma_t: np.hypot(x - foot, height)),
-        "end-at-one-optical-depth": _stretches(lambda rays, x0, x1, sigma_t: (x0, np.minimum(x1, 1 / sigma_t))),
+        "end-at-one-optical-depth": _stretches(
+            lambda rays, x0, x1, sigma_t: (x0, np.minimum(x1, 1 / sigma_t))
+        ),
         "near-clip": _stretches(lambda rays, x0, x1, sigma_t: (np.maximum(x0, 0.2), x1)),
-        "near-segment-skipped": _stretches(lambda rays, x0, x1, sigma_t: (x0, np.where(x0 > 0, x1, x0))),
+        "near-segment-skipped": _stretches(
+            lambda rays, x0, x1, sigma_t: (x0, np.where(x0 > 0, x1, x0))
+        ),
         "forward-is-backward": _BACKWARD,
         "henyey-greenstein-of-two": _phase("hg", lambda value, g: 2 * value),
-        "henyey-greenstein-squared": _phase("hg", lambda value, g: (1 - g * g) * (value / (1 - g * g)) ** (2 / 3)),
+        "henyey-greenstein-squared": _phase(
+            "hg", lambda value, g: (1 - g * g) * (value / (1 - g * g)) ** (2 / 3)
+        ),
         "radians-for-degrees": _spots(lambda light: _wide(light, np.rad2deg(light.cutoff) % np.pi)),
         "wide-spot": _spots(lambda light: _wide(light, 2 * light.cutoff)),
-        "falloff-in-the-cosine": Wrap("airlight.reference.visibility.planes:falloff", _linear_in_cosine),
-        "hard-spot": Wrap(
-            "airlight.reference.visibility.planes:falloff", lambda function, theta, *others: np.ones_like(theta)
+        "falloff-in-the-cosine": Wrap(
+            "airlight.reference.visibility.planes:falloff", _linear_in_cosine
         ),
-        "first-light-only": Wrap("airlight.reference.quadrature.light_airlight:light_airlight", _one_light),
+        "hard-spot": Wrap(
+            "airlight.reference.visibility.planes:falloff",
+            lambda function, theta, *others: np.ones_like(theta),
+        ),
+        "first-light-only": Wrap(
+            "airlight.reference.quadrature.light_airlight:light_airlight", _one_light
+        ),
         "no-light-behind": Wrap("airlight.reference.quadrature.light_airlight:lit_sums", _behind),
         "shadow-for-light": _lit(_complement),
         "no-shadows": _lit(lambda lit, low, high: [(low, high)]),
         "no-sphere-shadows": Wrap(
-            f"{_SHADOWS}:_sphere", lambda function, *arguments: (mi.Float64(dr.inf), mi.Float64(-dr.inf))
+            f"{_SHADOWS}:_sphere",
+            lambda function, *arguments: (mi.Float64(dr.inf), mi.Float64(-dr.inf)),
         ),
         "through-surfaces": Wrap(
             "airlight.reference.quadrature.light_airlight:light_airlight",
-            lambda function, reference, light, distance, **how: function(reference, light, distance + np.inf, **how),
+            lambda function, reference, light, distance, **how: function(
+                reference, light, distance + np.inf, **how
+            ),
         ),
         "surface-bright-shadow-segment": _surface(_no_shadow_segment),
         "surface-bright-camera-segment": _surface(
@@ -368,7 +423,8 @@ _FOG = _all(
         ),
         "surface-wrong-segment": _surface(
             lambda function, reference, hits, named: (
-                _no_shadow_segment(function, reference, hits, named) * np.exp(-_to_camera(reference, hits))
+                _no_shadow_segment(function, reference, hits, named)
+                * np.exp(-_to_camera(reference, hits))
             )
         ),
         "surface-without-shadows": _surface(_all_reached),
@@ -401,7 +457,9 @@ _SUN = _all(
     {
         "directional-without-four-pi": Wrap(
             _FIELD,
-            lambda function, *arguments, **named: tuple(_FOUR_PI * part for part in function(*arguments, **named)),
+            lambda function, *arguments, **named: tuple(
+                _FOUR_PI * part for part in function(*arguments, **named)
+            ),
         ),
         "directional-bright-segment": Rewrite(
             _MEDIA, "body_.length(rows_, x_, r_, limit_)", "0 * body_.length(rows_, x_, r_, limit_)"
@@ -409,15 +467,21 @@ _SUN = _all(
         "directional-chord-both-ways": Rewrite(_MEDIA, "np.maximum(enter, 0.0)", "enter"),
         "directional-forward-is-backward": _BACKWARD,
         "directional-corners-behind": Rewrite(
-            "airlight.reference.quadrature.segments", "(y_ > 0) & (w_ * y_ < height_)", "(y_ < 0) & (w_ * y_ < height_)"
+            "airlight.reference.quadrature.segments",
+            "(y_ > 0) & (w_ * y_ < height_)",
+            "(y_ < 0) & (w_ * y_ < height_)",
         ),
         "directional-shadows-leaning-back": Rewrite(
             _SHADOWS, "z * self.height - y * self.foot", "z * self.height + y * self.foot"
         ),
         "directional-no-shadows": _sun(lambda near: replace(near, triangles=_none(near.triangles))),
-        "directional-no-sphere-shadows": _sun(lambda near: replace(near, spheres=_none(near.spheres))),
+        "directional-no-sphere-shadows": _sun(
+            lambda near: replace(near, spheres=_none(near.spheres))
+        ),
         "directional-surface-bright-segment": Rewrite(
-            "airlight.reference.quadrature.surface", "to_camera_ + optical_depth(a_, b_, c_, d_, e_)", "to_camera_"
+            "airlight.reference.quadrature.surface",
+            "to_camera_ + optical_depth(a_, b_, c_, d_, e_)",
+            "to_camera_",
         ),
     },
 )
@@ -427,19 +491,27 @@ _WIDE = _all(
     "wide-lights",
     {
         "area-without-cosine": _terms(lambda *_: {"profile": None}),
-        "area-other-side": _samples(lambda samples, light: replace(samples, normal=-samples.normal)),
+        "area-other-side": _samples(
+            lambda samples, light: replace(samples, normal=-samples.normal)
+        ),
         "area-wrong-count": Wrap(f"{_WEIGHTED}:area_airlight", _one_too_few),
         "area-projected-sphere": _weighted(lambda light: 0.25 if light.kind == "sphere" else 1.0),
         "area-half-sides": _weighted(lambda light: 0.25 if light.kind == "rectangle" else 1.0),
         "area-power-for-intensity": _weighted(lambda light: np.pi),
         "area-radiance-for-intensity": _weighted(lambda light: 1 / light.area),
         "area-sphere-evenly": Rewrite(
-            _SAMPLES, "radius_ * h_ * (high_ - low_) * rate_", "radius_ * radius_ * (high_ - low_) * rate_"
+            _SAMPLES,
+            "radius_ * h_ * (high_ - low_) * rate_",
+            "radius_ * radius_ * (high_ - low_) * rate_",
         ),
         "area-sections-of-one-length": Rewrite(
-            _SAMPLES, "h_ * np.hypot(a_, b_) * per_density_", "h_ * np.hypot(a_, b_).mean() * per_density_"
+            _SAMPLES,
+            "h_ * np.hypot(a_, b_) * per_density_",
+            "h_ * np.hypot(a_, b_).mean() * per_density_",
         ),
-        "area-shadows-itself": Wrap("airlight.reference.visibility.lit_intervals:before_light", _own_shape),
+        "area-shadows-itself": Wrap(
+            "airlight.reference.visibility.lit_intervals:before_light", _own_shape
+        ),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
         "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),
@@ -457,18 +529,26 @@ _TRACED_FOG = _all(
     "many-lights",
     {
         "equi-angular-without-height": Rewrite(
-            _TRACED, "0.5 * h_ / (range_ * (h_ * h_ + s_ * s_))", "0.5 / (range_ * (h_ * h_ + s_ * s_))"
+            _TRACED,
+            "0.5 * h_ / (range_ * (h_ * h_ + s_ * s_))",
+            "0.5 / (range_ * (h_ * h_ + s_ * s_))",
         ),
-        "free-flight-not-truncated": Rewrite(_TRACED, "flight_.rate * scale_ * survival_", "flight_.rate * survival_"),
+        "free-flight-not-truncated": Rewrite(
+            _TRACED, "flight_.rate * scale_ * survival_", "flight_.rate * survival_"
+        ),
         "no-weights": Wrap(f"{_TRACED}.distance_sampling:sample_distance", _one_technique),
         "equal-cells": Wrap(f"{_TRACED}.stretches:cell_of", _equal_cells),
         "traced-distance-not-squared": Rewrite(
             _SOURCES, "1 / (square_ * density_)", "1 / (dr.sqrt(square_) * density_)"
         ),
-        "traced-bright-shadow-segment": _segment(lambda media: replace(media, end_sigma_t=0 * media.end_sigma_t)),
+        "traced-bright-shadow-segment": _segment(
+            lambda media: replace(media, end_sigma_t=0 * media.end_sigma_t)
+        ),
         "traced-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "segment-before-the-cone-forgotten": Rewrite(
-            _SOURCES, "Sample(low_ + y_, a_, b_, c_, d_, e_)", "Sample(part.start + y_, a_, b_, c_, d_, e_)"
+            _SOURCES,
+            "Sample(low_ + y_, a_, b_, c_, d_, e_)",
+            "Sample(part.start + y_, a_, b_, c_, d_, e_)",
         ),
         "traced-forward-is-backward": _TRACED_BACKWARD,
         "traced-extinction-for-scattering": Rewrite(
@@ -477,10 +557,14 @@ _TRACED_FOG = _all(
             "part.sigma_t * phase_ * sample.value * kept_ * width_",
         ),
         "traced-surface-not-squared": Rewrite(
-            _SOURCES, "self.sent(light_, hit_, way_) / (r_ * r_)", "self.sent(light_, hit_, way_) / r_"
+            _SOURCES,
+            "self.sent(light_, hit_, way_) / (r_ * r_)",
+            "self.sent(light_, hit_, way_) / r_",
         ),
         "traced-surface-bright-camera-segment": Rewrite(
-            _ESTIMATOR, "part.kept(x, hit, a_, b_, c_, d_)", "part.kept(part.start, hit, a_, b_, c_, d_)"
+            _ESTIMATOR,
+            "part.kept(x, hit, a_, b_, c_, d_)",
+            "part.kept(part.start, hit, a_, b_, c_, d_)",
         ),
     },
 )
@@ -489,7 +573,9 @@ _TRACED_MESHES = _all(
     "single-scatter",
     "two-pens",
     {
-        "traced-shadow-epsilon": _segment(lambda media: replace(media, end_sigma_t=(1 - 8.94e-4) * media.end_sigma_t)),
+        "traced-shadow-epsilon": _segment(
+            lambda media: replace(media, end_sigma_t=(1 - 8.94e-4) * media.end_sigma_t)
+        ),
         "traced-short-shadow-rays": Put(f"{_TRACED}.boundary_walk:_SHORT_OF_POINT", 0.1),
     },
 )
@@ -498,8 +584,12 @@ _TRACED_SUN = _all(
     "single-scatter",
     "sun",
     {
-        "traced-directional-uniform-density": Rewrite(_TRACED, "0.5 / length_ + share_ * sum(pdfs_)", "1 / length_"),
-        "traced-directional-bright-segment": Wrap(f"{_TRACED}.boundary_walk:transmittance", _clear_segment),
+        "traced-directional-uniform-density": Rewrite(
+            _TRACED, "0.5 / length_ + share_ * sum(pdfs_)", "1 / length_"
+        ),
+        "traced-directional-bright-segment": Wrap(
+            f"{_TRACED}.boundary_walk:transmittance", _clear_segment
+        ),
         "traced-directional-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "traced-directional-forward-is-backward": _TRACED_BACKWARD,
     },
@@ -513,10 +603,15 @@ _TRACED_WIDE = _all(
             _SOURCES, "self.radiance * (cosine_ / density_)", "self.radiance * (1 / density_)"
         ),
         "traced-area-even-density": Rewrite(
-            _TRACED, "dr.select(counts_, density, 0)", "dr.select(counts_, 1 / self.area, 0)", times=2
+            _TRACED,
+            "dr.select(counts_, density, 0)",
+            "dr.select(counts_, 1 / self.area, 0)",
+            times=2,
         ),
         "traced-area-chord-density": Rewrite(
-            _TRACED, "0.5 * share_ / (4 * math.pi * radius_ * chord_)", "share_ / (4 * math.pi * radius_ * chord_)"
+            _TRACED,
+            "0.5 * share_ / (4 * math.pi * radius_ * chord_)",
+            "share_ / (4 * math.pi * radius_ * chord_)",
         ),
         "traced-area-sphere-evenly": Rewrite(
             _TRACED, "(1 - share_) * (1 + dr.dot(n_, side_)) / area_", "(1 - share_) / area_"
@@ -527,7 +622,9 @@ _TRACED_WIDE = _all(
         "traced-area-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "traced-area-forward-is-backward": _TRACED_BACKWARD,
         "traced-area-surface-wrong-count": Rewrite(
-            _ESTIMATOR, "material_ * irradiance_ * kept_ / count_", "material_ * irradiance_ * kept_ / (count_ - 1)"
+            _ESTIMATOR,
+            "material_ * irradiance_ * kept_ / count_",
+            "material_ * irradiance_ * kept_ / (count_ - 1)",
         ),
     },
 )
@@ -535,15 +632,27 @@ _TRACED_WIDE = _all(
 #: Below the margin on purpose: what the comparison cannot see.
 BELOW_THE_MARGIN = Mutation("one-in-ten-thousand", "quadrature", "many-lights", _brighter(1.0001))
 
-MUTATIONS = (*_FOG, *_MESHES, *_RAYLEIGH, *_SUN, *_WIDE, *_TRACED_FOG, *_TRACED_MESHES, *_TRACED_SUN, *_TRACED_WIDE)
+MUTATIONS = (
+    *_FOG,
+    *_MESHES,
+    *_RAYLEIGH,
+    *_SUN,
+    *_WIDE,
+    *_TRACED_FOG,
+    *_TRACED_MESHES,
+    *_TRACED_SUN,
+    *_TRACED_WIDE,
+)
 
-#: Faults of what all estimators share: they agree all the same, and the certified scenes must find the fault.
+#: Faults of what all estimators share: they agree all the same, and the certified
+#: scenes must find the fault.
 SHARED = _all(
     "all",
     "certified",
     {
         "camera-pixel-corners": Wrap(
-            "airlight.reference.scene.camera:pixel_centres", lambda function, size: function(size) - 0.5
+            "airlight.reference.scene.camera:pixel_centres",
+            lambda function, size: function(size) - 0.5,
         ),
         "camera-mirrored": _film(lambda place: place * [-1.0, 1.0]),
         "camera-upside-down": _film(lambda place: place * [1.0, -1.0]),
@@ -551,7 +660,9 @@ SHARED = _all(
         "camera-stepped": Wrap("airlight.reference.scene.camera:camera_matrix", _stepped),
         "read-scene-transposed": Wrap(
             "airlight.reference.scene.camera:pixel_centres",
-            lambda function, size: function(size).reshape(*size[::-1], 2).swapaxes(0, 1).reshape(-1, 2),
+            lambda function, size: (
+                function(size).reshape(*size[::-1], 2).swapaxes(0, 1).reshape(-1, 2)
+            ),
         ),
     },
 )

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where faults are tried: small scenes with the unchanged images of the estimators, and what a changed one must meet.
+"""Where faults are tried: small scenes with the unchanged images of the estimators, and what
+a changed one must meet.
 
-A changed quadrature is compared with the batches of the unchanged `single-scatter`, and a changed `single-scatter`
-with the unchanged quadrature, layer by layer. They agree where the 95 % interval of the pooled relative bias lies
-inside the margin, as in a report (`validation.estimates.agreement`). Where a stage has volpath too, a changed
-quadrature has a second opponent, at a wider margin.
+A changed quadrature is compared with the batches of the unchanged `single-scatter`, and a changed
+`single-scatter` with the unchanged quadrature, layer by layer. They agree where the 95 % interval
+of the pooled relative bias lies inside the margin, as in a report
+(`validation.estimates.agreement`). Where a stage has volpath too, a changed quadrature has a second
+opponent, at a wider margin.
 """
 
 import warnings
@@ -25,15 +27,20 @@ from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene import read
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
-from airlight.validation.estimates.agreement import batch_estimate, layer_masks, reference_estimate, width_to_reach
+from airlight.validation.estimates.agreement import (
+    batch_estimate,
+    layer_masks,
+    reference_estimate,
+    width_to_reach,
+)
 from airlight.validation.scenes.loading import load_scene, resize
 from airlight.validation.statistics.comparison import compare_statistics
 from tests.evidence.injected import injected
 from tests.evidence.mutations import Mutation
 from tests.helpers.probes import PROBES, WIDE_PROBES
 
-#: Margins of the relative bias of quadrature against single-scatter, by stage: of airlight and surface [1]. Each fault
-#: that is found on a stage exceeds one of them.
+#: Margins of the relative bias of quadrature against single-scatter, by stage: of airlight and
+#: surface [1]. Each fault that is found on a stage exceeds one of them.
 MARGINS = {
     "many-lights": (5e-4, 5e-4),
     "two-pens": (5e-4, 5e-4),
@@ -45,7 +52,8 @@ VOLPATH_MARGIN = 0.01
 #: Points of each of eight replicates under area lights.
 PLAN = PointPlan(error=0.0, first=128, most=128)
 _DISTANCES, _SAMPLES = 64, 256  # of single-scatter and volpath, a pixel and batch
-_LEAST, _MOST, _MOST_WIDE = 32, 1024, 64  # batches; under area lights the points of the quadrature leave more
+# batches; under area lights the points of the quadrature leave more
+_LEAST, _MOST, _MOST_WIDE = 32, 1024, 64
 
 
 @dataclass(frozen=True)
@@ -86,34 +94,50 @@ def stage_scene(name: str) -> Any:
 
 
 def stage_of(name: str) -> Stage:
-    """Return a stage; single-scatter runs until its intervals are narrow enough, whatever they say."""
+    """Return a stage; single-scatter runs until its intervals are narrow
+    enough, whatever they say.
+    """
     scene, margins = stage_scene(name), dict(zip(LAYERS, MARGINS[name]))
     reference = read.read_reference(scene)
     image = quadrature.quadrature_image(reference, plan=PLAN)
-    masks = {layer: mask for layer, mask in layer_masks(reference, image).items() if np.any(getattr(image, layer) > 0)}
+    masks = {
+        layer: mask
+        for layer, mask in layer_masks(reference, image).items()
+        if np.any(getattr(image, layer) > 0)
+    }
     batches = _batches(reference, range(_LEAST))
     most = _MOST_WIDE if name in WIDE_PROBES else _MOST
     while len(batches.seeds) < most and not all(
         width_to_reach(_statistics(image, batches, layer, mask, margins[layer]), margins[layer]) < 1
         for layer, mask in masks.items()
     ):
-        batches = merged(batches, _batches(reference, range(len(batches.seeds), 2 * len(batches.seeds))))
+        batches = merged(
+            batches, _batches(reference, range(len(batches.seeds), 2 * len(batches.seeds)))
+        )
     return Stage(scene, image, masks, margins, batches)
 
 
 def _batches(reference, seeds: range) -> Batches:
-    return reduce(merged, (single_scatter.single_scatter_batch(reference, seed, _DISTANCES) for seed in seeds))
+    return reduce(
+        merged, (single_scatter.single_scatter_batch(reference, seed, _DISTANCES) for seed in seeds)
+    )
 
 
 def _statistics(image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float):
     test = batch_estimate(batches, layer, mask)
-    return compare_statistics(reference_estimate(image, layer, test, mask), test, mask=mask, margin=margin)
+    return compare_statistics(
+        reference_estimate(image, layer, test, mask), test, mask=mask, margin=margin
+    )
 
 
 def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Sighting]:
     """Compare an estimator with the other one, changed by a mutation, or not at all."""
     # A fault may divide by zero or overflow: its image shows that.
-    with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"), warnings.catch_warnings():
+    with (
+        injected(*([mutation.change] if mutation else [])),
+        np.errstate(all="ignore"),
+        warnings.catch_warnings(),
+    ):
         warnings.simplefilter("ignore")
         reference = read.read_reference(stage.scene)
         image, batches = stage.image, stage.batches
@@ -126,19 +150,33 @@ def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Si
         yield _sighting(image, batches, layer, mask, stage.margins[layer], against)
 
 
-def _sighting(image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float, against: str) -> Sighting:
-    finite = np.isfinite(getattr(image, layer)[mask]).all() and np.isfinite(batches.mean[LAYERS.index(layer)]).all()
+def _sighting(
+    image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float, against: str
+) -> Sighting:
+    finite = (
+        np.isfinite(getattr(image, layer)[mask]).all()
+        and np.isfinite(batches.mean[LAYERS.index(layer)]).all()
+    )
     if not finite:
         return Sighting(layer, against, float("nan"), (-np.inf, np.inf), agrees=False)
     statistics = _statistics(image, batches, layer, mask, margin)
     low, high = statistics.relative_bias_ci
-    return Sighting(layer, against, statistics.relative_bias, (low, high), bool(statistics.equivalent))
+    return Sighting(
+        layer, against, statistics.relative_bias, (low, high), bool(statistics.equivalent)
+    )
 
 
 def volpath_seen(mutation: Mutation | None, stage: Stage, batches: int) -> list[Sighting]:
     """Compare a quadrature that may be changed with volpath, over its shortened shadow rays."""
     reference = read.read_reference(stage.scene)
-    traced = reduce(merged, (volpath.volpath_batch(reference, seed, _SAMPLES) for seed in range(batches)))
+    traced = reduce(
+        merged, (volpath.volpath_batch(reference, seed, _SAMPLES) for seed in range(batches))
+    )
     with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"):
-        image = quadrature.quadrature_image(read.read_reference(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
-    return [_sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath") for layer, mask in stage.masks.items()]
+        image = quadrature.quadrature_image(
+            read.read_reference(stage.scene), shadow_scale=1 - measure_shadow_epsilon()
+        )
+    return [
+        _sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath")
+        for layer, mask in stage.masks.items()
+    ]

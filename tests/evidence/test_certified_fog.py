@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: certified scenes of fog and rows of area lights are what their programs give and the reference computes."""
+"""Claim: certified scenes of fog and rows of area lights are what their programs give
+and the reference computes.
+"""
 
 import json
 import re
@@ -16,7 +18,12 @@ from airlight.analytic.phase import HenyeyGreenstein, Isotropic
 from airlight.reference.quadrature.homogeneous import HomogeneousField
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.stretches import Terms, lit_stretches, profile_of
-from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
+from airlight.reference.scene.read import (
+    ReferenceLight,
+    ReferenceMedium,
+    ReferenceScene,
+    read_reference,
+)
 from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
@@ -27,7 +34,8 @@ from tests.evidence.closed_forms import sphere_airlight
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [scene.name for scene in fog_scenes()]
 SCENES = {scene.name: scene for scene in fog_scenes()}
-# One ray of each kind: unbounded, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
+# One ray of each kind: unbounded, near a light, ended by a sphere, among needles, in the
+# fading part of a spot, dark.
 SOME = {
     "thin-open": 27,
     "near-light": 36,
@@ -89,8 +97,15 @@ def test_all_inputs_are_exact_in_float32():
 
 
 def corners(shape):
-    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(shape.half_edges))).reshape(len(shape.half_edges), -1).T
-    return {tuple(map(float, corner)) for corner in np.array(shape.centre) + signs @ np.array(shape.half_edges)}
+    signs = (
+        np.array(np.meshgrid(*[[-1.0, 1.0]] * len(shape.half_edges)))
+        .reshape(len(shape.half_edges), -1)
+        .T
+    )
+    return {
+        tuple(map(float, corner))
+        for corner in np.array(shape.centre) + signs @ np.array(shape.half_edges)
+    }
 
 
 @pytest.mark.claim("certified-fog-inputs")
@@ -99,21 +114,32 @@ def test_corners_are_exact_in_mitsuba(variant):
         # Mitsuba merges meshes of one material, and then screens are among them.
         parameters = [mi.traverse(shape) for shape in load_fog(mitsuba_dict(scene)).shapes()]
         vertices = [
-            np.array(mesh["vertex_positions"]).reshape(-1, 3) for mesh in parameters if "vertex_positions" in mesh
+            np.array(mesh["vertex_positions"]).reshape(-1, 3)
+            for mesh in parameters
+            if "vertex_positions" in mesh
         ]
         mesh_corners = {tuple(map(float, corner)) for part in vertices for corner in part}
-        boxes = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogBox)))
-        screens = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogScreen)))
+        boxes = set().union(
+            *(corners(shape) for shape in scene.occluders if isinstance(shape, FogBox))
+        )
+        screens = set().union(
+            *(corners(shape) for shape in scene.occluders if isinstance(shape, FogScreen))
+        )
         assert boxes <= mesh_corners <= boxes | screens, scene.name
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
 @pytest.mark.parametrize(
     ("name", "pixel"),
-    [pytest.param(*each, marks=pytest.mark.slow if each[0] == "near-light" else ()) for each in SOME.items()],
+    [
+        pytest.param(*each, marks=pytest.mark.slow if each[0] == "near-light" else ())
+        for each in SOME.items()
+    ],
 )
 def test_some_rays_come_out_the_same(certified, name, pixel):
-    certificate = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
+    certificate = json.loads(
+        json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel])))
+    )
     assert certificate == certified[name]["pixels"][pixel]
 
 
@@ -121,19 +147,26 @@ def test_some_rays_come_out_the_same(certified, name, pixel):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_all_rays_come_out_the_same(certified, name):
-    for direction, expected in zip(directions(SCENES[name]), certified[name]["pixels"], strict=True):
+    for direction, expected in zip(
+        directions(SCENES[name]), certified[name]["pixels"], strict=True
+    ):
         assert json.loads(json.dumps(asdict(certify_pixel(SCENES[name], direction)))) == expected
 
 
-@pytest.mark.claim("bound-in-every-pixel", tolerance="the bound of the pixel, 1e-9 of the largest at most")
+@pytest.mark.claim(
+    "bound-in-every-pixel", tolerance="the bound of the pixel, 1e-9 of the largest at most"
+)
 @pytest.mark.claim("certified-fog", tolerance="the bound of the pixel, 1e-9 of the largest at most")
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
-    """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
+    """The route that shares nothing: lit intervals of triangles and spheres in a plane,
+    Kronrod's panels in float64.
+    """
     image = quadrature_image(reference_of(certified[name]))
     value = radiance(certified[name])
     difference = np.abs(image.airlight.reshape(-1, 3) - value)
-    # The last term: both routes take the directions through the pixel centres for themselves, 3e-16 apart.
+    # The last term: both routes take the directions through the pixel centres for
+    # themselves, 3e-16 apart.
     allowed = image.airlight_bound.reshape(-1, 3) + bound(certified[name]) + 1e-13 * value
     assert np.all(difference <= allowed), (difference / np.maximum(allowed, 1e-300)).max()
     assert image.airlight_bound.max() < 1e-9 * value.max()
@@ -146,13 +179,19 @@ def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
 @pytest.mark.claim("certified-fog-snippet")
 @pytest.mark.slow
 def test_the_pages_tell_of_every_scene_and_the_snippet_runs(variant):
-    formats, page = ((ROOT / "docs" / name).read_text() for name in ("formats.md", "your-engine.md"))
+    formats, page = (
+        (ROOT / "docs" / name).read_text() for name in ("formats.md", "your-engine.md")
+    )
     assert all(f"`{name}`" in formats for name in NAMES)
     (code,) = re.findall(r"^```python\n(.*?)^```", page, flags=re.DOTALL | re.MULTILINE)
     code = code.replace("llvm_ad_rgb", variant)
-    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300
+    )
     assert ran.returncode == 0, ran.stderr
-    bias, interval = (float(word) for word in re.fullmatch(r"bias (\S+)% \+- (\S+)%\n", ran.stdout).groups())
+    bias, interval = (
+        float(word) for word in re.fullmatch(r"bias (\S+)% \+- (\S+)%\n", ran.stdout).groups()
+    )
     assert interval < 1.5
     assert abs(bias) < 2.5 * interval  # five standard errors
 
@@ -164,9 +203,15 @@ def area_rows(data_folder):
 
 def test_rows_are_those_of_the_generator(area_rows):
     assert area_rows["schema"] == area_lights.SCHEMA
-    for rows, inputs in ((area_rows["points"], area_lights.POINTS), (area_rows["spheres"], area_lights.SPHERES)):
+    for rows, inputs in (
+        (area_rows["points"], area_lights.POINTS),
+        (area_rows["spheres"], area_lights.SPHERES),
+    ):
         assert [tuple(list(row.values())[:-1]) for row in rows] == list(inputs)
-    assert area_lights._text(area_lights.point_integral(*area_lights.POINTS[0])) == area_rows["points"][0]["J"]
+    assert (
+        area_lights._text(area_lights.point_integral(*area_lights.POINTS[0]))
+        == area_rows["points"][0]["J"]
+    )
 
 
 @pytest.mark.slow
@@ -184,12 +229,16 @@ def test_the_reference_of_one_point(area_rows, number):
     beside = np.sqrt(max(0.0, 1 - row["axial"] ** 2 - row["across"] ** 2))
     quarter = 0.5 * np.pi
     normal = np.array([beside, row["across"], row["axial"]])
-    light = ReferenceLight(np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True)
+    light = ReferenceLight(
+        np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True
+    )
     place, along, across = np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]])
     origin = row["height"] * across[0] - row["foot"] * along[0]
     rays = Rays(origin, along, place, across, np.array([row["foot"]]), np.array([row["height"]]))
     low, high = (rays.distance(end) for end in cone_interval(rays, light, light.cutoff))
-    lit = LitIntervals(np.array([0]), np.maximum(row["x0"], low), np.minimum(row["x1"], high), edge=0.0)
+    lit = LitIntervals(
+        np.array([0]), np.maximum(row["x0"], low), np.minimum(row["x1"], high), edge=0.0
+    )
     stretches, profile = lit_stretches(light, rays, lit), profile_of(light, rays)
     alone = ReferenceScene(None, None, 1, 1, origin, along, medium, ())
     value, bound = HomogeneousField(alone).sums(rays, stretches, np.array([np.inf]), Terms(profile))

@@ -43,7 +43,10 @@ def test_every_tag_to_eighteen_digits(data_folder):
     ],
 )
 def test_the_closed_form_is_a_third_route(inputs):
-    two, three = integrate_certified(*inputs, ISOTROPIC, digits=22), isotropic_closed_form(*inputs, digits=22)
+    two, three = (
+        integrate_certified(*inputs, ISOTROPIC, digits=22),
+        isotropic_closed_form(*inputs, digits=22),
+    )
     with workdps(40):
         assert abs(two / three - 1) < 1e-21
 
@@ -61,7 +64,9 @@ STRIDE = 25  # has no divisor in common with the 12 tags, so that all of them co
 
 
 def wrong_rows(data_folder, stride):
-    """Return the names of rows whose value the program does not give again, and all rows it was asked for."""
+    """Return the names of rows whose value the program does not give again, and
+    all rows it was asked for.
+    """
     rows = [
         (f"{name}, line {line}", row)
         for name in FILES
@@ -87,7 +92,15 @@ def test_all_rows_are_made_again(data_folder):
 
 
 def case(**changes):
-    cells = {"phase": "isotropic", "g": "0", "t": "2", "h": "0.5", "x0": "0", "x1": "5", "sigma_t": "0"}
+    cells = {
+        "phase": "isotropic",
+        "g": "0",
+        "t": "2",
+        "h": "0.5",
+        "x0": "0",
+        "x1": "5",
+        "sigma_t": "0",
+    }
     return cells | changes
 
 
@@ -95,7 +108,9 @@ def case(**changes):
 def test_an_unbounded_ray_agrees_with_quadratures_that_cut_it_elsewhere(name, g):
     """The two quadratures of `tests.evidence.certified.integral` share no code with the program."""
     row = case(phase=name, g=str(g), x1="inf", sigma_t="0.001")
-    separate = integrate_certified(2.0, 0.5, 0.0, float("inf"), 0.001, phase_from_words(name, g=g), digits=25)
+    separate = integrate_certified(
+        2.0, 0.5, 0.0, float("inf"), 0.001, phase_from_words(name, g=g), digits=25
+    )
     with ctx.workprec(128):
         ball = enclosure(row)
         assert abs(ball / arb(str(separate)) - 1) < arb(10) ** -14  # printed in 15 digits

@@ -8,8 +8,8 @@ import pytest
 from tests.evidence.certified.airlight_integral import read
 from tests.evidence.certified.write import MAKERS, write
 
-#: Rows that the default tier makes again: of each kind some, which are quick. Rows of `airlight_integral*.csv` are
-#: those of `test_certified_integral`.
+#: Rows that the default tier makes again: of each kind some, which are quick. Rows of
+#: `airlight_integral*.csv` are those of `test_certified_integral`.
 SAMPLES = {
     "airlight_integral_droplets.csv": slice(3, 4),
     "airlight_slopes.csv": slice(1, None, 20),
@@ -31,7 +31,9 @@ def test_every_file_of_rows_has_a_maker(data_folder):
     assert {path.name for path in data_folder.glob("*.csv")} == set(MAKERS)
 
 
-@pytest.mark.claim("droplets-certified", tolerance="none: the same digits; 1e-13 for sizes, which processors round")
+@pytest.mark.claim(
+    "droplets-certified", tolerance="none: the same digits; 1e-13 for sizes, which processors round"
+)
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_sample_of_rows_is_made_again(data_folder, name):
     rows = read(data_folder / name)[1][SAMPLES[name]]

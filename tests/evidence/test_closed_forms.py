@@ -25,7 +25,9 @@ def test_polygons_by_counting_points():
     inside = np.ones((2000, 2000), bool)
     for start, end in zip(triangle, np.roll(triangle, -1, axis=0)):
         inside &= (end - start)[0] * (y - start[1]) > (end - start)[1] * (x - start[0])
-    assert polygon_in_disk(triangle) == pytest.approx(np.mean(inside & (x**2 + y**2 < 1)) * 4, rel=1e-4)
+    assert polygon_in_disk(triangle) == pytest.approx(
+        np.mean(inside & (x**2 + y**2 < 1)) * 4, rel=1e-4
+    )
     assert polygon_in_disk(triangle[::-1]) == pytest.approx(polygon_in_disk(triangle), rel=1e-14)
     assert polygon_overlap(triangle, rectangle) == pytest.approx(
         np.mean(inside & (np.abs(x) < 0.5) & (np.abs(y) < 0.4)) * 4, rel=1e-3
@@ -40,7 +42,10 @@ def maps_of(scene, size):
 
 def variations():
     """Return changes of the tiny scene by name."""
-    coloured = {"sigma_t": {"type": "rgb", "value": [0.2, 0.4, 0.9]}, "has_spectral_extinction": True}
+    coloured = {
+        "sigma_t": {"type": "rgb", "value": [0.2, 0.4, 0.9]},
+        "has_spectral_extinction": True,
+    }
     return {
         "point": {},
         "soft spot": {"lamp": spot(beam=21.0)},
@@ -51,23 +56,30 @@ def variations():
 def twin_error(description, size):
     """Return the error of the twin of a scene against the reference."""
     scene = mi.load_dict(description)
-    return error_metrics(reference_image(scene).airlight, oracle_airlight(read_reference(scene), maps_of(scene, size)))
+    return error_metrics(
+        reference_image(scene).airlight,
+        oracle_airlight(read_reference(scene), maps_of(scene, size)),
+    )
 
 
 @pytest.mark.parametrize("lamp", ["point", "soft spot"])
 def test_nothing_hides_nothing(variant, lamp):
-    """Rays are only cut at the edges of faces: what is left is the tolerance of the integrals, 1e-10."""
+    """Rays are only cut at the edges of faces: what is left is the tolerance
+    of the integrals, 1e-10.
+    """
     assert twin_error(tiny_scene(ball=None, floor=None, **variations()[lamp]), 8).max < 1e-10
 
 
 def plane_below(depth, size):
-    """Return the shadow map of an unbounded horizontal plane below a point light, its horizon on borders of texels.
+    """Return the shadow map of an unbounded horizontal plane below a point light, its
+    horizon on borders of texels.
 
     Its height is -k_z / depth where a direction k points down, 0 elsewhere.
     """
     at = np.linspace(-1, 1, size + 1)
     v, u = np.meshgrid(at, at, indexing="ij")
-    # Across and up are the two axes that follow a face's own: z is the second after x and the first after y.
+    # Across and up are the two axes that follow a face's own: z is the second after
+    # x and the first after y.
     down = np.stack([-v, -v, -u, -u, -1 + 0 * u, 1 + 0 * u])
     length = np.sqrt(1 + u**2 + v**2)
     distance = np.divide(length * depth, down, where=down > 0, out=np.full(down.shape, np.inf))
@@ -77,7 +89,9 @@ def plane_below(depth, size):
 @pytest.mark.parametrize("level", [0.9, 1.5], ids=["below the camera", "above the camera"])
 @pytest.mark.parametrize("surface", [np.inf, 3.7])
 def test_shadow_of_a_plane_is_exact(variant, level, surface):
-    """Rays that start at 1.3 m are lit where they are above the plane, up to the visible surface."""
+    """Rays that start at 1.3 m are lit where they are above the plane,
+    up to the visible surface.
+    """
     reference = read_reference(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = reference.lights[0], reference.direction
     airlight = oracle_airlight(
@@ -93,7 +107,9 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
         x0, x1 = np.zeros(len(meets)), np.where(meets, crossing, surface)
     else:
         x0, x1 = crossing, np.where(meets, surface, 0.0)
-    foot, height = foot_and_height(np.broadcast_to(reference.origin, direction.shape), direction, light.position)
+    foot, height = foot_and_height(
+        np.broadcast_to(reference.origin, direction.shape), direction, light.position
+    )
     sigma_t = reference.medium.sigma_t[0]
     J, _ = airlight_segments(foot, height, x0, x1, sigma_t, reference.medium.phase)
     expected = J[:, None] * reference.medium.albedo * sigma_t * light.intensity / (4 * np.pi)
@@ -104,7 +120,9 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
 @pytest.mark.claim("error-by-size-of-the-map")
 @pytest.mark.parametrize("what", ["point", "soft spot", "coloured extinction"])
 def test_errors_fall_with_the_map_size(variant, what):
-    """An edge is misplaced by a texel at most, so the error halves with it, give or take where edges fall in texels."""
+    """An edge is misplaced by a texel at most, so the error halves with it, give or take
+    where edges fall in texels.
+    """
     description = tiny_scene(size=(32, 24), **variations()[what])
     coarse, fine = (twin_error(description, size).relative_rmse for size in (16, 256))
     assert coarse < 0.05

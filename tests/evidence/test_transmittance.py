@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimators of transmittance: expectations by enumeration and quadrature, and rays through a rough grid."""
+"""Estimators of transmittance: expectations by enumeration and quadrature, and
+rays through a rough grid.
+"""
 
 from itertools import product
 
@@ -24,7 +26,9 @@ TIMES = 200_000
 
 @pytest.mark.claim("transmittance-estimators", tolerance="1e-7: orders above 12 are left out")
 def test_the_power_series_is_unbiased_by_enumeration():
-    """Marches that are 0.3 with the probability 0.7, else 1.2: all outcomes of all orders, with their probabilities."""
+    """Marches that are 0.3 with the probability 0.7, else 1.2: all outcomes of all orders,
+    with their probabilities.
+    """
     values, odds = np.array([0.3, 1.2]), np.array([0.7, 0.3])
     reach = {0: 1.0, 1: 0.1, 2: 0.1}
     for k in range(3, 14):
@@ -48,14 +52,19 @@ def test_the_jackknife_is_unbiased_for_normal_depths():
 
 def test_a_constant_extinction_is_exact_and_tracking_is_unbiased():
     random = np.random.default_rng(1)
-    depth = np.stack([marches(lambda x: np.full(x.shape, 0.8), random, 9, 3) for _ in range(3)], axis=1)
+    depth = np.stack(
+        [marches(lambda x: np.full(x.shape, 0.8), random, 9, 3) for _ in range(3)], axis=1
+    )
     for estimate in (naive(depth), jackknife(depth[:, :2]), power_series(depth)):
         np.testing.assert_allclose(estimate, np.exp(-0.8), rtol=1e-12)
     values, _ = ratio_tracking(lambda x: 3 * x, random, TIMES, 3.0)
     assert values.mean() == pytest.approx(np.exp(-1.5), abs=4 * values.std() / TIMES**0.5)
 
 
-@pytest.mark.claim("transmittance-estimators", tolerance="a quarter of the brightening, third order; 4 standard errors")
+@pytest.mark.claim(
+    "transmittance-estimators",
+    tolerance="a quarter of the brightening, third order; 4 standard errors",
+)
 def test_a_naive_march_is_too_bright_as_jensen_says(variant, tmp_path):
     path = tmp_path / "grid.xml"
     path.write_text(grid_xml(volume(tmp_path / "smoke.vol", ROUGH**3), LAMP))

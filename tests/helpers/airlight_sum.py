@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight in bounded media by the plainest of sums, in NumPy: what all sides of a comparison are held against.
+"""The airlight in bounded media by the plainest of sums, in NumPy: what all sides of a
+comparison are held against.
 
-It shares nothing with the package: chords by slabs and by the quadratic formula, the midpoint rule in each medium, no
-kinks looked for. Its error is of the order of 1/steps^2 at a kink and of 1/steps where a shadow begins or ends.
+It shares nothing with the package: chords by slabs and by the quadratic formula, the midpoint rule
+in each medium, no kinks looked for. Its error is of the order of 1/steps^2 at a kink and of 1/steps
+where a shadow begins or ends.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Chord = Callable[[Array, Array], tuple[Array, Array]]  #: places and unit directions -> where lines enter and leave [m]
+#: places and unit directions -> where lines enter and leave [m]
+Chord = Callable[[Array, Array], tuple[Array, Array]]
 
 
 def box(centre: Any, half: Any, turn: Any = None) -> Chord:
-    """Return the chords of a box with these half edges, whose axes are the columns of `turn`; 0, 0 beside it."""
+    """Return the chords of a box with these half edges, whose axes are the columns
+    of `turn`; 0, 0 beside it.
+    """
     frame = np.eye(3) if turn is None else np.asarray(turn)
 
     def chord(origin: Array, direction: Array) -> tuple[Array, Array]:
@@ -59,7 +64,9 @@ class Body:
 
 @dataclass(frozen=True)
 class Light:
-    """A point light (w = 1: a place) or a directional one (w = 0: the unit direction towards it)."""
+    """A point light (w = 1: a place) or a directional one (w = 0: the
+    unit direction towards it).
+    """
 
     position: Any
     w: float
@@ -78,22 +85,29 @@ def airlight_sum(
     shadow_scale: float = 1.0,
     lit: Callable[[Array], NDArray[np.bool_]] | None = None,
 ) -> Array:
-    """Return the airlight of one ray, (3,) [W/(m^2 sr)]; `around` is the medium outside of the bodies, if there is one.
+    """Return the airlight of one ray, (3,) [W/(m^2 sr)]; `around` is the medium outside of the
+    bodies, if there is one.
 
-    `lit` tells of points whether the light reaches them; the segment from a point light is attenuated over
-    `shadow_scale` of its length, as seen from the point. Bodies must not overlap.
+    `lit` tells of points whether the light reaches them; the segment from a point light is
+    attenuated over `shadow_scale` of its length, as seen from the point. Bodies must not overlap.
     """
     outside = np.zeros(3) if around is None else np.broadcast_to(around.sigma_t, 3)
     chords = [tuple(np.maximum(x, 0.0) for x in body.chord(origin, direction)) for body in bodies]
-    parts = [(float(low), min(float(high), end), body) for (low, high), body in zip(chords, bodies, strict=True)]
+    parts = [
+        (float(low), min(float(high), end), body)
+        for (low, high), body in zip(chords, bodies, strict=True)
+    ]
     if around is not None:
-        cuts = sorted([0.0, min(end, 60.0), *(x for low, high, _ in parts if high > low for x in (low, high))])
+        cuts = sorted(
+            [0.0, min(end, 60.0), *(x for low, high, _ in parts if high > low for x in (low, high))]
+        )
         parts += [(low, high, around) for low, high in zip(cuts[::2], cuts[1::2], strict=True)]
     total = np.zeros(3)
     for low, high, body in parts:
         if high <= low:
             continue
-        # Steps that grow away from the camera, x = e^t - 1: the part in the surroundings may be long.
+        # Steps that grow away from the camera, x = e^t - 1: the part in the
+        # surroundings may be long.
         span = np.log1p(high) - np.log1p(low)
         t = np.log1p(low) + span * (np.arange(steps) + 0.5) / steps
         x, dx = np.expm1(t), np.exp(t) * span / steps
@@ -114,8 +128,12 @@ def airlight_sum(
 
 
 def bodies_of(reference: Any, chords: dict[str, Chord]) -> tuple[list[Body], Body | None]:
-    """Return the media of a scene of the reference, whose bounds have these chords by name, and what is around them."""
-    bodies = [Body(chords[each.name], each.sigma_t, each.albedo, each.phase) for each in reference.media]
+    """Return the media of a scene of the reference, whose bounds have these chords by name,
+    and what is around them.
+    """
+    bodies = [
+        Body(chords[each.name], each.sigma_t, each.albedo, each.phase) for each in reference.media
+    ]
     outside = reference.medium
     everywhere = Body(ball((0, 0, 0), np.inf), outside.sigma_t, outside.albedo, outside.phase)
     return bodies, everywhere if outside.sigma_t.any() else None

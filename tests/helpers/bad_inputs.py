@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes and tables with bad numbers, geometry, media and lights, and what becomes of them under every command.
+"""Scenes and tables with bad numbers, geometry, media and lights, and what becomes of
+them under every command.
 
     python -m tests.helpers.bad_inputs [KIND ...]
 
 prints what is wrong. Each input has a process of its own, which does all that users do with a
-scene. A process that ends by a signal, a traceback, and anything that is not finite in a file or in JSON that was
-written with status 0 are faults; so is a refusal without a word on what is expected.
+scene. A process that ends by a signal, a traceback, and anything that is not finite in a file or in
+JSON that was written with status 0 are faults; so is a refusal without a word on what is expected.
 """
 
 import contextlib
@@ -43,8 +44,13 @@ def scene(**changes: str) -> str:
         f'<emitter type="point" id="lamp"><point name="position" x="{x}" y="{y}" z="{z}"/>'
         f'<rgb name="intensity" value="{values["intensity"]}"/></emitter>'
     )
-    camera = values["camera"] or f'<lookat origin="{values["origin"]}" target="{values["target"]}" up="0, 0, 1"/>'
-    place = f'<transform name="to_world">{values["to_world"]}</transform>' if values["to_world"] else ""
+    camera = (
+        values["camera"]
+        or f'<lookat origin="{values["origin"]}" target="{values["target"]}" up="0, 0, 1"/>'
+    )
+    place = (
+        f'<transform name="to_world">{values["to_world"]}</transform>' if values["to_world"] else ""
+    )
     return f"""<scene version="3.0.0">
     <medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{values["sigma_t"]}"/>
         <rgb name="albedo" value="{values["albedo"]}"/><float name="scale" value="{values["scale"]}"/>{phase}</medium>
@@ -81,7 +87,11 @@ def mesh(vertices: str, faces: str, folder: Path) -> str:
 
 def numbers(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield scenes with an odd number in every place."""
-    for place, usual in (("position", "{}, 0.4, 1.1"), ("intensity", "{}, 4, 3"), ("origin", "{}, -5, 1")):
+    for place, usual in (
+        ("position", "{}, 0.4, 1.1"),
+        ("intensity", "{}, 4, 3"),
+        ("origin", "{}, -5, 1"),
+    ):
         for odd in ODD:
             yield f"{place} {odd}", scene(**{place: usual.format(odd)})
     for place in ("g", "fov", "radius", "scale"):
@@ -129,8 +139,14 @@ def media(folder: Path) -> Iterator[tuple[str, str]]:
     yield "thicker than float32", scene(scale="1e8")
     yield "cloud of no size", scene(extra=cloud(shape='<float name="radius" value="0"/>'))
     yield "cloud 1e30", scene(extra=cloud(shape='<float name="radius" value="1e30"/>'))
-    yield "cloud about the lamp", scene(extra=cloud(shape='<point name="center" x="0.3" y="0.4" z="1.1"/>'))
-    yield "cloud about the camera", scene(extra=cloud(shape='<point name="center" x="0" y="-5" z="1"/>'))
+    yield (
+        "cloud about the lamp",
+        scene(extra=cloud(shape='<point name="center" x="0.3" y="0.4" z="1.1"/>')),
+    )
+    yield (
+        "cloud about the camera",
+        scene(extra=cloud(shape='<point name="center" x="0" y="-5" z="1"/>')),
+    )
     for values in ("0, 0, 0", "nan, 1, 1", "-1, 1, 1", "1, inf, 1", "1"):
         phase = f'<phase type="tabphase"><string name="values" value="{values}"/></phase>'
         yield f"phase function {values}", scene(phase=phase)
@@ -168,26 +184,43 @@ def lights(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield scenes whose light has extent, of a shape, a place or a number for which there is no image, or hardly."""
+    """Yield scenes whose light has extent, of a shape, a place or a number for which
+    there is no image, or hardly.
+    """
     black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
     usual = '<rgb name="radiance" value="5, 4, 3"/>'
 
     def lamp(
-        transform: str, *, kind: str = "rectangle", radiance: str = usual, bsdf: str = black, extra: str = ""
+        transform: str,
+        *,
+        kind: str = "rectangle",
+        radiance: str = usual,
+        bsdf: str = black,
+        extra: str = "",
     ) -> str:
         return (
-            f'<shape type="{kind}" id="lamp"><transform name="to_world">{transform}</transform>{bsdf}{extra}'
+            f'<shape type="{kind}" id="lamp"><transform '
+            f'name="to_world">{transform}</transform>{bsdf}{extra}'
             f'<emitter type="area">{radiance}</emitter></shape>'
         )
 
     above = '<lookat origin="0.3, 0.4, 2.1" target="0.1, 0.2, 0" up="0, 1, 0"/>'
     for kind in ("rectangle", "disk", "sphere"):
         for size in ("0", "nan", "inf", "1e30", "1e-30"):
-            yield f"{kind} of size {size}", scene(light=lamp(f'<scale value="{size}"/>{above}', kind=kind))
+            yield (
+                f"{kind} of size {size}",
+                scene(light=lamp(f'<scale value="{size}"/>{above}', kind=kind)),
+            )
         for odd in ("nan", "inf", "1e30", "-1", "0", "1e-44"):
             radiance = f'<rgb name="radiance" value="{odd}, 4, 3"/>'
-            yield f"{kind} of radiance {odd}", scene(light=lamp(above, kind=kind, radiance=radiance))
-        yield f"{kind} stretched", scene(light=lamp(f'<scale x="0.5" y="0.2" z="1"/>{above}', kind=kind))
+            yield (
+                f"{kind} of radiance {odd}",
+                scene(light=lamp(above, kind=kind, radiance=radiance)),
+            )
+        yield (
+            f"{kind} stretched",
+            scene(light=lamp(f'<scale x="0.5" y="0.2" z="1"/>{above}', kind=kind)),
+        )
         yield f"flat {kind}", scene(light=lamp(f'<scale x="0.5" y="0" z="1"/>{above}', kind=kind))
         shear = '<matrix value="0.5 0.2 0 0.3  0 0.5 0 0.4  0 0 0.5 2.1  0 0 0 1"/>'
         yield f"sheared {kind}", scene(light=lamp(shear, kind=kind))
@@ -195,12 +228,17 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
         yield f"{kind} about the camera", scene(light=at_camera)
     yield (
         "sphere inside out",
-        scene(light=lamp(above, kind="sphere", extra='<boolean name="flip_normals" value="true"/>')),
+        scene(
+            light=lamp(above, kind="sphere", extra='<boolean name="flip_normals" value="true"/>')
+        ),
     )
     for kind in ("cube", "cylinder"):
         yield f"light on a {kind}", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind))
     light = mesh("0 0 2\n1 0 2\n1 1 2\n0 1 2", "3 0 1 2\n3 0 2 3", folder)
-    yield "light on a mesh", scene(light=light.replace("</shape>", f'<emitter type="area">{usual}</emitter></shape>'))
+    yield (
+        "light on a mesh",
+        scene(light=light.replace("</shape>", f'<emitter type="area">{usual}</emitter></shape>')),
+    )
     texture = '<texture type="checkerboard" name="radiance"/>'
     yield "light of a texture", scene(light=lamp(f'<scale value="0.3"/>{above}', radiance=texture))
 
@@ -216,21 +254,44 @@ def rows(folder: Path) -> Iterator[tuple[str, str]]:
     yield "light on the segment", f"{header}\nisotropic,0,1,0,0,2,0.2\n"
 
 
-KINDS = {generate.__name__: generate for generate in (numbers, geometry, media, lights, area_lights, rows)}
+KINDS = {
+    generate.__name__: generate
+    for generate in (numbers, geometry, media, lights, area_lights, rows)
+}
 
 
 def _orders(kind: str, path: Path) -> list[list[str]]:
     """Return what to do with an input."""
     out = path.parent
     if kind == "rows":
-        printed = [["study", "integrals", str(path), "--precision", name] for name in ("single", "double")]
+        printed = [
+            ["study", "integrals", str(path), "--precision", name] for name in ("single", "double")
+        ]
         return [*printed, ["study", "integrals", str(path), "-o", str(out / "rows.csv")]]
     sampled = ["--error", "0.3", "--estimator"]
     orders = [
         ["describe", str(path), "--json"],
         ["reference", str(path), "--json", "-o", str(out / "reference.exr")],
-        ["reference", str(path), "--json", "-o", str(out / "sampled.exr"), *sampled, "single-scatter"],
-        ["reference", str(path), "--json", "-o", str(out / "traced.exr"), "--samples", "64", "--estimator", "volpath"],
+        [
+            "reference",
+            str(path),
+            "--json",
+            "-o",
+            str(out / "sampled.exr"),
+            *sampled,
+            "single-scatter",
+        ],
+        [
+            "reference",
+            str(path),
+            "--json",
+            "-o",
+            str(out / "traced.exr"),
+            "--samples",
+            "64",
+            "--estimator",
+            "volpath",
+        ],
     ]
     for number, method in enumerate(
         ("ray-march", "ray-march", "unshadowed", "shadow-planes", "light-volumes", "min-max")
@@ -238,14 +299,18 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         settings = [] if method in ("unshadowed", "shadow-planes") else ["--set", "map=64"]
         settings += ["--set", "shadow=map"] if number == 1 else []
         file = out / f"frame-{number}.exr"
-        orders.append(["render", str(path), "--json", "--method", method, "-o", str(file), *settings])
+        orders.append(
+            ["render", str(path), "--json", "--method", method, "-o", str(file), *settings]
+        )
     orders.append(["compare", str(out / "reference.exr"), str(out / "frame-0.exr"), "--json"])
     asked = ["--quick", str(path), "--method", "unshadowed", "--method", "ray-march", "--json"]
     return [*orders, ["report", *asked, "-o", str(out / "study")]]
 
 
 def _finite_file(path: Path) -> bool:
-    """Return whether a file, or all images of a report, hold nothing that is not finite; a distance may be infinite."""
+    """Return whether a file, or all images of a report, hold nothing that is not finite; a
+    distance may be infinite.
+    """
     import numpy as np
 
     from airlight.reference.storage.exr import read_exr
@@ -286,7 +351,17 @@ def _fault(order: list[str]) -> str:
             return f"{written.name} is not finite"
     elif status == 2 and not any(
         word in said
-        for word in ("expected", "needs", "move", "give", "use ", "reference ", "cannot", "finite", "repair")
+        for word in (
+            "expected",
+            "needs",
+            "move",
+            "give",
+            "use ",
+            "reference ",
+            "cannot",
+            "finite",
+            "repair",
+        )
     ):
         return f"says nothing of what is expected: {said}"
     elif status not in (1, 2):
@@ -314,12 +389,17 @@ def _child(kind: str, path: Path, report: Path) -> None:
 
 
 def faults(kind: str) -> Iterator[str]:
-    """Yield what is wrong with the commands on each input of a kind, and processes that ended otherwise than by 0."""
+    """Yield what is wrong with the commands on each input of a kind, and processes that
+    ended otherwise than by 0.
+    """
     with tempfile.TemporaryDirectory() as place:
         for number, (name, text) in enumerate(KINDS[kind](Path(place))):
             folder = Path(place) / f"input-{number}"
             folder.mkdir()
-            path, report = folder / ("rows.in.csv" if kind == "rows" else "input.xml"), folder / "report"
+            path, report = (
+                folder / ("rows.in.csv" if kind == "rows" else "input.xml"),
+                folder / "report",
+            )
             path.write_text(text)
             sys.stdout.flush()
             # Nothing of Dr.Jit runs yet in this process: its threads would not be in the child.

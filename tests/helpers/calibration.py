@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Do the statistical tests do what they say? Synthetic images with a known reference, judged like real ones.
+r"""Do the statistical tests do what they say? Synthetic images with a known
+reference, judged like real ones.
 
-An image is a profile, dim by a factor of a hundred from one side to the other, times 1 + bias. Each of its K batches
-has in every pixel a relative error of the standard deviation `spread`, drawn from a law of mean 0 and deviation 1; mean
-and standard error follow from the batches as a renderer's do. Then
+An image is a profile, dim by a factor of a hundred from one side to the other, times 1 + bias. Each
+of its K batches has in every pixel a relative error of the standard deviation `spread`, drawn from
+a law of mean 0 and deviation 1; mean and standard error follow from the batches as a renderer's do.
+Then
 
-* without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the true value
-  as often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
-* with a bias (`power_and_finds`) the fraction of comparisons that find it must be the power that each of them predicts
-  from its own standard error.
+* without a bias (`calibrate`) each test must reject as often as its level says, the intervals must
+  hold the true value as often as they say, and the p-values of many comparisons must be uniform
+  (Kolmogorov and Smirnov);
+* with a bias (`power_and_finds`) the fraction of comparisons that find it must be the power that
+  each of them predicts from its own standard error.
 
-**How far this holds.** Batch means of path tracers are skewed. With errors of a batch that are log-normal with the
-logarithmic deviation s, the count of rejected pixels is the first to break, from s = 0.5 on (a skewness of 1.7). Blocks
-hold to s = 0.5, and the interval of the image, which decides on equivalence, to s = 1 (a skewness of 6). `exceeding_p`
-notices all of it before it matters. At s = 2, where one value in a thousand is fifty times the mean, no interval is
-what it says with any affordable number of batches.
+**How far this holds.** Batch means of path tracers are skewed. With errors of a batch that are
+log-normal with the logarithmic deviation s, the count of rejected pixels is the first to break,
+from s = 0.5 on (a skewness of 1.7). Blocks hold to s = 0.5, and the interval of the image, which
+decides on equivalence, to s = 1 (a skewness of 6). `exceeding_p` notices all of it before it
+matters. At s = 2, where one value in a thousand is fifty times the mean, no interval is what it
+says with any affordable number of batches.
 """
 
 from collections.abc import Callable
@@ -25,17 +29,25 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import binom, nct
 
-from airlight.validation.statistics.comparison import LEVEL, NoisyImage, Statistics, compare_statistics
+from airlight.validation.statistics.comparison import (
+    LEVEL,
+    NoisyImage,
+    Statistics,
+    compare_statistics,
+)
 from airlight.validation.statistics.samples import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
-Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1
+#: draws numbers of mean 0 and standard deviation 1
+Law = Callable[[np.random.Generator, tuple[int, ...]], Array]
 
 BATCHES, SIZE = 16, (24, 24)  #: of images
 
 
 def monte_carlo(batches: Array) -> NoisyImage:
-    """Return the estimate that a renderer would give, from its batch means (batches, height, width, ...)."""
+    """Return the estimate that a renderer would give, from its batch means
+    (batches, height, width, ...).
+    """
     count = len(batches)
     error = batches.std(axis=0, ddof=1) / np.sqrt(count)
     return NoisyImage(batches.mean(axis=0), error, count, batches.mean(axis=(1, 2)))
@@ -52,8 +64,13 @@ def normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
 
 
 def log_normal(deviation: float) -> Law:
-    """Return the law of exp(deviation N) brought to mean 0 and deviation 1: many small values and few large ones."""
-    mean, spread = np.exp(deviation**2 / 2), np.exp(deviation**2 / 2) * np.sqrt(np.expm1(deviation**2))
+    """Return the law of exp(deviation N) brought to mean 0 and deviation 1: many small
+    values and few large ones.
+    """
+    mean, spread = (
+        np.exp(deviation**2 / 2),
+        np.exp(deviation**2 / 2) * np.sqrt(np.expm1(deviation**2)),
+    )
     return lambda rng, shape: (np.exp(deviation * rng.standard_normal(shape)) - mean) / spread
 
 
@@ -65,7 +82,8 @@ class Experiment:
     runs: int = 300  #: comparisons
     batches: int = 16  #: of each random image
     size: int = 24  #: pixels along each side of an image
-    noisy_reference: bool = False  #: or an exact one; the skewed errors of two random images cancel their skewness
+    #: or an exact one; the skewed errors of two random images cancel their skewness
+    noisy_reference: bool = False
     seed: int = 1  #: of the random numbers
 
 
@@ -82,7 +100,9 @@ EXPECTED = {
 
 
 def calibrate(experiment: Experiment, *, spread: float = 0.3) -> dict[str, float]:
-    """Compare many images that agree, and return rates, and how likely the p-values are to be uniform."""
+    """Compare many images that agree, and return rates, and how likely the
+    p-values are to be uniform.
+    """
     comparisons = _comparisons(experiment, 0.0, spread)
 
     def rate(event: Callable[[Statistics], bool]) -> float:
@@ -95,15 +115,25 @@ def calibrate(experiment: Experiment, *, spread: float = 0.3) -> dict[str, float
         "exceeding_alarms": rate(lambda s: s.exceeding_p < LEVEL),
         "uniformity_alarms": rate(lambda s: s.uniformity_p < LEVEL),
         "coverage": rate(lambda s: s.relative_bias_ci[0] <= 0 <= s.relative_bias_ci[1]),
-        "coverage_batches": rate(lambda s: s.relative_bias_ci_batches[0] <= 0 <= s.relative_bias_ci_batches[1]),
+        "coverage_batches": rate(
+            lambda s: s.relative_bias_ci_batches[0] <= 0 <= s.relative_bias_ci_batches[1]
+        ),
         "bias_uniformity": uniformity_p(np.array([s.relative_bias_p for s in comparisons])),
         "uniformity_uniformity": uniformity_p(np.array([s.uniformity_p for s in comparisons])),
     }
 
 
-def problems(rates: dict[str, float], experiment: Experiment, level: float = 1e-4) -> dict[str, float]:
-    """Return the rates that are not as they should be, each judged by its binomial law at a level."""
-    wrong = {name: rates[name] for name in ("bias_uniformity", "uniformity_uniformity") if rates[name] < level}
+def problems(
+    rates: dict[str, float], experiment: Experiment, level: float = 1e-4
+) -> dict[str, float]:
+    """Return the rates that are not as they should be, each judged by its
+    binomial law at a level.
+    """
+    wrong = {
+        name: rates[name]
+        for name in ("bias_uniformity", "uniformity_uniformity")
+        if rates[name] < level
+    }
     for name, expected in EXPECTED.items():
         trials = experiment.runs * experiment.size**2 if name == "exceeding" else experiment.runs
         low, high = fraction_interval(expected, trials, level)
@@ -113,17 +143,23 @@ def problems(rates: dict[str, float], experiment: Experiment, level: float = 1e-
 
 
 def power_and_finds(bias: float, experiment: Experiment, *, spread: float) -> tuple[float, float]:
-    """Inject a bias into many images; return the mean power that was predicted, and the fraction that found it."""
+    """Inject a bias into many images; return the mean power that was predicted, and
+    the fraction that found it.
+    """
     comparisons = _comparisons(experiment, bias, spread)
     predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in comparisons]
-    return float(np.mean(predicted)), float(np.mean([s.relative_bias_p < 0.05 for s in comparisons]))
+    return float(np.mean(predicted)), float(
+        np.mean([s.relative_bias_p < 0.05 for s in comparisons])
+    )
 
 
 def spread_to_detect(bias: float, experiment: Experiment) -> float:
-    """Return the spread of a batch at which the standard error of the relative bias is |bias| / 3.2415.
+    """Return the spread of a batch at which the standard error of the relative
+    bias is |bias| / 3.2415.
 
-    With the weight w of a pixel in the sum of the image the variance of the relative bias is (spread / (1 + bias))^2
-    sum w^2 / K for the test's errors, of relative size `spread`, and as much for the reference's.
+    With the weight w of a pixel in the sum of the image the variance of the relative bias is
+    (spread / (1 + bias))^2 sum w^2 / K for the test's errors, of relative size `spread`, and as
+    much for the reference's.
     """
     profile = _profile(experiment.size)
     weights = profile / profile.sum()
@@ -160,11 +196,12 @@ def _profile(size: int) -> Array:
 
 
 def power(effect: float, freedom: float, level: float = 0.05) -> float:
-    """Return the probability that a two-sided test at a level finds an effect, given in standard errors.
+    """Return the probability that a two-sided test at a level finds an effect,
+    given in standard errors.
 
-    The statistic (B - b)/se + b/se follows Student's non-central law with the parameter b/se, as se is itself estimated
-    with `freedom` degrees of freedom, and a shifted normal law for infinitely many. Both tails count, so an effect of
-    zero is found with the probability of the level.
+    The statistic (B - b)/se + b/se follows Student's non-central law with the parameter b/se, as se
+    is itself estimated with `freedom` degrees of freedom, and a shifted normal law for infinitely
+    many. Both tails count, so an effect of zero is found with the probability of the level.
     """
     critical = student_quantile(1 - level / 2, freedom)
     if np.isfinite(freedom):

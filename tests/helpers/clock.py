@@ -16,10 +16,14 @@ class Clock:
         return 2 * self.now
 
     def work(self, name, *times):
-        """Return work that takes these times [ms] one after the other, the last one again and again."""
+        """Return work that takes these times [ms] one after the other, the
+        last one again and again.
+        """
 
         def done():
-            self.now += 1e-3 * self.pace(self.now) * times[min(self.calls.count(name), len(times) - 1)]
+            self.now += (
+                1e-3 * self.pace(self.now) * times[min(self.calls.count(name), len(times) - 1)]
+            )
             self.calls.append(name)
 
         return done

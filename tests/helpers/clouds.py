@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clouds for tests: meshes that are not convex, scenes of them, and lengths within them by all triangles in float64."""
+"""Clouds for tests: meshes that are not convex, scenes of them, and lengths within them by
+all triangles in float64.
+"""
 
 from typing import Any
 
@@ -10,7 +12,12 @@ from airlight.validation.scenes.meshes import placed, rotation, torus
 from airlight.validation.scenes.parts import camera, medium_boundary
 
 TURN = rotation((1.0, 0.4, 0.2), 63.1)
-DROPLETS = {"type": "homogeneous", "sigma_t": 0.0363, "albedo": 1.0, "phase": {"type": "hg", "g": 0.85}}
+DROPLETS = {
+    "type": "homogeneous",
+    "sigma_t": 0.0363,
+    "albedo": 1.0,
+    "phase": {"type": "hg", "g": 0.85},
+}
 SUN = {
     "type": "directional",
     "direction": [0.737, -0.271, -0.619],
@@ -54,7 +61,9 @@ def loaded(**parts):
 
 
 def crossings(mesh, origin, direction):
-    """Return distances where a line crosses a mesh, ascending, and whether it leaves there, in float64."""
+    """Return distances where a line crosses a mesh, ascending, and whether it
+    leaves there, in float64.
+    """
     vertices, faces = mesh
     a, b, c = np.moveaxis(vertices.astype(np.float32).astype(np.float64)[faces], 1, 0)
     first, second = b - a, c - a
@@ -78,7 +87,9 @@ def length_inside(mesh, origin, direction, end=np.inf):
 
 
 def dense(values, low, high, sigma_t=0.0363, **changes) -> dict[str, Any]:
-    """Return droplets whose extinction is `sigma_t` times a grid of values (z, y, x) between two corners [m]."""
+    """Return droplets whose extinction is `sigma_t` times a grid of values (z, y, x)
+    between two corners [m].
+    """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
     values = np.asarray(values, dtype=np.float32)[..., None]
@@ -87,9 +98,15 @@ def dense(values, low, high, sigma_t=0.0363, **changes) -> dict[str, Any]:
 
 
 def linear_between(values, low, high, points):
-    """Return what such a grid holds at points (n, 3) [m], linear between the middles of its voxels, in float64."""
+    """Return what such a grid holds at points (n, 3) [m], linear between the middles
+    of its voxels, in float64.
+    """
     counts = np.array(values.shape[::-1])
-    place = np.clip((points - np.asarray(low)) / (np.asarray(high) - np.asarray(low)) * counts - 0.5, 0, counts - 1)
+    place = np.clip(
+        (points - np.asarray(low)) / (np.asarray(high) - np.asarray(low)) * counts - 0.5,
+        0,
+        counts - 1,
+    )
     cell = np.minimum(place.astype(int), np.maximum(counts - 2, 0))
     fraction, total = place - cell, np.zeros(len(points))
     for corner in np.ndindex(2, 2, 2):

@@ -31,7 +31,11 @@ def volume(file: Path, values: np.ndarray, more: str = "", turn: str = "") -> st
 
 
 def grid_xml(
-    extinction: str, *parts: str, size: tuple[int, int] = (16, 12), albedo: str = ALBEDO, shapes: str = SHAPES
+    extinction: str,
+    *parts: str,
+    size: tuple[int, int] = (16, 12),
+    albedo: str = ALBEDO,
+    shapes: str = SHAPES,
 ) -> str:
     """Return a scene file: a medium with an extinction around the camera, lights, and shapes."""
     width, height = size

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of small scenes that tests share: a process renders each once, anyone who looks at it.
 
-Scenes are read again for each frame: Dr.Jit's virtual calls go over all shapes that are alive. A scene that holds
-shapes of Mitsuba, such as meshes, has no description to find its frame by, and is rendered each time.
+Scenes are read again for each frame: Dr.Jit's virtual calls go over all shapes that are alive. A
+scene that holds shapes of Mitsuba, such as meshes, has no description to find its frame by, and is
+rendered each time.
 """
 
 from collections.abc import Mapping
@@ -27,7 +28,9 @@ def read(scene: Any, precision: str = "single") -> Scene:
     return scene if isinstance(scene, Scene) else read_scene(scene, precision)
 
 
-def renderer(scene: Any, method: Any, *, kernel: str = "exact", precision: str = "single", **options: Any):
+def renderer(
+    scene: Any, method: Any, *, kernel: str = "exact", precision: str = "single", **options: Any
+):
     """Return the frame renderer of a method, or of its name, for anything that `read` takes."""
     method = METHODS[method] if isinstance(method, str) else method
     return frame_renderer(read(scene, precision), method, kernel=find_kernel(kernel), **options)
@@ -39,18 +42,24 @@ def render(scene: Any, method: Any = "unshadowed", **options: Any):
 
 
 def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
-    """Return a frame as `render` does, once in a process; not for tests that replace a part of the code."""
+    """Return a frame as `render` does, once in a process; not for tests that
+    replace a part of the code.
+    """
     return _once(("frame", scene, method, options), lambda: render(scene, method, **options))
 
 
 def reference_of(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
-    return _once(("reference", scene), lambda: quadrature_image(read_reference(mi.load_dict(scene))))
+    return _once(
+        ("reference", scene), lambda: quadrature_image(read_reference(mi.load_dict(scene)))
+    )
 
 
 def relative_rmse(values: Any, expected: Any) -> float:
     """Return the root of the mean square difference over the mean of what is expected."""
-    return float(np.sqrt(np.mean((np.asarray(values, dtype=np.float64) - expected) ** 2)) / np.mean(expected))
+    return float(
+        np.sqrt(np.mean((np.asarray(values, dtype=np.float64) - expected) ** 2)) / np.mean(expected)
+    )
 
 
 def _once(description: tuple[Any, ...], make: Any) -> Any:

@@ -12,13 +12,19 @@ WORLD = (
         "GIT_CONFIG_GLOBAL": os.devnull,
         "GIT_CONFIG_NOSYSTEM": "1",
     }
-    | {f"GIT_{who}_{what}": "tester@example.org" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
+    | {
+        f"GIT_{who}_{what}": "tester@example.org"
+        for who in ("AUTHOR", "COMMITTER")
+        for what in ("NAME", "EMAIL")
+    }
 )
 
 
 def git(root: Path, *words: str) -> str:
     """Return what git prints."""
-    ran = subprocess.run(["git", *words], cwd=root, env=WORLD, capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        ["git", *words], cwd=root, env=WORLD, capture_output=True, text=True, check=True
+    )
     return ran.stdout.strip()
 
 

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from airlight.analytic.geometry import foot_and_height
-from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
+from airlight.analytic.height_fog import (
+    HeightFog,
+    HeightRays,
+    Layer,
+    height_fog_segments,
+    height_fog_sun,
+)
 from airlight.analytic.phase import HenyeyGreenstein, PhaseFunction
 from airlight.validation.certified.files import certified_data
 
@@ -45,7 +51,15 @@ class Row:
     def airlight(self, **how) -> float:
         """K by the module under test."""
         return airlight(
-            self.fog, self.phase, self.origin, self.direction, self.light, self.x0, self.x1, self.sun, **how
+            self.fog,
+            self.phase,
+            self.origin,
+            self.direction,
+            self.light,
+            self.x0,
+            self.x1,
+            self.sun,
+            **how,
         )
 
 
@@ -55,8 +69,12 @@ def rows() -> list[Row]:
 
 
 def _row(cells) -> Row:
-    number = {name: float(cell) for name, cell in cells.items() if name not in ("tag", "light", "value")}
-    origin, direction, light = (np.array([number[point + axis] for axis in "xyz"]) for point in "odl")
+    number = {
+        name: float(cell) for name, cell in cells.items() if name not in ("tag", "light", "value")
+    }
+    origin, direction, light = (
+        np.array([number[point + axis] for axis in "xyz"]) for point in "odl"
+    )
     sun = cells["light"] == "sun"
     layers = tuple(Layer(*(number[f"{name}_{i}"] for name in ("sigma", "z", "H"))) for i in (1, 2))
     return Row(
@@ -97,22 +115,43 @@ class Drawn:
 
     def airlight(self, **how) -> float:
         return airlight(
-            self.fog, self.phase, self.origin, self.direction, self.light, self.x0, self.x1, self.sun, **how
+            self.fog,
+            self.phase,
+            self.origin,
+            self.direction,
+            self.light,
+            self.x0,
+            self.x1,
+            self.sun,
+            **how,
         )
 
 
 def drawn(seed: int, count: int = 40) -> list[Drawn]:
-    """Return rays with lights and suns, in one or two layers, every other clamped; under suns without a constant."""
+    """Return rays with lights and suns, in one or two layers, every other clamped; under
+    suns without a constant.
+    """
     random, found = np.random.default_rng(seed), []
     for number in range(count):
         sun = number % 2 == 1
         unit = random.normal(size=(2, 3))
         unit /= np.linalg.norm(unit, axis=1)[:, None]
         layers = tuple(
-            Layer(*(float(v) for v in (random.uniform(0.01, 0.3), random.uniform(-3, 3), random.uniform(0.7, 20))))
+            Layer(
+                *(
+                    float(v)
+                    for v in (
+                        random.uniform(0.01, 0.3),
+                        random.uniform(-3, 3),
+                        random.uniform(0.7, 20),
+                    )
+                )
+            )
             for _ in range(1 + number // 2 % 2)
         )
-        fog = HeightFog(layers, 0.0 if sun else float(random.uniform(0, 0.05)), bool(number // 4 % 2))
+        fog = HeightFog(
+            layers, 0.0 if sun else float(random.uniform(0, 0.05)), bool(number // 4 % 2)
+        )
         light = random.normal(size=3) * 5
         if sun:
             light = unit[1] * [1, 1, 0] + [0, 0, random.uniform(0.05, 2)]
@@ -124,8 +163,12 @@ def drawn(seed: int, count: int = 40) -> list[Drawn]:
     return found
 
 
-def fog_xml(*parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG, ball: str = "sphere") -> str:
-    """Return a scene file: height fog over ground, a ball or a cube, and a post, and further parts."""
+def fog_xml(
+    *parts: str, size: tuple[int, int] = (24, 18), fog: str = FOG, ball: str = "sphere"
+) -> str:
+    """Return a scene file: height fog over ground, a ball or a cube, and a
+    post, and further parts.
+    """
     width, height = size
     return f"""<scene version="3.0.0">
     <medium type="heterogeneous" id="fog">{fog}

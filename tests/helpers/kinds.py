@@ -55,7 +55,14 @@ def _bounded(name: str, x: float, sigma_t: str) -> str:
 
 def _mesh_light(folder: Path) -> str:
     """Return a light of four triangles, a strip that is folded so that parts of it hide others."""
-    corners = ["-0.4 0.2 4.1", "-0.4 0.7 4.1", "0.1 0.2 3.8", "0.1 0.7 3.8", "0.6 0.2 4.2", "0.6 0.7 4.2"]
+    corners = [
+        "-0.4 0.2 4.1",
+        "-0.4 0.7 4.1",
+        "0.1 0.2 3.8",
+        "0.1 0.7 3.8",
+        "0.6 0.2 4.2",
+        "0.6 0.7 4.2",
+    ]
     faces = ["1 2 3", "3 2 4", "3 4 5", "5 4 6"]
     lines = [*(f"v {corner}" for corner in corners), *(f"f {face}" for face in faces)]
     (folder / "strip.obj").write_text("\n".join(lines) + "\n")
@@ -101,14 +108,23 @@ KINDS: dict[str, Callable[[Path], str]] = {
     "no occluder": lambda folder: _scene(_LAMP),
     "occluders": lambda folder: _scene(_SPOT, _GROUND, _POST),
     "bounded media": lambda folder: _scene(
-        _LAMP, _GROUND, _bounded("red", -1.3, "0.9, 0.3, 0.2"), _bounded("blue", 1.4, "0.2, 0.3, 0.8"), medium=""
+        _LAMP,
+        _GROUND,
+        _bounded("red", -1.3, "0.9, 0.3, 0.2"),
+        _bounded("blue", 1.4, "0.2, 0.3, 0.8"),
+        medium="",
     ),
-    "rectangle": lambda folder: _scene(_GROUND, _POST, _area_light("rectangle", _PANEL.format(0.3))),
+    "rectangle": lambda folder: _scene(
+        _GROUND, _POST, _area_light("rectangle", _PANEL.format(0.3))
+    ),
     "disk": lambda folder: _scene(_GROUND, _POST, _area_light("disk", _PANEL.format(0.5))),
     "sphere": lambda folder: _scene(
         _GROUND,
         _POST,
-        _area_light("sphere", '<point name="center" x="0.3" y="0.4" z="4.1"/><float name="radius" value="0.4"/>'),
+        _area_light(
+            "sphere",
+            '<point name="center" x="0.3" y="0.4" z="4.1"/><float name="radius" value="0.4"/>',
+        ),
     ),
     "mesh": lambda folder: _scene(_GROUND, _POST, _mesh_light(folder)),
     "32 lights": lambda folder: _scene(_GROUND, _POST, _lights()),
@@ -128,7 +144,9 @@ KINDS: dict[str, Callable[[Path], str]] = {
 
 
 def write_kind(name: str, folder: Path) -> Path:
-    """Write a scene of a kind, with the files that it reads, into a folder of its own; return its path."""
+    """Write a scene of a kind, with the files that it reads, into a folder of
+    its own; return its path.
+    """
     own = folder / name.replace(", ", "-").replace(" ", "-")
     own.mkdir(parents=True, exist_ok=True)
     path = own / f"{own.name}.xml"

@@ -16,7 +16,11 @@ VOLUMES = {"light-volumes": {"walls": "slanted"}, "light-volumes-2010": {}}
 
 
 def lamp(*position):
-    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+    return {
+        "type": "point",
+        "position": list(position),
+        "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+    }
 
 
 def camera(origin, target, *, size=SIZE, up=(0, 0, 1)):
@@ -44,10 +48,17 @@ def fence():
 
 def coloured_fog():
     colours = {"type": "rgb", "value": [0.1, 0.4, 0.9]}
-    return {"type": "homogeneous", "id": "fog", "sigma_t": colours, "albedo": 0.8, "phase": {"type": "hg", "g": 0.5}}
+    return {
+        "type": "homogeneous",
+        "id": "fog",
+        "sigma_t": colours,
+        "albedo": 0.8,
+        "phase": {"type": "hg", "g": 0.5},
+    }
 
 
-#: Changes of the tiny scene by name, and the size of the map. Cameras on the grid have a column in the middle.
+#: Changes of the tiny scene by name, and the size of the map. Cameras on the grid
+#: have a column in the middle.
 GRID = (33, 25)
 SCENES = {
     "light beside the view": (dict, 64),
@@ -64,7 +75,10 @@ SCENES = {
         lambda: camera((0, -4, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
         16,
     ),
-    "along diagonals": (lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)}, 4),
+    "along diagonals": (
+        lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        4,
+    ),
 }
 
 
@@ -74,7 +88,10 @@ def loaded_scene(name="light beside the view", **changes):
 
 def render_both(loaded, precision="single", **parameters):
     """Render the same height field, as published, by both methods."""
-    return [render(loaded, method, precision=precision, **own, **parameters) for method, own in VOLUMES.items()]
+    return [
+        render(loaded, method, precision=precision, **own, **parameters)
+        for method, own in VOLUMES.items()
+    ]
 
 
 def differ(image, expected):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of meshes for tests of scenes: edges, whether a mesh is closed, its volume and areas."""
+"""Properties of meshes for tests of scenes: edges, whether a mesh is
+closed, its volume and areas.
+"""
 
 from collections import Counter
 

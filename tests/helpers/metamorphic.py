@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes of a scene that change nothing of its image, or scale it: descriptions of built-in scenes, changed.
+"""Changes of a scene that change nothing of its image, or scale it: descriptions of
+built-in scenes, changed.
 
-A description is the dictionary that `mi.load_dict` takes. Meshes in it are Mitsuba's, and are changed
-in place: each change builds its scene again.
+A description is the dictionary that `mi.load_dict` takes. Meshes in it are Mitsuba's, and are
+changed in place: each change builds its scene again.
 """
 
 from collections.abc import Sequence
@@ -41,7 +42,9 @@ def lights(scene: Description) -> list[str]:
 
 
 def only(scene: Description, names: Sequence[str]) -> Description:
-    """Return a scene with these lights alone; other area lights stay where they are, and send nothing."""
+    """Return a scene with these lights alone; other area lights stay where
+    they are, and send nothing.
+    """
     dark = set(lights(scene)) - set(names)
     kept = {name: part for name, part in scene.items() if name not in dark or "emitter" in part}
     for name in dark & kept.keys():
@@ -52,7 +55,9 @@ def only(scene: Description, names: Sequence[str]) -> Description:
 def brighter(scene: Description, factor: float) -> Description:
     """Return a scene whose lights send so many times as much light."""
     names = lights(scene)
-    return {name: _brighter(part, factor) if name in names else part for name, part in scene.items()}
+    return {
+        name: _brighter(part, factor) if name in names else part for name, part in scene.items()
+    }
 
 
 def _brighter(part: Description, factor: float) -> Description:
@@ -65,7 +70,9 @@ def _brighter(part: Description, factor: float) -> Description:
 
 
 def larger(scene: Description, factor: float) -> Description:
-    """Return a scene with all lengths times a factor that looks the same: irradiance and optical depths stay."""
+    """Return a scene with all lengths times a factor that looks the same: irradiance
+    and optical depths stay.
+    """
     scene = moved(scene, np.diag([factor, factor, factor, 1.0]))
     return {
         name: _brighter(part, factor**2) if isinstance(part, dict) and "intensity" in part else part
@@ -104,7 +111,9 @@ def _moved(part: Any, matrix: Array, scale: float) -> Any:
         part[clip] *= scale
     if part.get("type") == "heightfog":
         return _moved_layers(part, float(matrix[2, 3]), scale)
-    if "sigma_t" in part and not (isinstance(part["sigma_t"], dict) and part["sigma_t"]["type"] == "heightfog"):
+    if "sigma_t" in part and not (
+        isinstance(part["sigma_t"], dict) and part["sigma_t"]["type"] == "heightfog"
+    ):
         part["scale"] = part.get("scale", 1.0) / scale
     return part
 
@@ -135,7 +144,9 @@ def _moved_mesh(mesh: Any, matrix: Array, scale: float) -> Any:
 
 
 def _moved_grid(medium: Any, matrix: Array, scale: float) -> Description:
-    """Return a medium of a density grid, moved: the place of a grid is no parameter, and it is made again."""
+    """Return a medium of a density grid, moved: the place of a grid is no
+    parameter, and it is made again.
+    """
     inside = mi.traverse(medium)
     box = next(part for part in inside.hierarchy if part.class_name() == "GridVolume").bbox()
     low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (box.min, box.max))
@@ -175,7 +186,9 @@ def with_body(scene: Description, distance: float) -> Description:
 
 
 def another_light(scene: Description) -> Description:
-    """Return a light beside those of a scene: a sun where there is one, a lamp in view elsewhere."""
+    """Return a light beside those of a scene: a sun where there is one,
+    a lamp in view elsewhere.
+    """
     if any(scene[name]["type"] == "directional" for name in lights(scene)):
         irradiance = {"type": "rgb", "value": [2.0, 1.0, 3.0]}
         return {"type": "directional", "direction": [0.3, 0.5, -0.8], "irradiance": irradiance}

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes on which silhouettes and shadow planes go wrong, for tests: each returns (vertices (n, 3), faces (m, 3)).
+"""Meshes on which silhouettes and shadow planes go wrong, for tests: each returns
+(vertices (n, 3), faces (m, 3)).
 
-`SOUND` are closed and oriented outwards, `AWKWARD` each have the one flaw that their docstring names, `ALL` are both.
-Arbitrary numbers throughout; no vertex occurs twice within a mesh.
+`SOUND` are closed and oriented outwards, `AWKWARD` each have the one flaw that their docstring
+names, `ALL` are both. Arbitrary numbers throughout; no vertex occurs twice within a mesh.
 """
 
 import numpy as np
 
-from airlight.validation.scenes.meshes import Mesh, box, grid, icosphere, joined, placed, rotation, torus
+from airlight.validation.scenes.meshes import (
+    Mesh,
+    box,
+    grid,
+    icosphere,
+    joined,
+    placed,
+    rotation,
+    torus,
+)
 
 _TURN = rotation((0.3, 1.0, -0.2), 27.1)
 
@@ -24,7 +34,9 @@ def closed_box() -> Mesh:
 
 
 def closed_torus() -> Mesh:
-    """Return a closed ring of genus 1: seen from near its plane its silhouette has folds and crosses itself."""
+    """Return a closed ring of genus 1: seen from near its plane its silhouette has
+    folds and crosses itself.
+    """
     return placed(torus(0.53, 0.19, (31, 17)), (0.07, 0.03, -0.13), _TURN)
 
 
@@ -41,27 +53,36 @@ def open_cylinder(sides: int = 13) -> Mesh:
     vertices = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (-0.31, 0.43)])
     i = np.arange(sides)
     j = (i + 1) % sides
-    faces = np.concatenate([np.stack([i, j, sides + j], axis=1), np.stack([i, sides + j, sides + i], axis=1)])
+    faces = np.concatenate(
+        [np.stack([i, j, sides + j], axis=1), np.stack([i, sides + j, sides + i], axis=1)]
+    )
     return placed((vertices, faces), (0.05, 0.02, 0.09), _TURN)
 
 
 def moebius_strip(steps: int = 24) -> Mesh:
-    """Return a strip with half a twist: one border, and a seam of one edge that both its triangles run along alike."""
+    """Return a strip with half a twist: one border, and a seam of one edge that both its
+    triangles run along alike.
+    """
     angle = 2 * np.pi * np.arange(steps) / steps
     axis = np.stack([np.cos(angle), np.sin(angle), np.zeros(steps)], axis=1)
-    across = np.cos(angle / 2)[:, None] * axis + np.sin(angle / 2)[:, None] * np.array([0.0, 0.0, 1.0])
+    across = np.cos(angle / 2)[:, None] * axis + np.sin(angle / 2)[:, None] * np.array(
+        [0.0, 0.0, 1.0]
+    )
     vertices = np.concatenate([0.59 * axis - 0.17 * across, 0.59 * axis + 0.17 * across])
     low, high = np.arange(steps), np.arange(steps) + steps
     # After one turn the two borders have changed places.
     next_low, next_high = np.append(low[1:], high[0]), np.append(high[1:], low[0])
-    faces = np.concatenate([np.stack([low, next_low, next_high], axis=1), np.stack([low, next_high, high], axis=1)])
+    faces = np.concatenate(
+        [np.stack([low, next_low, next_high], axis=1), np.stack([low, next_high, high], axis=1)]
+    )
     return placed((vertices, faces), (0.0, 0.0, 0.0), _TURN)
 
 
 def boxes_sharing_an_edge() -> Mesh:
     """Return two closed boxes that have one edge in common, at which four triangles meet."""
     corners, faces = box((1.0, 1.0, 1.0))
-    # The edge from corner 3, (+, +, -), to corner 7, (+, +, +), is the other box's from corner 0 to corner 4.
+    # The edge from corner 3, (+, +, -), to corner 7, (+, +, +), is the other box's
+    # from corner 0 to corner 4.
     other = np.array([3, 8, 9, 10, 7, 11, 12, 13])
     shifted = corners + np.array([1.0, 1.0, 0.0])
     vertices = np.concatenate([corners, np.delete(shifted, [0, 4], axis=0)])
@@ -74,23 +95,31 @@ def boxes_sharing_a_corner() -> Mesh:
     corners, faces = box((1.0, 1.0, 1.0))
     other = np.array([7, *range(8, 15)])
     vertices = np.concatenate([corners, corners[1:] + 1.0])
-    return placed((0.41 * vertices, np.concatenate([faces, other[faces]])), (-0.07, 0.03, 0.01), _TURN)
+    return placed(
+        (0.41 * vertices, np.concatenate([faces, other[faces]])), (-0.07, 0.03, 0.01), _TURN
+    )
 
 
 def doubled_faces() -> Mesh:
-    """Return a closed sphere whose first seven faces occur twice, the copies with their corners rotated."""
+    """Return a closed sphere whose first seven faces occur twice, the copies
+    with their corners rotated.
+    """
     vertices, faces = closed_sphere(1)
     return vertices, np.concatenate([faces, np.roll(faces[:7], 1, axis=1)])
 
 
 def degenerate_faces() -> Mesh:
-    """Return a closed box with a line for a triangle and a point for another: neither has an area."""
+    """Return a closed box with a line for a triangle and a point for
+    another: neither has an area.
+    """
     vertices, faces = closed_box()
     return vertices, np.concatenate([faces, [[0, 1, 0], [5, 5, 5]]])
 
 
 def sliver() -> Mesh:
-    """Return a closed box one edge of which is split: a triangle of no area closes the gap between the two halves."""
+    """Return a closed box one edge of which is split: a triangle of no area closes the
+    gap between the two halves.
+    """
     vertices, faces = box((0.61, 0.47, 0.83))
     a, b = faces[0][0], faces[0][1]
     middle = 0.5 * (vertices[a] + vertices[b])
@@ -114,19 +143,29 @@ def mixed_winding() -> Mesh:
 
 
 def crossing_spheres() -> Mesh:
-    """Return two closed spheres that run into one another: each is sound, but no edge runs where they meet."""
-    return joined([closed_sphere(2), placed(closed_sphere(2), (0.37, 0.11, -0.07), rotation((1, 0.2, 0.5), 31.0))])
+    """Return two closed spheres that run into one another: each is sound, but no
+    edge runs where they meet.
+    """
+    return joined(
+        [
+            closed_sphere(2),
+            placed(closed_sphere(2), (0.37, 0.11, -0.07), rotation((1, 0.2, 0.5), 31.0)),
+        ]
+    )
 
 
 def nested_spheres() -> Mesh:
-    """Return a small closed sphere within a large one: shadow planes of the inner one do not count."""
+    """Return a small closed sphere within a large one: shadow planes of
+    the inner one do not count.
+    """
     vertices, faces = closed_sphere(2)
     centre = vertices.mean(axis=0)
     return joined([(vertices, faces), (centre + 0.41 * (vertices - centre), faces)])
 
 
 def flat_roof() -> tuple[Mesh, np.ndarray]:
-    """Return a closed box whose top has 2 * 4 * 4 coplanar triangles, and a light that lies in their plane.
+    """Return a closed box whose top has 2 * 4 * 4 coplanar triangles, and a light
+    that lies in their plane.
 
     The numbers are exact in binary, so that the light's height over the plane is exactly 0.
     """

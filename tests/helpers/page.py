@@ -12,7 +12,17 @@ from PIL import Image as Picture
 
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reports.data.records import Report, named_files
-from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
+from tests.helpers.reports import (
+    agreement,
+    checked,
+    engine,
+    entry,
+    errors,
+    flip,
+    report_of,
+    scene,
+    settings,
+)
 
 WIDTH, HEIGHT = 32, 24
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -59,7 +69,9 @@ class Page(HTMLParser):
 
     def script(self, name):
         """The content of the script element with an id."""
-        (script,) = ("".join(parts) for attributes, parts in self.scripts if attributes.get("id") == name)
+        (script,) = (
+            "".join(parts) for attributes, parts in self.scripts if attributes.get("id") == name
+        )
         return script
 
     @property
@@ -87,7 +99,11 @@ _HALL = scene(
     reference=_REFERENCE,
     agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
     exposure=2.5,
-    files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
+    files={
+        "picture": "s/reference.png",
+        "exr": "s/reference.exr",
+        "airlight": "s/reference-airlight.png",
+    },
 )
 DATA: dict[str, Any] = report_of(
     [_HALL],
@@ -104,7 +120,9 @@ DATA: dict[str, Any] = report_of(
 
 
 def images() -> dict[str, dict[str, np.ndarray]]:
-    """The layers of the files: `good` is wrong by 3e-6, `flat` by some per cent with one pixel that is no number."""
+    """The layers of the files: `good` is wrong by 3e-6, `flat` by some per cent with one
+    pixel that is no number.
+    """
     rng = np.random.default_rng(11)
     across, down = np.meshgrid(np.linspace(0.1, 2, WIDTH), np.linspace(0.2, 1, HEIGHT))
     airlight = (across * down)[..., None] * np.array([1.0, 0.8, 0.5])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes of boxes that tests share, and the rays of an image as the search for lit intervals takes them."""
+"""Scenes of boxes that tests share, and the rays of an image as the search for
+lit intervals takes them.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -14,7 +16,9 @@ from tests.helpers.scenes import tiny_scene
 
 
 def rays_of(reference, light=0):
-    """Return the rays of an image in their planes with a light, where they begin and end, and what is in the light."""
+    """Return the rays of an image in their planes with a light, where they begin and end,
+    and what is in the light.
+    """
     lamp = reference.lights[light]
     rays = rays_at(reference.origin, reference.direction, lamp.position)
     hits = surface_hits(reference)
@@ -32,7 +36,10 @@ def box(centre, size, **changes):
 
 def box_scene(**changes):
     """A scene of polygons: the sphere of the tiny scene replaced by boxes."""
-    boxes = {"tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)), "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13))}
+    boxes = {
+        "tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)),
+        "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13)),
+    }
     return tiny_scene(ball=None, **boxes, **changes)
 
 

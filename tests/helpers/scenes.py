@@ -7,7 +7,9 @@ import mitsuba as mi
 
 
 def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
-    """Return a sphere over a floor in fog, lit by a point light; `changes` replace or (with None) remove entries."""
+    """Return a sphere over a floor in fog, lit by a point light; `changes` replace or
+    (with None) remove entries.
+    """
     scene: dict[str, Any] = {
         "type": "scene",
         "fog": {
@@ -22,11 +24,22 @@ def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
             "fov": 49.0,
             "fov_axis": "x",
             "near_clip": 1e-4,
-            "to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.0, 0.6], [0, 0, 1]),
+            "to_world": mi.ScalarTransform4f().look_at(
+                [0.2, -4.1, 1.3], [0.1, 0.0, 0.6], [0, 0, 1]
+            ),
             "medium": {"type": "ref", "id": "fog"},
-            "film": {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "box"}},
+            "film": {
+                "type": "hdrfilm",
+                "width": size[0],
+                "height": size[1],
+                "rfilter": {"type": "box"},
+            },
         },
-        "lamp": {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}},
+        "lamp": {
+            "type": "point",
+            "position": [0.9, 0.7, 1.9],
+            "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+        },
         "ball": {
             "type": "sphere",
             "center": [0.1, 0.1, 0.7],
@@ -57,7 +70,9 @@ def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
 def bounded_medium(
     shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any
 ) -> dict[str, Any]:
-    """Return a shape that lets light pass and is filled with a homogeneous medium; `sigma_t` is grey or RGB [1/m]."""
+    """Return a shape that lets light pass and is filled with a homogeneous medium;
+    `sigma_t` is grey or RGB [1/m].
+    """
     colour = not isinstance(sigma_t, float)
     inside = {
         "type": "homogeneous",
@@ -79,7 +94,9 @@ LAMP = '<emitter type="point" id="lamp"><point name="position" value="0.7, 0.3, 
 FOG = '<float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/>'
 
 
-def scene_xml(*parts: str, fog: str = FOG, size: tuple[int, int] = (32, 24), fov: float = 39.3) -> str:
+def scene_xml(
+    *parts: str, fog: str = FOG, size: tuple[int, int] = (32, 24), fov: float = 39.3
+) -> str:
     """Return a scene file of a ball in fog under a lamp, or with `parts` instead of the lamp."""
     width, height = size
     return f"""<scene version="3.0.0"><medium type="homogeneous" id="fog">{fog}</medium>

@@ -5,7 +5,12 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.methods.published.biri2006.planes import paper_planes
-from airlight.realtime.methods.shadow_planes.plane_table import GAIN_SHIFT, GAIN_ZERO, NUMBER, light_basis
+from airlight.realtime.methods.shadow_planes.plane_table import (
+    GAIN_SHIFT,
+    GAIN_ZERO,
+    NUMBER,
+    light_basis,
+)
 from airlight.realtime.methods.shadow_planes.sweep import ray_planes
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.numerics.functions import host_diamond_angle
@@ -26,14 +31,17 @@ def planes_of(occluders, light=LIGHT, camera=CAMERA, precision="single", *, orde
     used = np.ones(len(occluders.closed), dtype=bool)
     light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
     types, towards_camera = array_types(precision), order == "paper"
-    return paper_planes(occluders, light, camera, used=used, types=types, towards_camera=towards_camera)
+    return paper_planes(
+        occluders, light, camera, used=used, types=types, towards_camera=towards_camera
+    )
 
 
 def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
-    """Return unit directions in the frame of the light, (count, 3): in bundles of sixteen, `spread` wide.
+    """Return unit directions in the frame of the light, (count, 3): in bundles
+    of sixteen, `spread` wide.
 
-    Three quarters lead to points in and behind the occluders, an eighth close by the light and an eighth away from it,
-    where all azimuths meet.
+    Three quarters lead to points in and behind the occluders, an eighth close by the light and an
+    eighth away from it, where all azimuths meet.
     """
     rng = np.random.default_rng(seed)
     tiles = count // 16
@@ -49,7 +57,9 @@ def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
 
 
 def plane_table(planes):
-    """Return ends (planes, 2, 3), first and last azimuth and gain of all planes, float64, without the padding."""
+    """Return ends (planes, 2, 3), first and last azimuth and gain of all planes,
+    float64, without the padding.
+    """
     index = planes.index
     ends = np.array(planes.ends, dtype=np.float64).reshape(-1, 2, 3)
     spans = np.array(index.spans, dtype=np.float64).reshape(-1, 2)
@@ -61,12 +71,12 @@ def plane_table(planes):
 
 
 def crossings(planes, ways):
-    """Return where rays from the camera cross planes, (rays, planes), infinite where they do not, and the layers
-    gained.
+    """Return where rays from the camera cross planes, (rays, planes), infinite where they do
+    not, and the layers gained.
 
-    The point of the ray is p a + q b, with a and b the ends of the edge and p, q >= 0, p + q >= 1 beyond the edge:
-    three linear equations. A plane that is in the table twice, parted at azimuth 0, counts where its azimuths hold the
-    ray's.
+    The point of the ray is p a + q b, with a and b the ends of the edge and p, q >= 0, p + q >= 1
+    beyond the edge: three linear equations. A plane that is in the table twice, parted at azimuth
+    0, counts where its azimuths hold the ray's.
     """
     ends, first, last, gain = plane_table(planes)
     a, b = ends[:, 0], ends[:, 1]
@@ -89,13 +99,17 @@ def crossings(planes, ways):
 
 
 def lit_lengths(planes, ways, end, *, weight=lambda x: x):
-    """Return the sum of weight(x1) - weight(x0) over the lit segments up to `end`, and whether the light reaches it."""
+    """Return the sum of weight(x1) - weight(x0) over the lit segments up to `end`, and
+    whether the light reaches it.
+    """
     x, gain = crossings(planes, ways)
     total, lit = np.zeros(len(ways)), np.zeros(len(ways), dtype=bool)
     for ray in range(len(ways)):
         order = np.argsort(x[ray])
         order = order[x[ray][order] < end[ray]]
-        layers = np.array(planes.index.layers).item() + np.concatenate([[0], np.cumsum(gain[order])])
+        layers = np.array(planes.index.layers).item() + np.concatenate(
+            [[0], np.cumsum(gain[order])]
+        )
         edges = np.concatenate([[0.0], x[ray][order], [end[ray]]])
         total[ray] = np.sum((weight(edges[1:]) - weight(edges[:-1]))[layers <= 0])
         lit[ray] = layers[-1] <= 0

@@ -49,9 +49,14 @@ def plank() -> dict[str, Any]:
     return cube(centre=PLANK_AT, sides=PLANK_SIDES, sigma_t=1.7, g=0.0)
 
 
-def fog_sphere(centre=SPHERE_AT, radius=SPHERE_RADIUS, sigma_t: Any = (0.9, 0.5, 0.7), **medium: Any) -> dict[str, Any]:
+def fog_sphere(
+    centre=SPHERE_AT, radius=SPHERE_RADIUS, sigma_t: Any = (0.9, 0.5, 0.7), **medium: Any
+) -> dict[str, Any]:
     return bounded_medium(
-        {"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium
+        {"type": "sphere", "center": list(centre), "radius": radius},
+        sigma_t,
+        (0.9, 0.4, 0.3),
+        **medium,
     )
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small scenes with a box and a sphere of fog, under a directional light or a lamp, and their airlight by a sum."""
+"""Small scenes with a box and a sphere of fog, under a directional light or a lamp, and
+their airlight by a sum.
+"""
 
 from typing import Any
 
@@ -36,7 +38,10 @@ def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any)
 def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str, Any]:
     """Return a sphere of fog."""
     return bounded_medium(
-        {"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium
+        {"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]},
+        sigma_t,
+        albedo,
+        **medium,
     )
 
 
@@ -56,10 +61,16 @@ CHORDS = {"brick": airlight_sum.box(*BRICK), "pearl": airlight_sum.ball(*PEARL)}
 
 
 def plain_airlight(reference, pixel: int, **how: Any):
-    """Return the airlight along a pixel's ray from the only light of a scene with brick and pearl, by a plain sum."""
+    """Return the airlight along a pixel's ray from the only light of a scene with brick
+    and pearl, by a plain sum.
+    """
     if reference.lights:
         light = airlight_sum.Light(reference.lights[0].position, 1.0, reference.lights[0].intensity)
     else:
-        light = airlight_sum.Light(-reference.directional[0].direction, 0.0, reference.directional[0].irradiance)
+        light = airlight_sum.Light(
+            -reference.directional[0].direction, 0.0, reference.directional[0].irradiance
+        )
     bodies, around = airlight_sum.bodies_of(reference, CHORDS)
-    return airlight_sum.airlight_sum(reference.origin, reference.direction[pixel], light, bodies, around=around, **how)
+    return airlight_sum.airlight_sum(
+        reference.origin, reference.direction[pixel], light, bodies, around=around, **how
+    )

@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Estimators of the transmittance T = exp(-tau) of a ray, and how wrong they are in a density grid.
+r"""Estimators of the transmittance T = exp(-tau) of a ray, and how wrong
+they are in a density grid.
 
-All look the extinction up at random places of a ray of the length l; a march of n steps does so at one random fraction
-of every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
+All look the extinction up at random places of a ray of the length l; a march of n steps does so at
+one random fraction of every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
 
-- **naive**: exp(-X). The exponential is convex, so by Jensen's inequality it is too bright: to second order by T v/2,
-  with the variance v of X, which falls as 1/n^2 where the extinction is smooth.
-- **ratio tracking** (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson process of
-  the density m >= sigma_t, here the largest extinction of the grid. E = exp(-int sigma_t): unbiased.
-- **unbiased ray marching** (Kettunen, d'Eon, Pantaleoni, Novak 2021): with N + 1 marches X_i, and any pivot X_j,
+- **naive**: exp(-X). The exponential is convex, so by Jensen's inequality it is too bright: to
+  second order by T v/2, with the variance v of X, which falls as 1/n^2 where the extinction is
+  smooth.
+- **ratio tracking** (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a
+  Poisson process of the density m >= sigma_t, here the largest extinction of the grid. E = exp(-int
+  sigma_t): unbiased.
+- **unbiased ray marching** (Kettunen, d'Eon, Pantaleoni, Novak 2021): with N + 1
+  marches X_i, and any pivot X_j,
 
       T = exp(-X_j) sum_k (X_j - tau)^k/k!,     (X_j - tau)^k = E[m_k of X_j - X_i, i != j],
 
-  with the elementary symmetric means m_k, cut at a random order N by roulette: order 0 in nine of ten cases, else
-  2 at least, and from there on k with the probability 2/k (their aggressive Bhanot-Kennedy roulette); term k is divided
-  by the probability to get there. The mean over all pivots is taken. Without their affine control variate.
-- **jackknife** (Peters 2025): exp(-(X_1 + X_2)/2) cos((X_1 - X_2)/2). For normal X it is the unbiased estimate of least
-  variance: E exp(-mean) = T exp(v/4), and the cosine, independent of the mean, is exp(-v/4) on average.
+  with the elementary symmetric means m_k, cut at a random order N by roulette: order 0 in nine of
+  ten cases, else 2 at least, and from there on k with the probability 2/k (their aggressive
+  Bhanot-Kennedy roulette); term k is divided by the probability to get there. The mean over all
+  pivots is taken. Without their affine control variate.
+- **jackknife** (Peters 2025): exp(-(X_1 + X_2)/2) cos((X_1 - X_2)/2). For normal X it is the
+  unbiased estimate of least variance: E exp(-mean) = T exp(v/4), and the cosine, independent of the
+  mean, is exp(-v/4) on average.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +35,8 @@ from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import GridMedium
 from airlight.validation.arrays import Array, Index
 
-Look = Callable[[Array], Array]  # fractions of a ray, any shape -> optical depth of the whole ray if all were as there
+# fractions of a ray, any shape -> optical depth of the whole ray if all were as there
+Look = Callable[[Array], Array]
 
 _ORDER_0, _SURE, _RATE = 0.9, 2, 2.0  # of the roulette
 _RAYS, _TIMES = 48, 1024
@@ -49,7 +56,9 @@ class TransmittanceError:
 
 
 def marches(look: Look, random: np.random.Generator, times: int, steps: int) -> Array:
-    """Return estimates of an optical depth, (times,), by marches that look up one fraction of all steps."""
+    """Return estimates of an optical depth, (times,), by marches that look up
+    one fraction of all steps.
+    """
     return look((np.arange(steps) + random.random((times, 1))) / steps).mean(axis=1)
 
 
@@ -74,7 +83,9 @@ def orders(random: np.random.Generator, times: int) -> Index:
 
 
 def power_series(depth: Array) -> Array:
-    """Return the estimates from as many marches as the order of the series and one, (times, order + 1)."""
+    """Return the estimates from as many marches as the order of the series and
+    one, (times, order + 1).
+    """
     order = depth.shape[1] - 1
     total = np.zeros(len(depth))
     for pivot in range(order + 1):
@@ -92,7 +103,9 @@ def power_series(depth: Array) -> Array:
     return np.asarray(total / (order + 1))
 
 
-def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant: float) -> tuple[Array, float]:
+def ratio_tracking(
+    look: Look, random: np.random.Generator, times: int, majorant: float
+) -> tuple[Array, float]:
     """Return estimates, (times,), and look-ups each, with a majorant of the optical depth."""
     count = random.poisson(majorant, times)
     most = int(count.max(initial=1))
@@ -100,22 +113,30 @@ def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant
     return np.where(np.arange(most) < count[:, None], kept, 1.0).prod(axis=1), float(count.mean())
 
 
-def transmittance_errors(reference: ReferenceScene, steps: Sequence[int]) -> list[TransmittanceError]:
-    """Return how wrong the estimators are along rays through the grid of a scene, a row for each and its steps.
+def transmittance_errors(
+    reference: ReferenceScene, steps: Sequence[int]
+) -> list[TransmittanceError]:
+    """Return how wrong the estimators are along rays through the grid of a scene, a
+    row for each and its steps.
 
-    `steps`: of the marches. Rays go between random places in the box; each has 1024 estimates by each estimator.
+    `steps`: of the marches. Rays go between random places in the box; each has 1024
+    estimates by each estimator.
     """
     medium = reference.medium
     assert isinstance(medium, GridMedium)
     random = np.random.default_rng(1)
     begin, end = medium.low + random.random((2, _RAYS, 3)) * (medium.high - medium.low)
     length = np.linalg.norm(end - begin, axis=1)
-    depth = field_of(reference).optical_depth(begin, (end - begin) / length[:, None], np.zeros(_RAYS), length)[:, 0]
+    depth = field_of(reference).optical_depth(
+        begin, (end - begin) / length[:, None], np.zeros(_RAYS), length
+    )[:, 0]
     exact = np.exp(-depth)
     found: dict[tuple[str, int], list[tuple[float, float, float, float]]] = {}
 
     def keep(name: str, count: int, values: Array, look_ups: float, variance: float = 0.0) -> None:
-        found.setdefault((name, count), []).append((look_ups, float(values.mean()), float(values.var()), variance))
+        found.setdefault((name, count), []).append(
+            (look_ups, float(values.mean()), float(values.var()), variance)
+        )
 
     for ray in range(_RAYS):
 
@@ -126,7 +147,12 @@ def transmittance_errors(reference: ReferenceScene, steps: Sequence[int]) -> lis
         for count in steps:
             one = marches(look, random, _TIMES, count)
             keep("naive", count, naive(one[:, None]), count, float(one.var()))
-            keep("jackknife", count, jackknife(np.stack([one, marches(look, random, _TIMES, count)], 1)), 2 * count)
+            keep(
+                "jackknife",
+                count,
+                jackknife(np.stack([one, marches(look, random, _TIMES, count)], 1)),
+                2 * count,
+            )
             chosen = orders(random, _TIMES)
             values = np.empty(_TIMES)
             for order in np.unique(chosen):
@@ -137,7 +163,10 @@ def transmittance_errors(reference: ReferenceScene, steps: Sequence[int]) -> lis
         majorant = length[ray] * float(medium.largest[0])
         for times in (1, 4):
             keep("ratio-tracking", times, *ratio_tracking(look, random, _TIMES, times * majorant))
-    return [_over_rays(name, count, np.array(rays), exact) for (name, count), rays in sorted(found.items())]
+    return [
+        _over_rays(name, count, np.array(rays), exact)
+        for (name, count), rays in sorted(found.items())
+    ]
 
 
 def _over_rays(name: str, count: int, rays: Array, exact: Array) -> TransmittanceError:

@@ -20,10 +20,17 @@ class Formula:
     weights: Any  #: by set
 
     def __call__(self, number, t, d, mu, cos_phi, sin_phi, mu_l):
-        weight = dr.gather(type(self.weights), self.weights, dr.uint32_array_t(type(self.weights))(number))
+        weight = dr.gather(
+            type(self.weights), self.weights, dr.uint32_array_t(type(self.weights))(number)
+        )
         sine = dr.safe_sqrt(1 - mu * mu)
         radiance = (
-            weight * (3 + mu + 0.7 * sine * cos_phi + 0.4 * sine * sin_phi) * mu_l * t / (1 + t) * dr.exp(-0.1 * d)
+            weight
+            * (3 + mu + 0.7 * sine * cos_phi + 0.4 * sine * sin_phi)
+            * mu_l
+            * t
+            / (1 + t)
+            * dr.exp(-0.1 * d)
         )
         return radiance, -0.2 * sine * cos_phi, -0.2 * sine * sin_phi, 0.5 + 0 * t
 
@@ -33,7 +40,9 @@ class Formula:
 
 
 def slabs_as_they_are(monkeypatch) -> None:
-    """Take slabs as the search finds them: light of a formula does not fade where there is none behind a point."""
+    """Take slabs as the search finds them: light of a formula does not fade where
+    there is none behind a point.
+    """
     monkeypatch.setattr(collector_search, "_reaching_behind", lambda slab, behind: slab)
     monkeypatch.setattr(collector_search, "_way", lambda slab: slab.thickness + np.inf)
 

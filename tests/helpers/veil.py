@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method that uses most of the interface: a veil before the scene that fades in from frame to frame."""
+"""A method that uses most of the interface: a veil before the scene that
+fades in from frame to frame.
+"""
 
 from dataclasses import dataclass
 
@@ -20,7 +22,9 @@ class Veil(Method):
     carries = True
     at_once = True
 
-    fraction: float = parameter(0.5, "fraction of every light that reaches the surfaces", least=0, most=1)
+    fraction: float = parameter(
+        0.5, "fraction of every light that reaches the surfaces", least=0, most=1
+    )
     veil: float = parameter(0.8, "transmittance of the veil", above=0, most=1)
     keep: float = parameter(0.25, "weight of the last frame", least=0, below=1)
 

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Area lights are read as they are; samples lie on them, share their power, and have the means of the light."""
+"""Area lights are read as they are; samples lie on them, share their power, and
+have the means of the light.
+"""
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from airlight.realtime.area_lights.points import PATTERNS, place_points
-from airlight.realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices, turned_area_light
+from airlight.realtime.area_lights.shape import (
+    AreaLight,
+    occluder_triangles,
+    occluder_vertices,
+    turned_area_light,
+)
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.meshes import rotation
 from tests.helpers.lamps import area_lamp
@@ -37,7 +44,9 @@ def test_points_lie_on_the_light_and_share_its_power(kind, pattern, points):
     else:
         np.testing.assert_allclose(from_middle @ light.normal, 0, atol=1e-12)
         u, v = (from_middle @ side / (side @ side) for side in (light.across, light.up))
-        assert np.all(np.maximum(np.abs(u), np.abs(v)) < 1 if kind == "rectangle" else np.hypot(u, v) < 1)
+        assert np.all(
+            np.maximum(np.abs(u), np.abs(v)) < 1 if kind == "rectangle" else np.hypot(u, v) < 1
+        )
     # The power of each point is pi I0.
     np.testing.assert_allclose(points * np.pi * placed.intensity, light.power, rtol=1e-12)
     assert len(np.unique(placed.positions.round(9), axis=0)) == points
@@ -51,7 +60,9 @@ def test_means_over_many_points_are_those_over_the_light(kind):
     fraction = {"rectangle": 1 / 3, "disk": 1 / 4, "sphere": 1 / 3}[kind]
     sizes = [np.linalg.norm(light.across), np.linalg.norm(light.up)]
     np.testing.assert_allclose(offsets.mean(axis=0), 0, atol=2e-3 * sizes[0])
-    np.testing.assert_allclose((offsets[:, :2] ** 2).mean(axis=0), fraction * np.square(sizes), rtol=3e-3)
+    np.testing.assert_allclose(
+        (offsets[:, :2] ** 2).mean(axis=0), fraction * np.square(sizes), rtol=3e-3
+    )
 
 
 @pytest.mark.parametrize(("kind", "fraction"), [("rectangle", 1 / 3), ("disk", 1 / 4)])
@@ -60,7 +71,9 @@ def test_a_ring_has_the_second_moments_of_its_light(kind, fraction, points):
     light = light_of(kind)
     offsets = (place_points(light, points, "ring").positions - light.middle) @ AXES[:2].T
     sizes = np.array([np.linalg.norm(light.across), np.linalg.norm(light.up)])
-    np.testing.assert_allclose(offsets.T @ offsets / points, np.diag(fraction * sizes**2), atol=1e-12)
+    np.testing.assert_allclose(
+        offsets.T @ offsets / points, np.diag(fraction * sizes**2), atol=1e-12
+    )
     np.testing.assert_allclose(place_points(light, 1, "ring").positions, [light.middle], atol=1e-12)
 
 
@@ -77,12 +90,16 @@ def test_a_sphere_shines_alike_in_all_directions(pattern):
 def test_a_turned_light_turns_its_points():
     turn, about = rotation((0.1, 0.2, 1.0), 71.0), np.array([0.3, 0.1, -0.7])
     light = light_of("disk")
-    before, after = (place_points(one, 7, "sobol") for one in (light, turned_area_light(light, about, turn)))
-    np.testing.assert_allclose(after.positions, about + (before.positions - about) @ turn.T, atol=1e-12)
+    before, after = (
+        place_points(one, 7, "sobol") for one in (light, turned_area_light(light, about, turn))
+    )
+    np.testing.assert_allclose(
+        after.positions, about + (before.positions - about) @ turn.T, atol=1e-12
+    )
     np.testing.assert_allclose(after.normals, before.normals @ turn.T, atol=1e-12)
 
 
-# The triangles that stand for a black light --------------------------------------------------------------------------
+# The triangles that stand for a black light -------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "disk"])
@@ -100,10 +117,12 @@ def test_a_sphere_is_closed_and_nearly_as_large():
     edges = directed_edges(faces)
     assert set(edges.values()) == {1}
     assert {(b, a) for a, b in edges} == set(edges)
-    assert volume(vertices - MIDDLE, faces) == pytest.approx(4 / 3 * np.pi * light.radius**3, rel=5e-3)
+    assert volume(vertices - MIDDLE, faces) == pytest.approx(
+        4 / 3 * np.pi * light.radius**3, rel=5e-3
+    )
 
 
-# Reading, and refusals by the name of the shape ----------------------------------------------------------------------
+# Reading, and refusals by the name of the shape ---------------------------------------------------
 
 
 def read(**changes):
@@ -114,7 +133,9 @@ def test_a_lamp_of_null_is_nothing_but_light(variant):
     scene = read(lamp=area_lamp("disk", size=0.29, material={"type": "null"}))
     assert not scene.area_lights[0].opaque
     assert "lamp" not in [shape.id() for shape in scene.geometry.shapes()]
-    assert "lamp" in [shape.id() for shape in read(lamp=area_lamp("disk", size=0.29)).geometry.shapes()]
+    assert "lamp" in [
+        shape.id() for shape in read(lamp=area_lamp("disk", size=0.29)).geometry.shapes()
+    ]
 
 
 @pytest.mark.parametrize("flipped", [False, True])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Filters of images are their definition, let nothing leak across an edge in depth, and give numbers everywhere."""
+"""Filters of images are their definition, let nothing leak across an edge in depth, and
+give numbers everywhere.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -19,7 +21,9 @@ from airlight.realtime.image_filters import (
 
 
 def slow_bilateral(image, *, hd, guides=(), support=3.0):
-    """Return an image (height, width) filtered; guides are pairs of an image (height, width[, n]) and its width."""
+    """Return an image (height, width) filtered; guides are pairs of an image (height,
+    width[, n]) and its width.
+    """
     height, width = image.shape
     reach = int(np.ceil(support * hd))
     filtered = np.empty_like(image, dtype=np.float64)
@@ -29,7 +33,9 @@ def slow_bilateral(image, *, hd, guides=(), support=3.0):
             for r in range(max(row - reach, 0), min(row + reach, height - 1) + 1):
                 for c in range(max(column - reach, 0), min(column + reach, width - 1) + 1):
                     exponent = ((r - row) ** 2 + (c - column) ** 2) / hd**2
-                    exponent += sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides)
+                    exponent += sum(
+                        np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides
+                    )
                     fraction = np.exp(-0.5 * exponent)
                     total, weighed = total + fraction, weighed + fraction * image[r, c]
             filtered[row, column] = weighed / total
@@ -37,7 +43,9 @@ def slow_bilateral(image, *, hd, guides=(), support=3.0):
 
 
 def slow_tile_average(image, *, guides=()):
-    """Return the mean over 5 x 5 pixels, those at the ends with half a weight, weighted by guides."""
+    """Return the mean over 5 x 5 pixels, those at the ends with half a
+    weight, weighted by guides.
+    """
     fractions = np.outer([0.5, 1, 1, 1, 0.5], [0.5, 1, 1, 1, 0.5])
     height, width = image.shape
     averaged = np.empty_like(image, dtype=np.float64)
@@ -47,7 +55,10 @@ def slow_tile_average(image, *, guides=()):
             for (down, right), fraction in np.ndenumerate(fractions):
                 r, c = row + down - 2, column + right - 2
                 if 0 <= r < height and 0 <= c < width:
-                    fraction *= np.exp(-0.5 * sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides))
+                    fraction *= np.exp(
+                        -0.5
+                        * sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides)
+                    )
                     total, weighed = total + fraction, weighed + fraction * image[r, c]
             averaged[row, column] = weighed / total
     return averaged
@@ -75,11 +86,17 @@ def filtered(name, image, *, hd=1.7, hr=0.5, depth=None, support=3.0):
     own = () if np.isinf(hr) else (Guide(lanes, hr),)
     guides = own if depth is None else (depth_guide(as_lanes(depth), 0.1),)
     if name == "levels":
-        return as_image(bilateral_of_levels(lanes, raster, levels=LEVELS, hd=hd, hr=hr, support=support))
+        return as_image(
+            bilateral_of_levels(lanes, raster, levels=LEVELS, hd=hd, hr=hr, support=support)
+        )
     if name == "tile":
         return as_image(tile_average(lanes, raster, guides=guides))
     if name == "varying":
-        return as_image(separable(lanes, raster, hd=mi.Float(hd) + 0 * lanes, guides=guides, support=support, most=hd))
+        return as_image(
+            separable(
+                lanes, raster, hd=mi.Float(hd) + 0 * lanes, guides=guides, support=support, most=hd
+            )
+        )
     function = {"bilateral": bilateral, "separable": separable}[name]
     return as_image(function(lanes, raster, hd=hd, guides=guides, support=support))
 
@@ -87,8 +104,12 @@ def filtered(name, image, *, hd=1.7, hr=0.5, depth=None, support=3.0):
 JOINT = ("bilateral", "separable", "varying", "tile")
 
 
-@pytest.mark.claim("filters-are-their-definition", tolerance="2e-6: float32 sums of up to 400 weights")
-@pytest.mark.parametrize(("name", "hr"), [("bilateral", 0.5), ("levels", 0.5), ("separable", np.inf)])
+@pytest.mark.claim(
+    "filters-are-their-definition", tolerance="2e-6: float32 sums of up to 400 weights"
+)
+@pytest.mark.parametrize(
+    ("name", "hr"), [("bilateral", 0.5), ("levels", 0.5), ("separable", np.inf)]
+)
 def test_the_sums_are_those_of_the_definition(variant, name, hr):
     image = noise()
     guides = () if np.isinf(hr) else ((image, hr),)
@@ -98,7 +119,9 @@ def test_the_sums_are_those_of_the_definition(variant, name, hr):
 
 def test_the_tile_average_is_its_definition(variant):
     image, depth = noise(), np.random.default_rng(4).uniform(1, 1.5, (HEIGHT, WIDTH))
-    np.testing.assert_allclose(filtered("tile", image, hr=np.inf), slow_tile_average(image), atol=2e-6)
+    np.testing.assert_allclose(
+        filtered("tile", image, hr=np.inf), slow_tile_average(image), atol=2e-6
+    )
     wanted = slow_tile_average(image, guides=((np.log(depth), 0.1),))
     np.testing.assert_allclose(filtered("tile", image, depth=depth), wanted, atol=1e-5)
 
@@ -113,7 +136,9 @@ def test_nothing_leaks_across_a_depth_edge(variant, name):
 
 @pytest.mark.parametrize("name", JOINT)
 def test_sky_and_zero_depth_give_numbers(variant, name):
-    depth = np.random.default_rng(6).choice([0.0, -1.0, np.nan, np.inf, 2.0, 2.05, 1e-40], (HEIGHT, WIDTH))
+    depth = np.random.default_rng(6).choice(
+        [0.0, -1.0, np.nan, np.inf, 2.0, 2.05, 1e-40], (HEIGHT, WIDTH)
+    )
     image = noise()
     result = filtered(name, image, depth=depth)
     assert np.all(np.isfinite(result))
@@ -124,7 +149,12 @@ def test_sky_and_zero_depth_give_numbers(variant, name):
 def test_levels_leave_out_what_is_not_there(variant):
     image, there = noise(), np.random.default_rng(9).uniform(size=(HEIGHT, WIDTH)) < 0.7
     lanes = bilateral_of_levels(
-        as_lanes(image), Raster(WIDTH, HEIGHT), levels=LEVELS, hd=1.7, hr=0.5, there=mi.Bool(there.ravel())
+        as_lanes(image),
+        Raster(WIDTH, HEIGHT),
+        levels=LEVELS,
+        hd=1.7,
+        hr=0.5,
+        there=mi.Bool(there.ravel()),
     )
     # Far away from all by a second guide is what is not there.
     wanted = slow_bilateral(image, hd=1.7, guides=((image, 0.5), (np.where(there, 0.0, 1e3), 1.0)))
@@ -133,7 +163,9 @@ def test_levels_leave_out_what_is_not_there(variant):
 
 
 def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
-    """Where the width is that of one pixel, so is the result of the Gaussian of this width along one row."""
+    """Where the width is that of one pixel, so is the result of the Gaussian of
+    this width along one row.
+    """
     row = np.random.default_rng(8).uniform(size=40)
     widths = np.where(np.arange(40) < 20, 0.8, 2.5)
     raster = Raster(40, 1)
@@ -143,7 +175,7 @@ def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
         np.testing.assert_allclose(varying[widths == hd], wanted[widths == hd], atol=1e-6)
 
 
-# Up-sampling: bilinear on a surface, the nearest depth elsewhere -----------------------------------------------------
+# Up-sampling: bilinear on a surface, the nearest depth elsewhere ----------------------------------
 
 
 COLUMNS, ROWS = 24, 16
@@ -157,7 +189,13 @@ def upsampled(image, depth, scale):
     small_guide = Guide(mi.Float(np.array(guide.values)[pixel]), guide.width)
     column, row = large.places()
     lanes = upsample(
-        mi.Float(image.ravel()[pixel]), small_guide, guide.values, small, scale=scale, column=column, row=row
+        mi.Float(image.ravel()[pixel]),
+        small_guide,
+        guide.values,
+        small,
+        scale=scale,
+        column=column,
+        row=row,
     )
     return np.array(lanes).reshape(ROWS, COLUMNS)
 
@@ -180,7 +218,9 @@ def test_upsampling_leaks_nothing_across_a_depth_edge(variant, scale):
 
 
 def test_a_thin_bar_takes_the_nearest_depth(variant):
-    """A bar of one pixel between columns 6 and 10 of the small image, which are 4 and 2.5 m away."""
+    """A bar of one pixel between columns 6 and 10 of the small image,
+    which are 4 and 2.5 m away.
+    """
     depth, image = np.full((ROWS, COLUMNS), 4.0), np.ones((ROWS, COLUMNS))
     depth[:, 9:], image[:, 9:] = 2.5, 0.5
     depth[:, 8] = 1.0
@@ -189,4 +229,6 @@ def test_a_thin_bar_takes_the_nearest_depth(variant):
 
 def test_upsampling_gives_numbers_for_sky_and_zero_depth(variant):
     depth = np.random.default_rng(2).choice([0.0, np.inf, np.nan, 2.0], (ROWS, COLUMNS))
-    assert np.all(np.isfinite(upsampled(np.random.default_rng(3).uniform(size=depth.shape), depth, 2)))
+    assert np.all(
+        np.isfinite(upsampled(np.random.default_rng(3).uniform(size=depth.shape), depth, 2))
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whatever the boundaries, and whenever intervals are added, the sum is that over the lit intervals."""
+"""Whatever the boundaries, and whenever intervals are added, the sum is
+that over the lit intervals.
+"""
 
 import drjit as dr
 import mitsuba as mi
@@ -24,11 +26,15 @@ from airlight.realtime.numerics.array_types import aligned_array
 RAYS, STEPS = 24, 7
 GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))
 WAITS = arrays(np.bool_, (RAYS, STEPS))
-PLACES = arrays(np.int64, (RAYS, STEPS + 2), elements=st.integers(0, 40)).map(lambda places: np.sort(places, axis=1))
+PLACES = arrays(np.int64, (RAYS, STEPS + 2), elements=st.integers(0, 40)).map(
+    lambda places: np.sort(places, axis=1)
+)
 
 
 def expected(layers, places, gains):
-    """Sums of b - a and of b^2 - a^2 over the lit intervals of a ray, how many they are, and whether its end is lit."""
+    """Sums of b - a and of b^2 - a^2 over the lit intervals of a ray, how many they are,
+    and whether its end is lit.
+    """
     length = square = count = 0
     opened = places[0] if layers <= 0 else None
     for place, gain in zip(places[1:-1], gains):
@@ -36,10 +42,18 @@ def expected(layers, places, gains):
         if opened is None and layers <= 0:
             opened = place
         elif opened is not None and layers > 0:
-            length, square, count = length + place - opened, square + place**2 - opened**2, count + 1
+            length, square, count = (
+                length + place - opened,
+                square + place**2 - opened**2,
+                count + 1,
+            )
             opened = None
     if opened is not None:
-        length, square, count = length + places[-1] - opened, square + places[-1] ** 2 - opened**2, count + 1
+        length, square, count = (
+            length + places[-1] - opened,
+            square + places[-1] ** 2 - opened**2,
+            count + 1,
+        )
     return length, square, count, opened is not None
 
 
@@ -49,7 +63,11 @@ def integral(a, b):
 
 def start(layers, places):
     columns = [aligned_array(mi.Float, column) for column in places.T]
-    return aligned_array(mi.Float, layers), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
+    return (
+        aligned_array(mi.Float, layers),
+        columns,
+        no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0]),
+    )
 
 
 def check(total, layers, places, gains):
@@ -60,9 +78,16 @@ def check(total, layers, places, gains):
 
 @pytest.mark.claim("sum-over-lit-intervals", tolerance="none: whole numbers")
 @settings(deadline=None, max_examples=50)
-@given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS, due=WAITS)
+@given(
+    layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)),
+    places=PLACES,
+    gains=GAINS,
+    due=WAITS,
+)
 def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains, due):
-    """As shadow planes use it: until another one closes, or until it is due; the rest at the end of the ray."""
+    """As shadow planes use it: until another one closes, or until it is due; the
+    rest at the end of the ray.
+    """
     over, columns, intervals = start(layers, places)
     opened = columns[0]
     for step in range(STEPS):
@@ -90,12 +115,14 @@ def test_intervals_that_are_added_at_once(variant, layers, places, gains):
     check(add_waiting(intervals, integral).total, layers, places, gains)
 
 
-# The queue of the nearest crossings: ties, infinities, too many ------------------------------------------------------
+# The queue of the nearest crossings: ties, infinities, too many -----------------------------------
 
 
 QUEUES, COUNT, LENGTH = 16, 9, 4
 # Few values, so that many are equal; 0 and infinity stand for no crossing.
-KEYS = arrays(np.float32, (QUEUES, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf]))
+KEYS = arrays(
+    np.float32, (QUEUES, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf])
+)
 
 
 def in_order(keys):
@@ -129,7 +156,9 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, keys):
     real = kept != none
     np.testing.assert_array_equal(gains[real], order[:, :LENGTH][real] + 1)
     # Nothing is lost in secret: what is not in the queue came out.
-    others = np.sort(np.concatenate([rows(queue.key), rows([key for key, _ in out])], axis=1), axis=1)
+    others = np.sort(
+        np.concatenate([rows(queue.key), rows([key for key, _ in out])], axis=1), axis=1
+    )
     padding = np.full((QUEUES, LENGTH), none, dtype=np.float32)
     np.testing.assert_array_equal(others, np.sort(np.concatenate([keys, padding], axis=1), axis=1))
 

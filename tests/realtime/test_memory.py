@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Work may use the least of the machine's memory and its containers' limits, and with CUDA the GPU's."""
+"""Work may use the least of the machine's memory and its containers' limits,
+and with CUDA the GPU's.
+"""
 
 import os
 
@@ -31,16 +33,26 @@ def limits(variant, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("own", "files", "least"),
     [
-        ("0::/a/b\n", {"a/b/memory.max": "max\n", "a/memory.max": "2000000\n", "memory.max": "max"}, 2 * 10**6),
+        (
+            "0::/a/b\n",
+            {"a/b/memory.max": "max\n", "a/memory.max": "2000000\n", "memory.max": "max"},
+            2 * 10**6,
+        ),
         # Docker without a namespace of its own: the path is the machine's, and is not there.
         ("0::/docker/0123\n", {"memory.max": "3000000\n"}, 3 * 10**6),
-        ("5:cpu:/a\n4:memory:/a\n0::/\n", {"memory/a/memory.limit_in_bytes": "4000000\n"}, 4 * 10**6),
+        (
+            "5:cpu:/a\n4:memory:/a\n0::/\n",
+            {"memory/a/memory.limit_in_bytes": "4000000\n"},
+            4 * 10**6,
+        ),
         ("0::/\n", {"memory.max": "max\n"}, MACHINE),
     ],
 )
 def test_the_least_limit_counts(limits, own, files, least):
     limits(own, files)
-    assert usable_memory() == Memory(least, "this machine has" if least == MACHINE else "this container may use")
+    assert usable_memory() == Memory(
+        least, "this machine has" if least == MACHINE else "this container may use"
+    )
 
 
 def test_the_message_names_the_container(limits):

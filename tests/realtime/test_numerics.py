@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounded functions keep the errors that their docstrings state; what is recorded is recorded once, and ends well."""
+"""Bounded functions keep the errors that their docstrings state; what is recorded is
+recorded once, and ends well.
+"""
 
 import gc
 import threading
@@ -14,13 +16,21 @@ from airlight.realtime.frame.renderer import frame_renderer, run_stages
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.numerics.array_types import array_types
-from airlight.realtime.numerics.functions import WIDEST, exp2_bounded, exp_bounded, exp_expm1_bounded, sinh_bounded
+from airlight.realtime.numerics.functions import (
+    WIDEST,
+    exp2_bounded,
+    exp_bounded,
+    exp_expm1_bounded,
+    sinh_bounded,
+)
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.scene.animate import read_objects, turned_objects
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.loading import load_scene
 
-WHOLE = np.append(np.linspace(-87, 88, 1_000_001), np.outer([-1, 1], np.geomspace(1e-30, 1, 10_000)))
+WHOLE = np.append(
+    np.linspace(-87, 88, 1_000_001), np.outer([-1, 1], np.geomspace(1e-30, 1, 10_000))
+)
 
 
 @pytest.mark.parametrize(
@@ -28,14 +38,19 @@ WHOLE = np.append(np.linspace(-87, 88, 1_000_001), np.outer([-1, 1], np.geomspac
     [
         (exp_bounded, np.exp, np.linspace(-87, 88, 2_000_001)),
         (exp2_bounded, np.exp2, np.linspace(-125, 125, 1_000_001)),
-        (sinh_bounded, np.sinh, np.append(np.linspace(-WIDEST, WIDEST, 100_000), np.geomspace(1e-30, 1, 1000))),
+        (
+            sinh_bounded,
+            np.sinh,
+            np.append(np.linspace(-WIDEST, WIDEST, 100_000), np.geomspace(1e-30, 1, 1000)),
+        ),
     ],
     ids=["exp", "exp2", "sinh"],
 )
 def test_relative_error_over_the_stated_range(variant, function, exact, x):
     x = x.astype(np.float32)
     value = np.array(function(mi.Float(x)), dtype=np.float64)
-    np.testing.assert_allclose(value, exact(x.astype(np.float64)), rtol=2e-7)  # stated in the docstrings
+    # stated in the docstrings
+    np.testing.assert_allclose(value, exact(x.astype(np.float64)), rtol=2e-7)
 
 
 @pytest.mark.parametrize(("precision", "error"), [("single", 5e-7), ("double", 2e-15)])
@@ -64,13 +79,16 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     function = Frozen(doubled)
     arguments = [dr.opaque(mi.Float, value, 5) for value in (1.0, 2.0, 3.0)]
     assert [float(function(argument)[0]) for argument in arguments] == [2, 4, 6]
-    # Names that the function takes from its surroundings are inputs: the list changes, and it is recorded again.
+    # Names that the function takes from its surroundings are inputs: the list changes,
+    # and it is recorded again.
     assert seen == [False] * function.n_recordings
     assert seen
 
 
 def test_nothing_is_collected_until_the_last_of_two_threads_is_done(variant, collecting):
-    """The collector is one for all threads: the first to return must not switch it on under the second."""
+    """The collector is one for all threads: the first to return must not
+    switch it on under the second.
+    """
     entered, ends, enabled = threading.Event(), threading.Event(), []
 
     def first(x):
@@ -98,7 +116,9 @@ def _call(function):
 
 @pytest.mark.parametrize("in_loop", [False, True])
 def test_an_interrupt_in_a_recording_is_raised_after_it(variant, in_loop):
-    """Dr.Jit answers an exception in a recording by aborting a later one: a notebook's kernel died."""
+    """Dr.Jit answers an exception in a recording by aborting a later one:
+    a notebook's kernel died.
+    """
     interrupts = [KeyboardInterrupt()]
 
     def raised(x):
@@ -109,7 +129,9 @@ def test_an_interrupt_in_a_recording_is_raised_after_it(variant, in_loop):
     def recorded(x):
         if not in_loop:
             return raised(x)
-        return dr.while_loop((mi.UInt32(0), x), lambda i, x: i < 1, lambda i, x: (i + 1, raised(x)))[1]
+        return dr.while_loop(
+            (mi.UInt32(0), x), lambda i, x: i < 1, lambda i, x: (i + 1, raised(x))
+        )[1]
 
     function, argument = Frozen(recorded), dr.opaque(mi.Float, 1.0, 5)
     with pytest.raises(KeyboardInterrupt):
@@ -131,7 +153,8 @@ def test_an_exception_whose_causes_form_a_circle_is_raised(variant):
 
 
 def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
-    """Dr.Jit records again where the memory of an array is aligned in another way, and NumPy's is by chance.
+    """Dr.Jit records again where the memory of an array is aligned in another way,
+    and NumPy's is by chance.
 
     The second recording is for vertices that are aligned, after Mitsuba's own, which need not be.
     """

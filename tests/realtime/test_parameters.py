@@ -33,13 +33,20 @@ def refused(words):
     ("given", "words"),
     [
         ({"steps": -1}, "steps: got -1, expected a whole number from 1 to 64"),
-        ({"fraction": 0.0}, "fraction: got 0.0, expected a finite number above 0 up to, but not, 1 [1/m]"),
+        (
+            {"fraction": 0.0},
+            "fraction: got 0.0, expected a finite number above 0 up to, but not, 1 [1/m]",
+        ),
         ({"fraction": float("nan")}, "fraction: got nan, expected"),
-        ({"word": "unevn"}, "word: got 'unevn', expected one of even, uneven; did you mean 'uneven'?"),
+        (
+            {"word": "unevn"},
+            "word: got 'unevn', expected one of even, uneven; did you mean 'uneven'?",
+        ),
         ({"free": -1.0}, "free: expected on=false with a value below 0"),
         (
             {"step": 3},
-            "method fog: got a parameter 'step', expected one of: steps, fraction, word, on, free; did you mean",
+            "method fog: got a parameter 'step', expected one of: steps, fraction, word, on, free; "
+            "did you mean",
         ),
         ({"steps": "1.5"}, "method fog: steps got '1.5', expected a whole number"),
         ({"on": "maybe"}, "method fog: on got 'maybe', expected true or false"),
@@ -54,5 +61,11 @@ def test_words_become_values():
     parameters = read_parameters(
         "fog", Fog, {"steps": " 0 ", "fraction": "0.25", "word": "uneven", "on": "no", "free": -1}
     )
-    assert values(parameters) == {"steps": 0, "fraction": 0.25, "word": "uneven", "on": False, "free": -1.0}
+    assert values(parameters) == {
+        "steps": 0,
+        "fraction": 0.25,
+        "word": "uneven",
+        "on": False,
+        "free": -1.0,
+    }
     assert values(read_parameters("fog", Fog, {})) == defaults(Fog)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow maps are never read outside, and a plane never shadows itself; frames show that maps say what rays say."""
+"""Shadow maps are never read outside, and a plane never shadows itself; frames show
+that maps say what rays say.
+"""
 
 import drjit as dr
 import mitsuba as mi
@@ -23,7 +25,12 @@ def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
     odd = np.array([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.0, 1.0])
     points = np.array(np.meshgrid(odd, odd, odd)).reshape(3, -1)
     place = np.array(light.position).reshape(3, 1)
-    assert np.array(lit_in_map(shadow_map, light, mi.Vector3f(np.hstack([points, place + points, place])))).size == 687
+    assert (
+        np.array(
+            lit_in_map(shadow_map, light, mi.Vector3f(np.hstack([points, place + points, place])))
+        ).size
+        == 687
+    )
 
 
 def test_a_plane_never_shadows_itself(variant):

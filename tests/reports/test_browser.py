@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a report and the view in a real browser: what they show is what files hold, and they load nothing."""
+"""The page of a report and the view in a real browser: what they show is what files
+hold, and they load nothing.
+"""
 
 import shutil
 import signal
@@ -26,7 +28,11 @@ def browser():
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="playwright drives the browser; see the extra `test`"
     )
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    path = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     if path is None:
         pytest.skip("no Chromium on this machine; Debian's package is chromium")
     with playwright.sync_playwright() as running:
@@ -68,7 +74,9 @@ def layer(folder, name):
 
 def as_number(words):
     mantissa, _, power = words.replace("\N{MINUS SIGN}", "-").removesuffix(" %").partition("·10")
-    return float(mantissa) * 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
+    return float(mantissa) * 10.0 ** int(
+        power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0
+    )
 
 
 @pytest.mark.claim("report-stands-alone")
@@ -100,10 +108,13 @@ def test_the_page_shows_what_the_files_hold(browser, tmp_path):
     canvas = viewer.locator(".method canvas")
     box = canvas.bounding_box()
     canvas.hover(position={"x": 20.5 * box["width"] / WIDTH, "y": 10.5 * box["height"] / HEIGHT})
-    rows = [row.locator("th, td").all_inner_texts() for row in viewer.locator(".probe tbody tr").all()]
+    rows = [
+        row.locator("th, td").all_inner_texts() for row in viewer.locator(".probe tbody tr").all()
+    ]
     (probed,) = (cells[1:4] for cells in rows if cells[0] == "reference")
     shown = [as_number(words) for words in probed]
-    np.testing.assert_allclose(shown, layer(folder, "reference")[10, 20], rtol=5e-3)  # three digits are shown
+    # three digits are shown
+    np.testing.assert_allclose(shown, layer(folder, "reference")[10, 20], rtol=5e-3)
     page.keyboard.press("f")
     assert not viewer.locator("figure.error").is_visible()
     page.close()
@@ -152,12 +163,16 @@ def test_the_view_moves_changes_and_shows_the_error(browser):
         assert np.abs(pixels(page, "#method") - first).mean() > 0.5
         assert "--change camera.origin=" in command(page)
         changed(page, lambda: page.select_option("#choose-method", "ray-march"))
-        changed(page, lambda: page.fill('[aria-label="steps"]', "30") or page.keyboard.press("Enter"))
+        changed(
+            page, lambda: page.fill('[aria-label="steps"]', "30") or page.keyboard.press("Enter")
+        )
         assert "--method ray-march" in command(page)
         assert "--set steps=30 " in command(page)
         page.fill('[aria-label="steps"]', "0")
         page.keyboard.press("Enter")
-        page.wait_for_function("() => document.querySelector('#mistake').textContent.includes('steps: got 0')")
+        page.wait_for_function(
+            "() => document.querySelector('#mistake').textContent.includes('steps: got 0')"
+        )
         page.select_option("#beside", "reference")
         page.wait_for_selector("html[data-reference=done]", timeout=120_000)
         assert "all pixels" in page.inner_text("#error")

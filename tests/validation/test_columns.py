@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a record says heading, unit and meaning of every value that it and the records within it have."""
+"""Claim: a record says heading, unit and meaning of every value that it and
+the records within it have.
+"""
 
 import json
 from collections.abc import Mapping
@@ -41,7 +43,9 @@ def test_columns_and_values_have_the_same_keys():
 
 def test_plain_makes_what_json_can_hold():
     sample = Outer("x", np.int64(2), Inner(np.float32(0.5)))
-    written = plain({"sample": sample, 1: [np.bool_(True), None, (0.25,), float("nan"), np.float32("inf")]})
+    written = plain(
+        {"sample": sample, 1: [np.bool_(True), None, (0.25,), float("nan"), np.float32("inf")]}
+    )
     assert json.loads(json.dumps(written, allow_nan=False)) == {
         "sample": {"name": "x", "count": 2, "inner": {"low": 0.5}, "others": {}},
         "1": [True, None, [0.25], None, None],

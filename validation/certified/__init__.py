@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files of certified values: twelve scenes of fog to 12 digits for any renderer, and airlight integrals.
+"""Files of certified values: twelve scenes of fog to 12 digits for any
+renderer, and airlight integrals.
 
-The programs that computed them are evidence (`tests/evidence/certified` of the source); here are the values.
+The programs that computed them are evidence (`tests/evidence/certified` of the
+source); here are the values.
 
 Read in this order:
 

@@ -11,10 +11,14 @@ FOLDER = Path(__file__).parent
 FILES = {
     "certified_fog.json": "twelve scenes of fog: the airlight of 64 camera rays each to 12 digits",
     "certified_area_lights.json": "points of area lights beside a ray, and spheres, to 15 digits",
-    "airlight_integral.csv": "the airlight integral to 20 digits, by foot and height of the light over the ray",
+    "airlight_integral.csv": (
+        "the airlight integral to 20 digits, by foot and height of the light over the ray"
+    ),
     "airlight_integral_rays.csv": "the airlight integral to 20 digits, by ray and light",
     "airlight_integral_droplets.csv": "the airlight integral in fog of droplets to 18 digits",
-    "height_fog_rays.csv": "airlight in exponential height fog to 20 digits, of point lights and suns",
+    "height_fog_rays.csv": (
+        "airlight in exponential height fog to 20 digits, of point lights and suns"
+    ),
     "airlight_slopes.csv": "derivatives of the airlight integral to 17 digits",
 }
 
@@ -35,5 +39,8 @@ def certified_data(name: str = "certified_fog.json") -> Path:
     ['thin-open', 'near-light']
     """
     if name not in FILES:
-        raise InputError(f"certified data: got {name!r}, expected one of {', '.join(FILES)}{nearest(name, FILES)}")
+        raise InputError(
+            f"certified data: got {name!r}, expected one of "
+            f"{', '.join(FILES)}{nearest(name, FILES)}"
+        )
     return FOLDER / name

@@ -21,7 +21,12 @@ from airlight.validation.metrics.colour import ColourDifference, colour_differen
 from airlight.validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from airlight.validation.metrics.flip import Flip, flip_hdr
 from airlight.validation.metrics.other_tools import PublishedErrors, published_errors
-from airlight.validation.statistics.comparison import LEVEL, NoisyImage, check_margin, compare_statistics
+from airlight.validation.statistics.comparison import (
+    LEVEL,
+    NoisyImage,
+    check_margin,
+    compare_statistics,
+)
 from airlight.validation.statistics.estimate import Answer, Estimate, Kind
 from airlight.validation.statistics.records import Statistics
 
@@ -30,13 +35,18 @@ _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 
 @dataclass(frozen=True)
 class StatedErrors:
-    """The errors without noise that two files state of their own pixels, and what they make of the relative bias."""
+    """The errors without noise that two files state of their own pixels, and what they
+    make of the relative bias.
+    """
 
-    reference: Estimate | None  #: mean of its layer, and of the error of its pixels [W/(m^2 sr)]; None if not stated
+    #: mean of its layer, and of the error of its pixels [W/(m^2 sr)]; None if not stated
+    reference: Estimate | None
     test: Estimate | None  #: the same of the test image
-    bias_error: float | None  #: by how much both can change the relative bias [1]; None where it is not known
+    #: by how much both can change the relative bias [1]; None where it is not known
+    bias_error: float | None
     kind: Kind  #: proven if all stated errors are
-    margin: float | None = None  #: that these errors alone decide on; standard errors have it in `Statistics`
+    #: that these errors alone decide on; standard errors have it in `Statistics`
+    margin: float | None = None
     equivalent: bool | None = None  #: whether the relative bias is known to be within the margin
 
 
@@ -50,32 +60,44 @@ class Comparison:
     stated: StatedErrors | None = None  #: None where neither file states an error of the layer
     masked: int = 0  #: pixels that the mask leaves out
     errors: PublishedErrors | None = None  #: as other tools print them
-    errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
+    #: the same with the mean of the reference as the unit
+    errors_normalised: PublishedErrors | None = None
     colour: ColourDifference | None = None  #: None if it was not asked for
     flip: Flip | None = None  #: None if it was not asked for
-    orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have
+    #: of the layers by order of scattering that both images have
+    orders: tuple["Comparison", ...] = ()
     notes: tuple[str, ...] = ()  #: what was changed or left out when files were read
-    #: Why the comparison must be called failed: pixels that are not finite or negative, a bias beyond the margin.
+    #: Why the comparison must be called failed: pixels that are not finite or negative,
+    #: a bias beyond the margin.
     failures: tuple[str, ...] = ()
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
         m = self.metrics
         lines = [
-            f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, {m.nonfinite} not finite, "
+            f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, "
+            f"{m.nonfinite} not finite, "
             f"{m.negative} negative",
             f"bias             {shown(m.bias)} W/(m^2 sr), relative {percent(m.relative_bias)}",
             f"rmse             {shown(m.rmse)} W/(m^2 sr), relative {percent(m.relative_rmse)}",
             f"relative error   p50 {shown(m.p50, 3)}, p99 {shown(m.p99, 3)}, max {shown(m.max, 3)}",
         ]
         if m.bias is not None and m.relative_bias is None:
-            lines.append("  undefined      the mean of the reference is not above zero: nothing is relative to it")
+            lines.append(
+                "  undefined      the mean of the reference is not above zero: nothing is relative "
+                "to it"
+            )
         lines += [] if self.stated is None else _stated_lines(self.stated)
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
         more: dict[str, Any] = {"other tools": self.errors, "over the mean": self.errors_normalised}
         more |= {"colour": self.colour, "FLIP": self.flip}
-        lines += [line for name, record in more.items() if record is not None for line in record_lines(name, record)]
+        lines += [
+            line
+            for name, record in more.items()
+            if record is not None
+            for line in record_lines(name, record)
+        ]
         lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
         lines += [f"file             {note}" for note in self.notes]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
@@ -93,17 +115,19 @@ def compare_images(
 ) -> Comparison:
     """Compare a layer of two images whose errors are independent, `total` for the plain channels.
 
-    By default that is the airlight where both have one, else the plain channels; with the airlight also the layers by
-    order of scattering that both have, such as `airlight_3_4`.
+    By default that is the airlight where both have one, else the plain channels; with the airlight
+    also the layers by order of scattering that both have, such as `airlight_3_4`.
 
-    Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both count. The header
-    attribute `airlight:batches` says from how many batch means they come. An error that is no noise is in the layer
-    `<layer>_bound` of either image, and the attribute `airlight:bound` says whether it is proven or estimated.
+    Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both
+    count. The header attribute `airlight:batches` says from how many batch means they come. An
+    error that is no noise is in the layer `<layer>_bound` of either image, and the attribute
+    `airlight:bound` says whether it is proven or estimated.
 
-    The mask says which pixels to compare, (height, width) of truth values; pixels of the frame that a file does not
-    hold are left out too. The `margin` is the largest relative bias that counts as agreement; it needs errors of either
-    kind, and counts all that there are. `all_metrics` adds the errors by the formulae of other tools, the colour
-    differences and HDR-FLIP. Messages call the images by their `names`.
+    The mask says which pixels to compare, (height, width) of truth values; pixels of the frame that
+    a file does not hold are left out too. The `margin` is the largest relative bias that counts as
+    agreement; it needs errors of either kind, and counts all that there are. `all_metrics` adds the
+    errors by the formulae of other tools, the colour differences and HDR-FLIP. Messages call the
+    images by their `names`.
     """
     check_margin(margin)
     named = tuple(zip(names, (reference, test)))
@@ -116,13 +140,21 @@ def compare_images(
     return replace(
         whole,
         orders=by_order,
-        notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes),
-        failures=whole.failures + tuple(f"{each.layer}: {why}" for each in by_order for why in each.failures),
+        notes=tuple(
+            f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes
+        ),
+        failures=whole.failures
+        + tuple(f"{each.layer}: {why}" for each in by_order for why in each.failures),
     )
 
 
 def _compared(
-    named: Sequence[tuple[str, Image]], layer: str, mask: Any, margin: float | None = None, *, all_metrics: bool = False
+    named: Sequence[tuple[str, Image]],
+    layer: str,
+    mask: Any,
+    margin: float | None = None,
+    *,
+    all_metrics: bool = False,
 ) -> Comparison:
     """Compare a layer of two images, each with its name."""
     expected, tested = (_estimate(path, image, layer) for path, image in named)
@@ -130,7 +162,9 @@ def _compared(
     stated, statistics = _stated_errors(named, layer, mask), None
     # The verdict on a margin counts noise and stated errors together.
     if expected.standard_error is not None or tested.standard_error is not None:
-        bound = 0.0 if stated is None else math.inf if stated.bias_error is None else stated.bias_error
+        bound = (
+            0.0 if stated is None else math.inf if stated.bias_error is None else stated.bias_error
+        )
         statistics = compare_statistics(expected, tested, mask=mask, margin=margin, bound=bound)
         equivalent = statistics.equivalent
     elif stated is not None and margin is not None:
@@ -141,7 +175,8 @@ def _compared(
         equivalent = None
     else:
         raise InputError(
-            f"a margin needs errors, and neither {named[0][0]} nor {named[1][0]} has a layer '{layer}_se' or "
+            f"a margin needs errors, and neither {named[0][0]} nor {named[1][0]} has a layer "
+            f"'{layer}_se' or "
             f"'{layer}_bound'; leave the margin out, or make the reference by airlight reference"
         )
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
@@ -174,14 +209,21 @@ def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
     if len(common) == 1:
         return common[0]
     have = "; ".join(f"{path} has {layer_names(image)}" for path, image in (reference, test))
-    raise InputError(f"the files share {'no layer' if not common else 'several layers, name one by --layer'}: {have}")
+    raise InputError(
+        f"the files share {'no layer' if not common else 'several layers, name one by --layer'}: "
+        f"{have}"
+    )
 
 
 def read_mask(path: str | os.PathLike[str]) -> Bools:
-    """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width)."""
+    """Return where the plain channels of an EXR file are not zero: truth
+    values [1], (height, width).
+    """
     values = np.asarray(image_layer(read_exr(path), TOTAL, path))
     if not np.isfinite(values).all():
-        raise InputError(f"{path} as a mask has values that are not finite; expected 0 for out and 1 for in")
+        raise InputError(
+            f"{path} as a mask has values that are not finite; expected 0 for out and 1 for in"
+        )
     return (values != 0).any(axis=2)
 
 
@@ -191,16 +233,21 @@ def _estimate(path: str, image: Image, name: str) -> NoisyImage:
     batches = image.attributes.get(BATCHES) if error is not None else None
     if batches is not None and not isinstance(batches, int):
         raise InputError(
-            f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or remove it"
+            f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or "
+            "remove it"
         )
     return NoisyImage(image_layer(image, name, path), error, batches)
 
 
-def _stated_errors(named: Sequence[tuple[str, Image]], layer: str, mask: Any) -> StatedErrors | None:
-    """Return what two images, each with its name, say of their own errors in the pixels that are compared.
+def _stated_errors(
+    named: Sequence[tuple[str, Image]], layer: str, mask: Any
+) -> StatedErrors | None:
+    """Return what two images, each with its name, say of their own errors in the
+    pixels that are compared.
 
-    The true images are T +- t and R +- r in the mean: |T'/R' - T/R| is at most (t + r T/R) / (R - r). The rounding of a
-    file to single precision, up to half an epsilon of each pixel, is a part of t and r.
+    The true images are T +- t and R +- r in the mean: |T'/R' - T/R| is at most (t + r T/R) / (R -
+    r). The rounding of a file to single precision, up to half an epsilon of each pixel, is a part
+    of t and r.
     """
     bounds = [image.layers.get(f"{layer}_bound") for _, image in named]
     if all(bound is None for bound in bounds):
@@ -209,25 +256,36 @@ def _stated_errors(named: Sequence[tuple[str, Image]], layer: str, mask: Any) ->
     *images, chosen = compared(layers[0], layers[1], mask)
     finite = chosen & np.isfinite(images).all(axis=(0, 3))
     sides = [
-        None if bound is None else _stated(path, image, values[finite], np.asarray(bound, dtype=np.float64)[finite])
+        None
+        if bound is None
+        else _stated(path, image, values[finite], np.asarray(bound, dtype=np.float64)[finite])
         for (path, image), values, bound in zip(named, layers, bounds)
     ]
-    # A file without a stated error is compared as it is; an error that is stated and no number is not known.
+    # A file without a stated error is compared as it is; an error that is stated
+    # and no number is not known.
     kinds = {side.kind for side in sides if side is not None}
     kind: Kind = "proven" if kinds == {"proven"} else "estimated"
-    r, t = (0.0 if side is None else math.nan if side.error is None else side.error for side in sides)
-    reference, test = (float(values[finite].mean()) if finite.any() else math.nan for values in images)
+    r, t = (
+        0.0 if side is None else math.nan if side.error is None else side.error for side in sides
+    )
+    reference, test = (
+        float(values[finite].mean()) if finite.any() else math.nan for values in images
+    )
     known = math.isfinite(t) and r < reference
     change = (t + r * abs(test / reference)) / (reference - r) if known else None
     return StatedErrors(sides[0], sides[1], change, kind)
 
 
 def _stated(path: str, image: Image, values: Array, bound: Array) -> Estimate:
-    """Return the mean of the compared pixels of one image, and the mean of their errors by its file."""
+    """Return the mean of the compared pixels of one image, and the mean of
+    their errors by its file.
+    """
     kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
     said = image.attributes.get(BOUND, "estimated")
     if said not in kinds:
-        raise InputError(f"{path} has the attribute {BOUND} {said!r}; expected {' or '.join(kinds)}; correct it")
+        raise InputError(
+            f"{path} has the attribute {BOUND} {said!r}; expected {' or '.join(kinds)}; correct it"
+        )
     if not (values.size and np.isfinite(bound).all() and (bound >= 0).all()):
         return Estimate(float(values.mean()) if values.size else None, None, kinds[said])
     rounding = float(np.finfo(np.result_type(values, np.float32)).eps) / 2
@@ -243,35 +301,50 @@ def _stated_lines(stated: StatedErrors) -> list[str]:
         if each is not None
     ]
     change = "unknown" if stated.bias_error is None else f"{percent(stated.bias_error)} at most"
-    lines = [f"stated errors    {'; '.join(words)}", f"  together       of the relative bias {change} ({stated.kind})"]
+    lines = [
+        f"stated errors    {'; '.join(words)}",
+        f"  together       of the relative bias {change} ({stated.kind})",
+    ]
     if stated.margin is None:
         return lines
-    return [*lines, f"margin           +-{percent(stated.margin)}: {'inside' if stated.equivalent else 'NOT inside'}"]
+    return [
+        *lines,
+        f"margin           +-{percent(stated.margin)}: "
+        f"{'inside' if stated.equivalent else 'NOT inside'}",
+    ]
 
 
 def statistics_lines(s: Statistics) -> list[str]:
     """Return the statistics as text."""
     low, high = s.relative_bias_ci
     lines = [
-        f"relative bias    95 % interval {percent(low)} to {percent(high)}; {percent(s.detectable_bias)} would have "
+        f"relative bias    95 % interval {percent(low)} to {percent(high)}; "
+        f"{percent(s.detectable_bias)} would have "
         "been found (90 % power, 5 % level)"
     ]
     if s.relative_bias_ci_batches is not None:
         low, high = s.relative_bias_ci_batches
         lines.append(f"  by batches     95 % interval {percent(low)} to {percent(high)}")
     if s.equivalent is not None and s.margin is not None:
-        lines.append(f"margin           +-{percent(s.margin)}: {'inside' if s.equivalent else 'NOT inside'}")
+        lines.append(
+            f"margin           +-{percent(s.margin)}: {'inside' if s.equivalent else 'NOT inside'}"
+        )
     return [
         *lines,
-        f"variance         {percent(s.reference_variance_fraction)} of it the reference's; one pixel has up to "
+        f"variance         {percent(s.reference_variance_fraction)} of it the reference's; one "
+        "pixel has up to "
         f"{percent(s.largest_fraction)}",
         f"zero reference   {s.zero_reference} values, the test image there up to "
         f"{shown(s.zero_reference_error, 3)} of the mean",
-        f"z                mean {_fixed(s.z_mean)}, standard deviation {_fixed(s.z_std)}, {s.tested} values; "
-        f"{s.zero_variance} without variance differ by up to {shown(s.zero_variance_error, 3)} of the mean",
-        f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level {LEVEL:g}); "
+        f"z                mean {_fixed(s.z_mean)}, standard deviation {_fixed(s.z_std)}, "
+        f"{s.tested} values; "
+        f"{s.zero_variance} without variance differ by up to {shown(s.zero_variance_error, 3)} of "
+        "the mean",
+        f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level "
+        f"{LEVEL:g}); "
         f"{s.rejected_blocks} of {s.blocks} blocks",
-        f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {LEVEL:g}), "
+        f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level "
+        f"{LEVEL:g}), "
         f"p = {shown(s.exceeding_p, 3)}; p-values uniform: p = {shown(s.uniformity_p, 3)}",
     ]
 
@@ -293,8 +366,13 @@ def record_lines(name: str, record: Any) -> list[str]:
         value = values[each.key]
         if value is not None and value != "":
             number = shown(value) if isinstance(value, float) else str(value)
-            words.append(f"{each.heading} {number}" + ("" if each.unit in ("", "1", each.heading) else f" {each.unit}"))
-    return textwrap.wrap("; ".join(words), 117, initial_indent=f"{name:<17}", subsequent_indent=" " * 17)
+            words.append(
+                f"{each.heading} {number}"
+                + ("" if each.unit in ("", "1", each.heading) else f" {each.unit}")
+            )
+    return textwrap.wrap(
+        "; ".join(words), 117, initial_indent=f"{name:<17}", subsequent_indent=" " * 17
+    )
 
 
 def percent(value: float | None) -> str:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Encodings and tone curves that engines apply before they write values. Values below 0 stay, or become 0."""
+"""Encodings and tone curves that engines apply before they write values. Values
+below 0 stay, or become 0.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -18,7 +20,9 @@ def to_srgb(linear: Array) -> Array:
 def from_srgb(encoded: Array) -> Array:
     """Return the linear values of those encoded by that curve."""
     with np.errstate(invalid="ignore"):
-        return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4)
+        return np.where(
+            encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4
+        )
 
 
 def srgb_in_8_bits(radiance: Array) -> Array:
@@ -53,7 +57,8 @@ def filmic(radiance: Array) -> Array:
     return np.asarray(np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0))
 
 
-# Blender's view transforms: a curve of log2(x/0.18) at even places, as Blender 5.0.1 wrote greys into a file.
+# Blender's view transforms: a curve of log2(x/0.18) at even places, as Blender 5.0.1
+# wrote greys into a file.
 _STOPS = np.linspace(-10.0, 6.5, 23)
 _FILMIC = (
     1.5e-5, 0.003, 0.0074, 0.0136, 0.0224, 0.0348, 0.0522, 0.0764, 0.1095, 0.1538, 0.2113, 0.2833,
@@ -63,9 +68,14 @@ _AGX = (
     0.0, 0.0001, 0.0007, 0.0023, 0.0059, 0.0129, 0.0258, 0.0492, 0.0805, 0.12, 0.171, 0.2369,
     0.3204, 0.4238, 0.5359, 0.6379, 0.7242, 0.7951, 0.8536, 0.9014, 0.9404, 0.9728, 1.0,
 )  # fmt: skip
-# AgX mixes channels before its curve, and takes that back in linear light after it; fitted to colours, to 2e-3.
-_AGX_BEFORE = np.array([[0.5691, 0.3314, 0.0995], [0.1191, 0.7372, 0.1437], [0.0934, 0.198, 0.7086]])
-_AGX_AFTER = np.array([[1.8311, -0.7004, -0.1307], [-0.2281, 1.3306, -0.1025], [-0.1837, -0.3038, 1.4875]])
+# AgX mixes channels before its curve, and takes that back in linear light after it;
+# fitted to colours, to 2e-3.
+_AGX_BEFORE = np.array(
+    [[0.5691, 0.3314, 0.0995], [0.1191, 0.7372, 0.1437], [0.0934, 0.198, 0.7086]]
+)
+_AGX_AFTER = np.array(
+    [[1.8311, -0.7004, -0.1307], [-0.2281, 1.3306, -0.1025], [-0.1837, -0.3038, 1.4875]]
+)
 
 
 def _by_stops(curve: tuple[float, ...], radiance: Array) -> Array:
@@ -85,7 +95,8 @@ def agx(radiance: Array) -> Array:
     return np.clip(to_srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
 
 
-# Chromaticities of red, green, blue and white: IEC 61966-2-1, SMPTE EG 432-1, ITU-R BT.2020, S-2014-004, ST 2065-1.
+# Chromaticities of red, green, blue and white: IEC 61966-2-1, SMPTE EG 432-1, ITU-R
+# BT.2020, S-2014-004, ST 2065-1.
 _SRGB = (0.64, 0.33), (0.3, 0.6), (0.15, 0.06), (0.3127, 0.329)
 _SPACES = {
     "Display P3": ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06), (0.3127, 0.329)),
@@ -93,7 +104,9 @@ _SPACES = {
     "ACEScg (AP1)": ((0.713, 0.293), (0.165, 0.83), (0.128, 0.044), (0.32168, 0.33767)),
     "ACES 2065-1 (AP0)": ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077), (0.32168, 0.33767)),
 }
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+_BRADFORD = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
 
 
 def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
@@ -103,7 +116,8 @@ def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
     return (cones[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])) / cones[:, 3:]
 
 
-#: Matrices from colours with the primaries of sRGB to others, white to white, by the name of the others.
+#: Matrices from colours with the primaries of sRGB to others, white to white,
+#: by the name of the others.
 PRIMARIES: Mapping[str, Array] = {
     name: np.asarray(np.linalg.solve(_to_cones(space), _to_cones(_SRGB)), dtype=np.float64)
     for name, space in _SPACES.items()

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The diagnosis of an image of a scene: every fault predicts the image that it would make, and the data choose.
+"""The diagnosis of an image of a scene: every fault predicts the image that it would
+make, and the data choose.
 
-1. An image that is right by `validation.engine.judge` is right: no fault is looked for. One that is black is black.
-2. Faults are tried alone, those that need paths of their own only where no other one leaves noise; where none does,
-   pairs of faults of different kinds. Whether pixels are centres or means is decided once, by what the faults without
-   paths of their own leave of the image.
-3. The explanation with the most evidence is chosen, or the simplest of those that are as good (`evidence.py`).
-4. It is named if its evidence and the fraction of the error that it leaves are within the limits of the calibration
-   (`calibration.json`): chosen so that of right images with errors of engines at most 5 % have a name.
+1. An image that is right by `validation.engine.judge` is right: no fault is looked for.
+   One that is black is black.
+2. Faults are tried alone, those that need paths of their own only where no other one leaves noise;
+   where none does, pairs of faults of different kinds. Whether pixels are centres or means is
+   decided once, by what the faults without paths of their own leave of the image.
+3. The explanation with the most evidence is chosen, or the simplest of those that are
+   as good (`evidence.py`).
+4. It is named if its evidence and the fraction of the error that it leaves are within the limits of
+   the calibration (`calibration.json`): chosen so that of right images with errors of engines at
+   most 5 % have a name.
 """
 
 import os
@@ -24,7 +28,13 @@ from airlight.validation.engine.error_place import place_words
 from airlight.validation.engine.evidence import EVIDENCE, KNOWN, LEFT, Blocks, evidence, scale_of
 from airlight.validation.engine.fault import Fault
 from airlight.validation.engine.faults import KINDS, faults_of
-from airlight.validation.engine.judge import EngineComparison, ReferenceOf, all_but_few, judge_image, references
+from airlight.validation.engine.judge import (
+    EngineComparison,
+    ReferenceOf,
+    all_but_few,
+    judge_image,
+    references,
+)
 from airlight.validation.engine.prediction import Predictor, SceneLight
 from airlight.validation.engine.search import Explanation, begin, explain
 from airlight.validation.engine.seen import (
@@ -41,7 +51,8 @@ from airlight.validation.scenes.loading import LoadedScene
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
 
 _FEWEST = 16  # pixels
-_REFINED = 5  # faults whose numbers are found to all digits: those that leave least after a coarse search
+# faults whose numbers are found to all digits: those that leave least after a coarse search
+_REFINED = 5
 _FAR = 3.0  # errors over the least one that more digits do not bring down to it
 _PARTNERS = 6  # faults, those that leave least, with which all others are tried as pairs
 _PAIRS = 12  # pairs that are followed, those that leave least where they begin
@@ -49,7 +60,8 @@ _LITTLE = 0.05  # fraction of the error: less is no second fault, nor another im
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN, _PRINTED = 8, 5
 _CERTAIN = 1e4  # evidence beyond which the number says no more
-_PARTS = (0.0, 0.3), (0.5, 0.8), (0.8, 1.0), (0.3, 0.5)  # of the time: faults by what they cost, and pairs
+# of the time: faults by what they cost, and pairs
+_PARTS = (0.0, 0.3), (0.5, 0.8), (0.8, 1.0), (0.3, 0.5)
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,8 @@ class Ranked:
     words: str
     residual: float  #: mean relative error that it leaves, with what stands beside it
     evidence: float  #: score against the unchanged scene, see `validation.engine.evidence`
-    together: tuple[str, ...]  #: names of all that explain the image together, where it takes more than one
+    #: names of all that explain the image together, where it takes more than one
+    together: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -72,23 +85,28 @@ class Diagnosis:
     path: str
     layer: str
     pixel: str  #: 'centre' or 'area'
-    first: str  #: name of the first explanation; 'right', 'black' or 'unexplained' where it is no fault
+    #: name of the first explanation; 'right', 'black' or 'unexplained' where it is no fault
+    first: str
     ranked: tuple[Ranked, ...]  #: one where no fault was looked for
     residual: float  #: mean relative error of the image as it is
     left: float  #: what the first explanation leaves of it
     rest: str  #: what that is: like noise, or little; empty where it is neither
     explained: bool  #: whether that is nothing to explain
     place: str  #: where the remaining error lies; empty where it is like noise, or little
-    few: str  #: which pixels are wrong where these are few and all others are right; empty otherwise
+    #: which pixels are wrong where these are few and all others are right; empty otherwise
+    few: str
     verdict: str  #: of the comparison with the reference, in words
-    failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
+    #: what is wrong with the file, such as pixels that are not finite
+    failures: tuple[str, ...] = ()
     note: str = ""  #: what the reader of the file changed or left out, such as other primaries
 
     @property
     def lines(self) -> list[str]:
         """The first explanation, the error that it leaves, and the others that were tried."""
         off = f"values are {_percent(self.residual)} off in the mean"
-        lines = [f"{self.path}, {self.layer}, against {self.scene}, {PIXEL_WORDS[self.pixel]}: {off}."]
+        lines = [
+            f"{self.path}, {self.layer}, against {self.scene}, {PIXEL_WORDS[self.pixel]}: {off}."
+        ]
         lines += self._said()
         lines += [f"Failed: {reason}." for reason in self.failures]
         lines += [f"The file: {self.note}."] if self.note else []
@@ -96,12 +114,20 @@ class Diagnosis:
             return lines
         lines += ["", f"{'fault':<16} {'left':>9} {'evidence':>9}  what it says"]
         for row in self.ranked[:_PRINTED]:
-            weight = f"{row.evidence:.0f}" if abs(row.evidence) < _CERTAIN else f"{row.evidence:.1e}"
+            weight = (
+                f"{row.evidence:.0f}" if abs(row.evidence) < _CERTAIN else f"{row.evidence:.1e}"
+            )
             lines.append(f"{row.name:<16} {_percent(row.residual):>9} {weight:>9}  {row.words}")
-        return [*lines, "", "left: mean relative error without the fault; evidence: a score against `right`."]
+        return [
+            *lines,
+            "",
+            "left: mean relative error without the fault; evidence: a score against `right`.",
+        ]
 
     def _said(self) -> list[str]:
-        """Return what is wrong, in sentences; the comparison's verdict stands where no fault is named."""
+        """Return what is wrong, in sentences; the comparison's verdict stands
+        where no fault is named.
+        """
         place = f": {self.few or f'the error lies {self.place}'}" if self.few or self.place else ""
         if self.first == RIGHT and len(self.ranked) < 2:
             return [f"Nothing is wrong with it: {self.verdict}."]
@@ -112,28 +138,41 @@ class Diagnosis:
         if self.first == UNEXPLAINED:
             return [f"Nothing here explains it{place} ({self.verdict})."]
         together = [row for row in self.ranked if row.together]
-        both = f"Two faults explain it: {'; and '.join(row.words for row in together)}." if together else ""
+        both = (
+            f"Two faults explain it: {'; and '.join(row.words for row in together)}."
+            if together
+            else ""
+        )
         more = f"more than noise: something else is wrong too{place}"
         return [
             both or f"{self.first}: {self.ranked[0].words}.",
-            f"Without that, values are {_percent(self.left)} off in the mean, which is {self.rest or more}.",
+            f"Without that, values are {_percent(self.left)} off in the mean, which is "
+            f"{self.rest or more}.",
         ]
 
 
 def diagnose_file(
-    path: str | os.PathLike[str], scene: str, *, layer: str | None = None, holds: str | None = None, **how: Any
+    path: str | os.PathLike[str],
+    scene: str,
+    *,
+    layer: str | None = None,
+    holds: str | None = None,
+    **how: Any,
 ) -> tuple[Diagnosis, ...]:
-    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both; see `diagnose_image`.
+    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has
+    both; see `diagnose_image`.
 
-    `path`, `scene`: the EXR file; a built-in scene or a Mitsuba XML file; `layer`, `holds`: which layer, see
-    `validation.engine.seen.judged_layer`. A layer that is black, as it should be, says nothing beside another one.
+    `path`, `scene`: the EXR file; a built-in scene or a Mitsuba XML file; `layer`, `holds`: which
+    layer, see `validation.engine.seen.judged_layer`. A layer that is black, as it should be, says
+    nothing beside another one.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
     loaded = scene_of_size(scene, several[0].size, path)
     how["reference_of"] = references(loaded)
     found = [
-        diagnose_image(image, loaded, path=str(path), layer=each.name, holds=each.holds, **how) for each in several
+        diagnose_image(image, loaded, path=str(path), layer=each.name, holds=each.holds, **how)
+        for each in several
     ]
     return tuple(each for each in found if each.first != BLACK or each.residual > 0) or tuple(found)
 
@@ -176,12 +215,16 @@ def diagnose_image(
     seen, failures = seen_image(image, judged, loaded.scene)
     if (count := int(seen.used.sum())) < _FEWEST:
         raise InputError(
-            f"{path}: {count} pixels of the layer '{judged.name}' say something; expected at least {_FEWEST}, finite "
+            f"{path}: {count} pixels of the layer '{judged.name}' say something; expected at least "
+            f"{_FEWEST}, finite "
             "and not of a light itself: fewer do not tell a fault from noise"
         )
-    # The comparison decides whether anything is wrong; the diagnosis says what, and never contradicts it.
+    # The comparison decides whether anything is wrong; the diagnosis says what,
+    # and never contradicts it.
     reference_of = reference_of or references(loaded)
-    compared = judge_image(image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data())
+    compared = judge_image(
+        image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data()
+    )
     light = light or SceneLight(seen.reference)
     pixels = (compared.pixel,) if compared.verdict.right else pixel_kinds(image, pixel)
 
@@ -221,7 +264,9 @@ def diagnose_image(
     return _concluded(said, attempt, compared, few)
 
 
-def _concluded(said: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str) -> Diagnosis:
+def _concluded(
+    said: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str
+) -> Diagnosis:
     """Return a diagnosis with what a search has found."""
     chosen = attempt.chosen
     if chosen.faults and attempt.is_named(chosen):
@@ -266,7 +311,10 @@ class _Attempt:
 
     def try_faults(self, costly: int) -> None:
         """Try all faults of a cost, each alone."""
-        faults, tried = [fault for fault in self.faults if fault.costly == costly], list[Explanation]()
+        faults, tried = (
+            [fault for fault in self.faults if fault.costly == costly],
+            list[Explanation](),
+        )
         for number, fault in enumerate(faults):
             self._tell(_PARTS[costly], number / len(faults), fault.name)
             tried.append(explain(self.predictor, (fault,), fine=False))
@@ -275,22 +323,36 @@ class _Attempt:
     def try_pairs(self) -> None:
         """Try two faults of different kinds.
 
-        Each pair has one of the faults that leave least, and starts from the values found for its faults alone; the
-        best pairs are followed until one leaves nothing to explain.
+        Each pair has one of the faults that leave least, and starts from the values found for its
+        faults alone; the best pairs are followed until one leaves nothing to explain.
         """
         ordered = sorted(self.found, key=lambda each: each.error)
-        cheap = [each.faults[0] for each in ordered if not each.faults[0].costly and not each.faults[0].single]
-        # An exposure is wrong beside anything else, and alone explains little where a curve comes after it.
+        cheap = [
+            each.faults[0]
+            for each in ordered
+            if not each.faults[0].costly and not each.faults[0].single
+        ]
+        # An exposure is wrong beside anything else, and alone explains little
+        # where a curve comes after it.
         cheap.sort(key=lambda fault: fault.name != "factor")
-        both = [_in_order(a, b) for n, a in enumerate(cheap[:_PARTNERS]) for b in cheap[n + 1 :] if _differ(a, b)]
+        both = [
+            _in_order(a, b)
+            for n, a in enumerate(cheap[:_PARTNERS])
+            for b in cheap[n + 1 :]
+            if _differ(a, b)
+        ]
         few, begun = self.predictor.few, []
         for number, pair in enumerate(both):
-            self._tell(_PARTS[-1], 0.5 * number / len(both), " and ".join(fault.name for fault in pair))
+            self._tell(
+                _PARTS[-1], 0.5 * number / len(both), " and ".join(fault.name for fault in pair)
+            )
             begun.append((*begin(few, pair), pair))
         begun.sort(key=lambda each: each[0])
         explanations: list[Explanation] = []
         for number, (_, near, pair) in enumerate(begun[:_PAIRS]):
-            self._tell(_PARTS[-1], 0.5 + 0.5 * number / _PAIRS, " and ".join(fault.name for fault in pair))
+            self._tell(
+                _PARTS[-1], 0.5 + 0.5 * number / _PAIRS, " and ".join(fault.name for fault in pair)
+            )
             rough = explain(few, pair, near, fine=False)
             if rough.error < LEFT * ordered[0].error:
                 explanations.append(explain(self.predictor, pair, rough.values))
@@ -303,14 +365,18 @@ class _Attempt:
         return self.blocks.is_noise(explanation) or self._is_little(explanation)
 
     def _is_little(self, explanation: Explanation) -> bool:
-        """Return whether an explanation leaves no more than the fog model's error in its place, or nearly so."""
+        """Return whether an explanation leaves no more than the fog model's error in
+        its place, or nearly so.
+        """
         most = max(KNOWN[self.pixel], min(KNOWN["area"], _LITTLE * self.right.error))
         return explanation.error <= most
 
     def is_named(self, explanation: Explanation) -> bool:
         """Return whether an explanation is within the limits of the calibration."""
         weight = self._evidence([explanation])[0]
-        return weight > EVIDENCE and (self.is_settled(explanation) or explanation.error < LEFT * self.right.error)
+        return weight > EVIDENCE and (
+            self.is_settled(explanation) or explanation.error < LEFT * self.right.error
+        )
 
     def rest(self, explanation: Explanation) -> str:
         """Return what an explanation leaves in words; nothing where something else is wrong too."""
@@ -320,7 +386,9 @@ class _Attempt:
 
     @property
     def chosen(self) -> Explanation:
-        """The explanation with the most evidence, or the simplest of those that are as good; or the scene as it is."""
+        """The explanation with the most evidence, or the simplest of those that are as
+        good; or the scene as it is.
+        """
         singles = [each for each in self.found if len(each.faults) == 1]
         pairs = [each for each in self.found if len(each.faults) > 1]
         best = self._best([self.right, *singles])
@@ -334,20 +402,28 @@ class _Attempt:
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:
         """Return the explanation with the most evidence, or the simplest of those that are as good.
 
-        A further number is worth its error only where the simpler explanation leaves more than little: fog of a scale
-        height of 10 km is an extinction, and one of 90 m that fits a rest of 0.1 % is it too.
+        A further number is worth its error only where the simpler explanation leaves more than
+        little: fog of a scale height of 10 km is an extinction, and one of 90 m that fits a rest of
+        0.1 % is it too.
         """
         weights = self._evidence(explanations)
         ordered = sorted(zip(weights, explanations, strict=True), key=lambda each: -each[0])
         most, best = ordered[0]
-        alike = [each for weight, each in ordered if weight >= most - _ALIKE or self._is_as_good(each, best)]
+        alike = [
+            each
+            for weight, each in ordered
+            if weight >= most - _ALIKE or self._is_as_good(each, best)
+        ]
         return min(alike, key=lambda each: (each.parameters, len(each.faults)))
 
     def _is_as_good(self, one: Explanation, best: Explanation) -> bool:
-        """Return whether an explanation is nearly the image of the best one, and leaves little or hardly more."""
+        """Return whether an explanation is nearly the image of the best one, and
+        leaves little or hardly more.
+        """
         apart = float(np.abs(one.errors - best.errors).mean())
         leaves_little = bool(one.faults) and self._is_little(one)
-        # An explanation that leaves noise alone is better than one that does not, by however little.
+        # An explanation that leaves noise alone is better than one that
+        # does not, by however little.
         noise_too = self.blocks.is_noise(one) or not self.blocks.is_noise(best)
         hardly_more = noise_too and one.error <= (1 + _LITTLE) * best.error
         return apart <= _LITTLE * self.right.error and (leaves_little or hardly_more)
@@ -361,7 +437,9 @@ class _Attempt:
     def ranked(self, chosen: Explanation) -> list[Ranked]:
         """Return all explanations in the order of evidence, the chosen one first."""
         singles = [each for each in self.found if len(each.faults) == 1]
-        weights = dict(zip(map(id, [chosen, *singles]), self._evidence([chosen, *singles]), strict=True))
+        weights = dict(
+            zip(map(id, [chosen, *singles]), self._evidence([chosen, *singles]), strict=True)
+        )
         rows = _rows(chosen, weights[id(chosen)])
         named = {row.name for row in rows}
         for each in sorted(singles, key=lambda each: -weights[id(each)]):
@@ -385,15 +463,21 @@ class _Attempt:
 
 
 def _differ(first: Fault, second: Fault) -> bool:
-    """Return whether two faults are of different kinds, and do not both look for paths of their own."""
+    """Return whether two faults are of different kinds, and do not both
+    look for paths of their own.
+    """
     moves = [any(parameter.step for parameter in each.parameters) for each in (first, second)]
     lights = [each.kind == "light" for each in (first, second)]
     return first.kind != second.kind and not (any(moves) and any(lights))
 
 
 def _in_order(first: Fault, second: Fault) -> tuple[Fault, Fault]:
-    """Return faults in the order in which they happen: the scene, its image, what is done to values."""
-    return (first, second) if KINDS.index(first.kind) <= KINDS.index(second.kind) else (second, first)
+    """Return faults in the order in which they happen: the scene, its
+    image, what is done to values.
+    """
+    return (
+        (first, second) if KINDS.index(first.kind) <= KINDS.index(second.kind) else (second, first)
+    )
 
 
 def _rows(explanation: Explanation, weight: float) -> list[Ranked]:

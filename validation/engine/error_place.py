@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the error of an image lies: beside a light, at edges, in rings around a light, or in a part of the frame."""
+"""Where the error of an image lies: beside a light, at edges, in rings around a light,
+or in a part of the frame.
+"""
 
 import math
 from dataclasses import dataclass
@@ -31,7 +33,8 @@ class ErrorPlace:
 
     pixels: int  #: the fewest that have `fraction` of it
     fraction: float
-    worst: tuple[int, int]  #: column and row of the pixel with the largest error, from the upper left
+    #: column and row of the pixel with the largest error, from the upper left
+    worst: tuple[int, int]
     kind: str  #: 'lamp', 'edge' or '' for neither
     relative_rmse_without: float  #: the relative rmse of all other pixels
     few: bool  #: whether they are less than a hundredth of the image
@@ -47,8 +50,10 @@ class ErrorPlace:
         place = f"{kinds[self.kind]}, " if self.kind else ""
         at = "" if single else "the worst "
         return (
-            f"{100 * self.fraction:.3g} % of the squared error in {self.pixels} pixel{'s' * (not single)} ({place}{at}"
-            f"in column {self.worst[0]}, row {self.worst[1]}); without {'it' if single else 'them'} the relative rmse "
+            f"{100 * self.fraction:.3g} % of the squared error in {self.pixels} "
+            f"pixel{'s' * (not single)} ({place}{at}"
+            f"in column {self.worst[0]}, row {self.worst[1]}); without "
+            f"{'it' if single else 'them'} the relative rmse "
             f"is {100 * self.relative_rmse_without:.3g} %"
         )
 
@@ -56,8 +61,8 @@ class ErrorPlace:
 def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPlace | None:
     """Return where most of the squared error lies; None where there is no error.
 
-    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `light_pixels`: how far a light is, (height, width)
-    [pixels].
+    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `light_pixels`: how far a light
+    is, (height, width) [pixels].
     """
     difference = np.where(np.isfinite(reference) & np.isfinite(image), image - reference, 0.0)
     squared = (difference**2).sum(axis=2)
@@ -76,13 +81,27 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     light = np.where(np.isfinite(reference), reference, 0.0).sum(axis=2)
     lamp, edge = (light_pixels[chosen] < _BESIDE).mean() > 0.5, at_edges(light)[chosen].mean() > 0.5
     kind = "lamp" if lamp else "edge" if edge else ""
-    left = math.sqrt(float(rest.mean()) / reference.shape[2]) / mean if len(rest) and mean > 0 else 0.0
-    return ErrorPlace(count, float(below[count - 1]), (column, row), kind, left, count <= max(1, _FEW * squared.size))
+    left = (
+        math.sqrt(float(rest.mean()) / reference.shape[2]) / mean if len(rest) and mean > 0 else 0.0
+    )
+    return ErrorPlace(
+        count,
+        float(below[count - 1]),
+        (column, row),
+        kind,
+        left,
+        count <= max(1, _FEW * squared.size),
+    )
 
 
 def at_edges(values: Array) -> Bools:
-    """Return where a pixel or one beside it is much larger than another of these, (height, width)."""
-    return np.asarray(maximum_filter(values, 3, mode="nearest") > _STEP * minimum_filter(values, 3, mode="nearest"))
+    """Return where a pixel or one beside it is much larger than another
+    of these, (height, width).
+    """
+    return np.asarray(
+        maximum_filter(values, 3, mode="nearest")
+        > _STEP * minimum_filter(values, 3, mode="nearest")
+    )
 
 
 def place_words(predictor: Predictor, explanation: Explanation) -> str:
@@ -102,7 +121,8 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
     outline = np.abs(laplace(inverse, mode="nearest")) > _BENT * inverse.max()
     wide = binary_dilation(outline, iterations=max(1, min(_WIDE, min(height, width) // 12) - 1))
     regions.append(("at the edges of shapes", wide[row, column]))
-    # Relative errors, and radiance: beside a light the latter is most of all, at an outline in the dark the former.
+    # Relative errors, and radiance: beside a light the latter is most of all, at an
+    # outline in the dark the former.
     shown, predicted = predictor.shown(explanation.guess), predictor.predicted(explanation.guess)
     amount = np.nan_to_num(np.abs(shown - predicted).mean(axis=1))
     found = [words for words, here in regions if _lies(size, here) or _lies(amount, here)]
@@ -115,28 +135,42 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
         for across, horizontal in enumerate(_PLACES[1]):
             here = (3 * row // height == high) & (3 * column // width == across)
             if _lies(size, here):
-                return f"in the {vertical} {horizontal} of the image".replace("middle middle", "middle")
+                return f"in the {vertical} {horizontal} of the image".replace(
+                    "middle middle", "middle"
+                )
     return "all over the image"
 
 
 def _lies(size: Array, here: Bools) -> bool:
-    """Return whether the error lies in some pixels: most of it, or far more for a pixel than elsewhere."""
+    """Return whether the error lies in some pixels: most of it, or far more
+    for a pixel than elsewhere.
+    """
     if not 0.001 < here.mean() < 0.7 or size.sum() <= 0:
         return False
     inside, outside = float(size[here].mean()), float(size[~here].mean())
     fraction = float(size[here].sum() / size.sum())
-    return inside > _MORE * outside and (fraction > _FRACTION or (inside > 4 * outside and fraction > 0.05))
+    return inside > _MORE * outside and (
+        fraction > _FRACTION or (inside > 4 * outside and fraction > 0.05)
+    )
 
 
 def _angles(reference: ReferenceScene) -> list[tuple[str, Array]]:
-    """Return the angle of every pixel to each light before the camera, (pixels,) [rad], and what it is called."""
-    places = [light.position for light in reference.lights] + [light.centre for light in reference.area]
+    """Return the angle of every pixel to each light before the camera, (pixels,)
+    [rad], and what it is called.
+    """
+    places = [light.position for light in reference.lights] + [
+        light.centre for light in reference.area
+    ]
     found = []
     for place in places:
-        way = (place - reference.origin) / max(float(np.linalg.norm(place - reference.origin)), 1e-300)
+        way = (place - reference.origin) / max(
+            float(np.linalg.norm(place - reference.origin)), 1e-300
+        )
         cosine = reference.direction @ way
         if cosine.max() > 0.9:
-            found.append(("the light" if len(places) == 1 else "a light", np.arccos(np.clip(cosine, -1, 1))))
+            found.append(
+                ("the light" if len(places) == 1 else "a light", np.arccos(np.clip(cosine, -1, 1)))
+            )
     return found
 
 

@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How much speaks for an explanation of an image, and whether what it leaves is noise.
 
-**Evidence.** With e the relative errors of n pixels and s their scale in the best explanation, the logarithm of
-Cauchy's likelihood is -sum log(1 + (e/s)^2). Channels of a pixel share their noise, so that three values count as one.
-The evidence of an explanation is this logarithm for its errors minus the logarithm for the unchanged scene.
+**Evidence.** With e the relative errors of n pixels and s their scale in the best explanation, the
+logarithm of Cauchy's likelihood is -sum log(1 + (e/s)^2). Channels of a pixel share their noise, so
+that three values count as one. The evidence of an explanation is this logarithm for its errors
+minus the logarithm for the unchanged scene.
 
-Neighbouring pixels share their errors where an image was denoised, has fog of a low resolution, or leans on its last
-frames; such pixels are no independent witnesses. Blocks of B x B pixels say how many count as one: with S the sum of
-the errors of a block and Q that of their squares,
+Neighbouring pixels share their errors where an image was denoised, has fog of a low resolution, or
+leans on its last frames; such pixels are no independent witnesses. Blocks of B x B pixels say how
+many count as one: with S the sum of the errors of a block and Q that of their squares,
 
     A = sum over blocks of S^2 / sum over blocks of Q
 
-is 1 in the mean for independent errors, and the number of pixels in a block where all of these agree. The gain over A,
-less log(n/A)/2 for each number (Schwarz 1978, Ann. Statist. 6, 461), is the evidence. It is a score: its limit is
-measured by `docs/tools/calibrate_diagnosis.py`, on right images with the errors that engines have and on faulty ones.
+is 1 in the mean for independent errors, and the number of pixels in a block where all of these
+agree. The gain over A, less log(n/A)/2 for each number (Schwarz 1978, Ann. Statist. 6, 461), is the
+evidence. It is a score: its limit is measured by `docs/tools/calibrate_diagnosis.py`, on right
+images with the errors that engines have and on faulty ones.
 
-**Noise.** An explanation leaves noise if A is 1 at most, within two standard errors of it for independent pixels,
-sqrt(2/blocks). One image in thirty of normal noise alone is beyond: A is then a mean over blocks of chi-squares.
+**Noise.** An explanation leaves noise if A is 1 at most, within two standard errors of it for
+independent pixels, sqrt(2/blocks). One image in thirty of normal noise alone is beyond: A is then a
+mean over blocks of chi-squares.
 """
 
 import json
@@ -30,16 +33,19 @@ from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
 
-#: Relative error of the fog model itself, in most pixels: of pixel centres the quadrature's, of means 3 x 3 rays'.
+#: Relative error of the fog model itself, in most pixels: of pixel centres the
+#: quadrature's, of means 3 x 3 rays'.
 KNOWN = {"centre": 3e-4, "area": 3e-3}
 
 _LIMITS = json.loads(Path(__file__).with_name("calibration.json").read_text(encoding="utf-8"))
-#: Least evidence with which a fault is named, and the largest fraction of the error that it may leave where that is no
-#: noise. `docs/tools/calibrate_diagnosis.py` chooses both and writes the file.
+#: Least evidence with which a fault is named, and the largest fraction of the error that it may
+#: leave where that is no noise. `docs/tools/calibrate_diagnosis.py` chooses both and writes the
+#: file.
 EVIDENCE, LEFT = float(_LIMITS["evidence"]), float(_LIMITS["left"])
 
 _BLOCK = 8  # pixels, as in a comparison (`validation.engine.judge`)
-_BLOCKS = 6  # along the shorter side of an image at least: a few blocks tell no noise from a gradient
+# along the shorter side of an image at least: a few blocks tell no noise from a gradient
+_BLOCKS = 6
 _CLIP = 3.0  # usual errors: beyond, single pixels such as those at a light would decide
 _SIGMAS = 2.0
 
@@ -61,7 +67,8 @@ class Blocks:
         return cls(number, len(used))
 
     def area(self, errors: Array, lit: Bools) -> float:
-        """Return how many pixels count as one: A of the module, of errors (m, 3), clipped at three usual ones.
+        """Return how many pixels count as one: A of the module, of errors (m, 3),
+        clipped at three usual ones.
 
         `lit`: which values are not dark, (m, 3): the others have no noise.
         """
@@ -79,12 +86,16 @@ class Blocks:
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
-    """Return the scale of the errors that an explanation leaves [1]: the fog model's own at least."""
+    """Return the scale of the errors that an explanation leaves [1]: the
+    fog model's own at least.
+    """
     return max(usual_size(explanation.errors[explanation.lit]), KNOWN[pixel])
 
 
 def evidence(explanation: Explanation, right: Explanation, scale: float, area: float) -> float:
-    """Return the evidence of an explanation against the unchanged scene; `area`: how many pixels count as one."""
+    """Return the evidence of an explanation against the unchanged scene; `area`: how
+    many pixels count as one.
+    """
     gain = _likelihood(explanation.errors, scale) - _likelihood(right.errors, scale)
     independent = max(len(explanation.errors) / area, math.e)
     return gain / area - 0.5 * explanation.parameters * math.log(independent)

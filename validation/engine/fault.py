@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes of a guess of an image, the numbers that are looked for in them, and the features that they need of a scene.
+"""Changes of a guess of an image, the numbers that are looked for in them, and the features
+that they need of a scene.
 
-A fault changes a guess, which another fault may have changed before: two faults of different kinds are applied in turn.
-A fault has any number of parameters, each with a range and values to begin with. A diagnosis looks for faults, most of
-them relative to the scene; a fit looks for faults that set a number (`validation.fit.unknowns`).
+A fault changes a guess, which another fault may have changed before: two faults of different kinds
+are applied in turn. A fault has any number of parameters, each with a range and values to begin
+with. A diagnosis looks for faults, most of them relative to the scene; a fit looks for faults that
+set a number (`validation.fit.unknowns`).
 """
 
 import math
@@ -48,9 +50,11 @@ class Number:
     high: float
     starts: tuple[float, ...] = (1.0,)
     scale: str = "plain"  #: one of `SCALES`
-    #: The step of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not.
+    #: The step of differences, for what moves paths: each guess costs new ones, and few
+    #: must do; 0: it does not.
     step: float = 0.0
-    stride: float = 0.0  #: of the first search along the axes, for what moves shadows; 0: there is none
+    #: of the first search along the axes, for what moves shadows; 0: there is none
+    stride: float = 0.0
 
     def inward(self, value: float) -> float:
         """Return the place on the whole line where a value is looked for."""
@@ -78,7 +82,8 @@ class Fault:
     costly: int = 0  #: 1: tried where nothing of 0 explains the image; 2: where no pair does either
     single: bool = False  #: whether it is not tried together with another one
     needs: tuple[str, ...] = ()  #: what the scene and its image must have for it, of `traits`
-    undo: Callable[[Array], Array] | None = None  #: the image without it, (height, width, 3) -> the same
+    #: the image without it, (height, width, 3) -> the same
+    undo: Callable[[Array], Array] | None = None
     factor: bool = False  #: whether its number is a factor that may have a name
     kind: str = ""  #: of the table that it is in: one of `validation.engine.faults.KINDS`
 
@@ -112,8 +117,12 @@ def with_scenery(**given: Any) -> Change:
 
 
 def scenery_number(name: str, digits: int = 4) -> Change:
-    """Return a change of a number of the scenery, with few digits: sceneries that differ by less share their paths."""
-    return lambda predictor, guess, p: with_scenery(**{name: short(p[0], digits)})(predictor, guess, p)
+    """Return a change of a number of the scenery, with few digits: sceneries that differ
+    by less share their paths.
+    """
+    return lambda predictor, guess, p: with_scenery(**{name: short(p[0], digits)})(
+        predictor, guess, p
+    )
 
 
 def of_fog_alone(change: Change) -> Change:
@@ -136,13 +145,16 @@ def of_surfaces_alone(change: Change) -> Change:
 
 def changed_layers(make: Callable[[Predictor, Guess, Values], Layers]) -> Change:
     """Return a change of airlight and surfaces before they are added."""
-    return lambda predictor, guess, p: replace(guess, layers=(*guess.layers, make(predictor, guess, p)))
+    return lambda predictor, guess, p: replace(
+        guess, layers=(*guess.layers, make(predictor, guess, p))
+    )
 
 
 def changed_values(change: Callable[..., Array]) -> Change:
     """Return a change of the values, by a function of them and the numbers of the fault."""
     return lambda predictor, guess, p: replace(
-        guess, values=(*guess.values, lambda radiance: change(radiance, *p) if p else change(radiance))
+        guess,
+        values=(*guess.values, lambda radiance: change(radiance, *p) if p else change(radiance)),
     )
 
 
@@ -158,10 +170,19 @@ def short(value: float, digits: int = 4) -> float:
 
 def traits(predictor: Predictor) -> dict[str, bool]:
     """Return whether a scene and its image have what faults need, by the words of `Fault.needs`."""
-    reference, fog, holds, values = predictor.reference, predictor.fog, predictor.seen.holds, predictor.seen.values
+    reference, fog, holds, values = (
+        predictor.reference,
+        predictor.fog,
+        predictor.seen.holds,
+        predictor.seen.values,
+    )
     spots, right = [light for light in reference.lights if light.axis is not None], Guess(fog)
     shapes, lobes = bool(reference.occluders.shapes()), any(isinstance(g, float) for g in fog.phase)
-    optics = [pair for media in zip(fog.sigma_t, fog.albedo, strict=True) for pair in zip(*media, strict=True)]
+    optics = [
+        pair
+        for media in zip(fog.sigma_t, fog.albedo, strict=True)
+        for pair in zip(*media, strict=True)
+    ]
     return {
         "shapes": shapes,
         "lamps": bool(reference.lights),  # point and spot lights
@@ -179,10 +200,13 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "absorption": any(s > 0 and a < 1 - 1e-6 for s, a in optics),
         "lobes": lobes and holds != "surface",  # of Henyey and Greenstein
         "g": lobes and holds != "surface" and any(fog.phase),  # other than 0
-        "isotropy": not lobes and any(medium.phase.is_constant for medium in (reference.medium, *reference.media)),
+        "isotropy": not lobes
+        and any(medium.phase.is_constant for medium in (reference.medium, *reference.media)),
         "square": predictor.shape[0] == predictor.shape[1],
         "oblong": predictor.shape[0] != predictor.shape[1],
-        "colours": bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))),
+        "colours": bool(
+            np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))
+        ),
         "stop": bool(stopped(values).any()),  # of many values
         # More light than there should be: higher orders take none away.
         "more light": float(np.median(predictor.shown(right) - predictor.predicted(right))) > 0,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of faults that an engine's image may have: what is said of each, and what it makes of a guess.
+"""The catalogue of faults that an engine's image may have: what is said of each, and
+what it makes of a guess.
 
-`airlight compare --diagnose` tries all of them; the hints of `airlight compare` are those with an `undo`, which takes a
-fault back from a whole image, without any path of light.
+`airlight compare --diagnose` tries all of them; the hints of `airlight compare` are those with an
+`undo`, which takes a fault back from a whole image, without any path of light.
 """
 
 from dataclasses import replace
@@ -25,20 +26,28 @@ _TABLES = {
     "camera": CAMERA,
     "values": VALUES,
 }
-KINDS = ("medium", "light", "layers", "camera", "brightness", "values")  #: in the order in which faults happen
+#: in the order in which faults happen
+KINDS = ("medium", "light", "layers", "camera", "brightness", "values")
 FAULTS = tuple(replace(fault, kind=kind) for kind, table in _TABLES.items() for fault in table)
 
 
 def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
-    """Return the faults that an image of a scene may have, those of its single lights and classes of lights too."""
+    """Return the faults that an image of a scene may have, those of its single lights
+    and classes of lights too.
+    """
     sources = light_sources(predictor.reference)
-    near, far = len(predictor.reference.lights), len(predictor.reference.lights) + len(predictor.reference.directional)
+    near, far = (
+        len(predictor.reference.lights),
+        len(predictor.reference.lights) + len(predictor.reference.directional),
+    )
     classes = {
         "point and spot lights": range(near),
         "directional lights": range(near, far),
         "area lights": range(far, len(sources)),
     }
-    groups = {name: tuple(numbers) for name, numbers in classes.items() if 1 < len(numbers) < len(sources)}
+    groups = {
+        name: tuple(numbers) for name, numbers in classes.items() if 1 < len(numbers) < len(sources)
+    }
     # A light that is the only one of its class is looked at even among many.
     singles = [(numbers[0],) for numbers in classes.values() if len(numbers) == 1 < len(sources)]
     if 1 < len(sources) <= _MANY_LIGHTS:

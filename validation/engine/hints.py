@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Suspected faults of a whole image: a constant factor, another way up, a gamma, values that stop at one.
+"""Suspected faults of a whole image: a constant factor, another way up, a gamma,
+values that stop at one.
 
-Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
-computes the root mean square error again, and names the combinations that make it ten times smaller, the fewest first.
+Such a fault of set-up hides everything else. For each combination of suspects this module takes the
+faults back, computes the root mean square error again, and names the combinations that make it ten
+times smaller, the fewest first.
 
-The radiance grows without bound towards a lamp, so that one pixel next to it can have most of the error, whatever the
-others are like. The error that decides therefore leaves out the worst hundredth of the lit values; and the
-factor that fits best is k = exp(median(log(r/t))) over the values that both images light, with t the test image and r
-the reference.
+The radiance grows without bound towards a lamp, so that one pixel next to it can have most of the
+error, whatever the others are like. The error that decides therefore leaves out the worst hundredth
+of the lit values; and the factor that fits best is k = exp(median(log(r/t))) over the values that
+both images light, with t the test image and r the reference.
 """
 
 import math
@@ -71,7 +73,9 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
 
 
 def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ...]]:
-    """Return the image without the faults that make the error ten times smaller, and their names."""
+    """Return the image without the faults that make the error ten times
+    smaller, and their names.
+    """
     first = smallest = _usual_error(ref, tst)
     hints: tuple[str, ...] = ()
     corrected, left = tst, math.nan
@@ -112,7 +116,11 @@ def _usual_error(ref: Array, tst: Array) -> float:
     floor = FLOOR * float(np.nanmean(ref))
     lit = int(np.count_nonzero((ref > floor) | (tst > floor)))
     kept = max(len(squared) - int(OUTLIERS * lit), 1)
-    return math.sqrt(float(np.mean(np.partition(squared, kept - 1)[:kept]))) if len(squared) else math.nan
+    return (
+        math.sqrt(float(np.mean(np.partition(squared, kept - 1)[:kept])))
+        if len(squared)
+        else math.nan
+    )
 
 
 def _rmse(ref: Array, tst: Array) -> float:
@@ -140,6 +148,7 @@ def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
     if not len(values) or not (wanted > 1.02 * values[0]).mean() > 0.5:
         return ()
     return (
-        f"{len(values)} values stop at {values[0]:.4g} where the reference goes up to {np.nanmax(wanted):.4g}: write "
+        f"{len(values)} values stop at {values[0]:.4g} where the reference goes up to "
+        f"{np.nanmax(wanted):.4g}: write "
         "floats, without a tone curve",
     )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults of the camera and the grid of pixels, of brightness, and of the values: encodings, curves, channels."""
+"""Faults of the camera and the grid of pixels, of brightness, and of the values:
+encodings, curves, channels.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -8,8 +10,25 @@ from itertools import permutations, product
 import numpy as np
 
 from airlight.validation.arrays import Array
-from airlight.validation.engine.curves import PRIMARIES, TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_pq, to_srgb
-from airlight.validation.engine.fault import Change, Fault, Number, Values, changed_values, scenery_number, top, undone
+from airlight.validation.engine.curves import (
+    PRIMARIES,
+    TONE_CURVES,
+    from_srgb,
+    gamma,
+    srgb_in_8_bits,
+    to_pq,
+    to_srgb,
+)
+from airlight.validation.engine.fault import (
+    Change,
+    Fault,
+    Number,
+    Values,
+    changed_values,
+    scenery_number,
+    top,
+    undone,
+)
 from airlight.validation.engine.prediction import Guess, Predictor
 
 
@@ -21,7 +40,9 @@ def shifted(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 
 def best_corner(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
-    """Return the best of no shift and half a pixel each way: at sharp edges slopes of one do not lead to others."""
+    """Return the best of no shift and half a pixel each way: at sharp edges slopes of
+    one do not lead to others.
+    """
 
     def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
         def error(shift: Values) -> float:
@@ -36,7 +57,9 @@ SHIFT = tuple(Number(-3.0, 3.0, step=0.1) for _ in range(2))  # begun by `best_c
 
 
 def _other_axis(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    """Return the guess with the angle of view along the other axis: pixels grow with the ratio of the sides."""
+    """Return the guess with the angle of view along the other axis: pixels grow
+    with the ratio of the sides.
+    """
     height, width = predictor.shape
     return replace(guess, scenery=replace(guess.scenery, zoom=width / height))
 
@@ -49,7 +72,10 @@ def _vignette(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 #: Names of the turns of an image, and their inverses: each is its own.
 TURNS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
     ("upside down (flip it vertically)", lambda image: image[::-1]),
-    ("mirrored left to right (a left-handed camera or an axis of the scene)", lambda image: image[:, ::-1]),
+    (
+        "mirrored left to right (a left-handed camera or an axis of the scene)",
+        lambda image: image[:, ::-1],
+    ),
     ("turned by 180 degrees", lambda image: image[::-1, ::-1]),
 )
 
@@ -83,7 +109,8 @@ CAMERA = (
     ),
     Fault(
         "vignette",
-        "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
+        "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the "
+        "camera's axis",
         _vignette,
         (Number(0.0, 100.0, (4.0, 1.0, 12.0)),),
     ),
@@ -98,7 +125,8 @@ def _exposed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, fog=replace(guess.fog, exposure=(red, green, blue)))
 
 
-_EXPOSURES = tuple(2.0**stops for stops in (0, 1, -1, 2, -2, 3, -3, 4, -4))  # that a curve after it may hide
+# that a curve after it may hide
+_EXPOSURES = tuple(2.0**stops for stops in (0, 1, -1, 2, -2, 3, -3, 4, -4))
 
 
 def _ratio(predictor: Predictor, guess: Guess) -> Sequence[Values]:
@@ -125,7 +153,11 @@ def _swapped(order: tuple[int, ...]) -> Fault:
     words = f"the image is in the channel order {', '.join('RGB'[channel] for channel in order)}"
     undo = (lambda image: image[..., order]) if order == (2, 1, 0) else None  # which undoes itself
     return Fault(
-        "channels", words, changed_values(lambda radiance: radiance[..., order]), needs=("colours",), undo=undo
+        "channels",
+        words,
+        changed_values(lambda radiance: radiance[..., order]),
+        needs=("colours",),
+        undo=undo,
     )
 
 
@@ -151,7 +183,11 @@ VALUES = (
         changed_values(from_srgb),
         undo=to_srgb,
     ),
-    Fault("transfer", "the values were written in 8 bits by the sRGB curve", changed_values(srgb_in_8_bits)),
+    Fault(
+        "transfer",
+        "the values were written in 8 bits by the sRGB curve",
+        changed_values(srgb_in_8_bits),
+    ),
     Fault(
         "transfer",
         "the values are encoded by a gamma of {0:.3g}: write linear ones",
@@ -160,11 +196,14 @@ VALUES = (
     ),
     Fault(
         "transfer",
-        "the values are encoded by the PQ curve of SMPTE ST 2084, 1 as {0:.4g} cd/m^2: write linear ones",
+        "the values are encoded by the PQ curve of SMPTE ST 2084, 1 as {0:.4g} cd/m^2: write "
+        "linear ones",
         changed_values(to_pq),
         (Number(1e-3, 1e6, (100.0, 10_000.0), scale="log"),),
     ),
-    Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, needs=("stop",)),
+    Fault(
+        "clamp", "the values are cut off at the largest one: write floats", _clamp, needs=("stop",)
+    ),
     *(
         Fault("tone-map", f"the values went through {words}", changed_values(curve))
         for words, curve in TONE_CURVES.items()

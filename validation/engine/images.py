@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images that another renderer wrote, such as a game engine: EXR files named by scene, judged by the reference.
+"""Images that another renderer wrote, such as a game engine: EXR files named by scene,
+judged by the reference.
 
-A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An image with a layer
-`airlight` is judged by that; else its plain channels are judged against airlight plus surface. It is judged at its own
-size, which all images of a scene must share, and by the reference that fits, at pixel centres or over their areas.
+A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An
+image with a layer `airlight` is judged by that; else its plain channels are judged against airlight
+plus surface. It is judged at its own size, which all images of a scene must share, and by the
+reference that fits, at pixel centres or over their areas.
 """
 
 import json
@@ -36,20 +38,30 @@ class EngineImage:
     path: Path
 
 
-def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
+def find_images(
+    folder: str | os.PathLike[str], scenes: Mapping[str, str]
+) -> dict[str, tuple[EngineImage, ...]]:
     """Return the images in a folder by the name of their scene.
 
-    `folder`: holds EXR files; other files are not looked at; `scenes`: the scenes that files may name: a name, and what
-    `validation.scenes.loading.load_scene` takes for it.
+    `folder`: holds EXR files; other files are not looked at; `scenes`: the scenes that files may
+    name: a name, and what `validation.scenes.loading.load_scene` takes for it.
     """
     place = Path(folder)
     if not place.is_dir():
         raise InputError(
-            f"--images: got {folder}, expected a folder with EXR files named by scene, such as open-fog.exr"
+            f"--images: got {folder}, expected a folder with EXR files named by scene, such as "
+            "open-fog.exr"
         )
-    files = sorted(path for path in place.iterdir() if path.suffix.lower() == ".exr" and not path.name.startswith("."))
+    files = sorted(
+        path
+        for path in place.iterdir()
+        if path.suffix.lower() == ".exr" and not path.name.startswith(".")
+    )
     if not files:
-        raise InputError(f"--images: the folder {folder} has no EXR file; expected SCENE.exr or SCENE.NAME.exr in it")
+        raise InputError(
+            f"--images: the folder {folder} has no EXR file; expected SCENE.exr or SCENE.NAME.exr "
+            "in it"
+        )
     by_scene: dict[str, tuple[EngineImage, ...]] = {}
     for path in files:
         scene = _scene_of(path, scenes)
@@ -66,7 +78,8 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
         if size != sizes[first.path]:
             wanted, got = (f"{width} x {height}" for width, height in (sizes[first.path], size))
             raise InputError(
-                f"--images: {path} is {got} pixels and {first.path} {wanted}; render all images of a scene at one size"
+                f"--images: {path} is {got} pixels and {first.path} {wanted}; render all images of "
+                "a scene at one size"
             )
     return sizes[first.path]
 
@@ -74,35 +87,45 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
 def measure_image(
     shown: EngineImage, loaded: LoadedScene, reference_of: ReferenceOf, *, surfaces: bool
 ) -> tuple[EngineComparison, Mapping[str, NDArray[np.floating]], Metrics | None]:
-    """Judge an image from elsewhere by the reference of its scene at its size, as `airlight compare SCENE IMAGE` does.
+    """Judge an image from elsewhere by the reference of its scene at its size, as `airlight
+    compare SCENE IMAGE` does.
 
-    `loaded`, `reference_of`: the scene at that size, and what computes its reference for 'centre' or 'area';
-    `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers that were judged by what they
-    hold, and the error of the surface where an image has both layers.
+    `loaded`, `reference_of`: the scene at that size, and what computes its reference for 'centre'
+    or 'area'; `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers
+    that were judged by what they hold, and the error of the surface where an image has both layers.
     """
     image = read_exr(shown.path)
     layer = judged_layer(image, shown.path)
     layers = {layer.holds: layer.values}
     if layer.name == AIRLIGHT and SURFACE in image.layers:
         layers[SURFACE] = image.layers[SURFACE]
-    judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=image.with_data())
+    judged = judge_image(
+        image, layer, loaded, reference_of, path=shown.path, mask=image.with_data()
+    )
     both = surfaces and AIRLIGHT in layers and SURFACE in layers
     return judged, layers, error_metrics(judged.layers.surface, layers[SURFACE]) if both else None
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:
-    """Return notes of the reader of a file, the kind of its pixels, whether it is right, and the device."""
+    """Return notes of the reader of a file, the kind of its pixels, whether it
+    is right, and the device.
+    """
     notes = [judged.note] if judged.note else []
-    notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
+    notes += (
+        ["judged by the means over the areas of pixels, which fit"]
+        if judged.pixel == "area"
+        else []
+    )
     notes += [judged.verdict.words]
     return "; ".join([*notes, f"timed on {times[1]}"] if times is not None and times[1] else notes)
 
 
 def image_times(path: Path) -> tuple[Timing, str] | None:
-    """Return the time of a frame that `times.json` in the folder of an image says, and the device; None for nothing.
+    """Return the time of a frame that `times.json` in the folder of an image says, and the
+    device; None for nothing.
 
-    The file holds, by the name of the image, `{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}`, of which
-    the last two may be missing.
+    The file holds, by the name of the image, `{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX
+    4090"}`, of which the last two may be missing.
     """
     file = path.with_name(TIMES)
     if not file.is_file():
@@ -118,7 +141,8 @@ def image_times(path: Path) -> tuple[Timing, str] | None:
             raise ValueError("ms")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(
-            f'{file}: expected {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}}}}, '
+            f'{file}: expected {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": '
+            '"RTX 4090"}}, '
             "milliseconds of a frame above 0, the median between its quartiles"
         ) from error
     return times, str(entry.get("device", ""))
@@ -131,6 +155,6 @@ def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:
     if names:
         return max(names, key=len)
     raise InputError(
-        f"--images: {path} names no scene, expected SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}"
-        + nearest(stem.split(".")[0], scenes)
+        f"--images: {path} names no scene, expected SCENE.exr or SCENE.NAME.exr with one of "
+        f"{', '.join(scenes)}" + nearest(stem.split(".")[0], scenes)
     )

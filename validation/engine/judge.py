@@ -1,24 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether an image that another renderer made of a scene is right, against the reference of that scene at its size.
+"""Whether an image that another renderer made of a scene is right, against the reference
+of that scene at its size.
 
-**Pixels.** A renderer that filters its samples by a box writes means over the areas of pixels, one that traces a ray
-through each centre does not, and few say which. The two differ where the radiance changes within a pixel: at edges, and
-beside a light, by 10 % and more. Only these values can tell the one from the other, so only they are looked at. With r
-the reference of either kind and t the image, without the faults of the whole that `hints.py` finds, the error is the
-mean of
+**Pixels.** A renderer that filters its samples by a box writes means over the areas of pixels, one
+that traces a ray through each centre does not, and few say which. The two differ where the radiance
+changes within a pixel: at edges, and beside a light, by 10 % and more. Only these values can tell
+the one from the other, so only they are looked at. With r the reference of either kind and t the
+image, without the faults of the whole that `hints.py` finds, the error is the mean of
 
     |t - r| / max(|t|, |r|, 0.001 mean(r))
 
 which no single value decides, and the kind with the smaller error fits.
 
-**Verdict.** The noise of a path tracer is independent from pixel to pixel, and near a light its variance is infinite:
-no bound on the error of single pixels tells noise from a fault. Means over blocks of pixels do: noise falls as the root
-of their number, an error of light, medium or shadow stays. An image is right if the relative error of the block means,
+**Verdict.** The noise of a path tracer is independent from pixel to pixel, and near a light its
+variance is infinite: no bound on the error of single pixels tells noise from a fault. Means over
+blocks of pixels do: noise falls as the root of their number, an error of light, medium or shadow
+stays. An image is right if the relative error of the block means,
 
     |sum(t) - sum(r)| / max(sum(r), 0.05 n mean(r))    over the n pixels of a block, channel by channel,
 
-is at most `RIGHT` in the root mean square, the worst hundredth of the blocks left out (that of the light), if the best
-factor is as close to one, and if nothing is suspected of the image as a whole.
+is at most `RIGHT` in the root mean square, the worst hundredth of the blocks left out (that of the
+light), if the best factor is as close to one, and if nothing is suspected of the image as a whole.
 """
 
 import math
@@ -69,10 +71,14 @@ ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'cen
 BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
 RIGHT = 0.01  #: largest relative error of an image that is called right
 _DIM = 0.05  # of the mean: a block that is dimmer in both images says nothing
-_APART = 0.01  # by how much the two references must differ, relative to the larger, for a value to say which fits
-_FEW_WRONG = 0.1  # of the pixels: what stands on an image, or is missing in it; more are another image
-_APART_FROM_NOISE = 6.0  # median errors: noise of a normal distribution is beyond in 5 pixels of 100 000
-_EXACT = 1e-3  # relative error of an image that fits the centres so well that nothing can fit better
+# by how much the two references must differ, relative to the larger, for a value to say which fits
+_APART = 0.01
+# of the pixels: what stands on an image, or is missing in it; more are another image
+_FEW_WRONG = 0.1
+# median errors: noise of a normal distribution is beyond in 5 pixels of 100 000
+_APART_FROM_NOISE = 6.0
+# relative error of an image that fits the centres so well that nothing can fit better
+_EXACT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,9 @@ class Verdict:
 
     @property
     def noise_alone(self) -> bool:
-        """Whether the scatter within blocks explains the error of their means, and nothing else is in the way."""
+        """Whether the scatter within blocks explains the error of their means, and
+        nothing else is in the way.
+        """
         return len(self.reasons) <= 1 and self.block_noise > self.block_error / math.sqrt(2)
 
     @property
@@ -95,7 +103,9 @@ class Verdict:
         """Return a sentence."""
         if not self.right:
             return f"not right: {'; '.join(self.reasons)}"
-        size = "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
+        size = (
+            "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
+        )
         scatter = f"the scatter of single pixels alone makes {100 * self.block_noise:.2g} %"
         return f"right: {size} are within {100 * self.block_error:.2g} % ({scatter})"
 
@@ -107,15 +117,18 @@ class EngineComparison:
     scene: str
     path: str
     size: tuple[int, int]  #: width and height [pixels]
-    kind: PixelKind  #: what a pixel is, and how well either kind fits where the two references differ
+    #: what a pixel is, and how well either kind fits where the two references differ
+    kind: PixelKind
     hints: Hints  #: what may be wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    known: Estimate  #: mean of the layer of the reference that it was compared with, and its error [W/(m^2 sr)]
+    #: mean of the layer of the reference that it was compared with, and its error [W/(m^2 sr)]
+    known: Estimate
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
     note: str  #: what the reader of the file changed or left out
-    layers: ReferenceImage = field(repr=False, compare=False)  #: the reference that it was judged by, and its layer
+    #: the reference that it was judged by, and its layer
+    layers: ReferenceImage = field(repr=False, compare=False)
     reference: NDArray[np.floating] = field(repr=False, compare=False)
     image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
 
@@ -156,11 +169,12 @@ def compare_scene(
 ) -> EngineComparison:
     """Compare an EXR file with the reference of a scene at the file's size.
 
-    `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what it holds, see
-    `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area', see
-    `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what fits; `mask`: an
-    EXR file that is 0 in pixels to leave out; `all_metrics`: see `validation.comparison.images.compare_images`;
-    `margin`: largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
+    `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what
+    it holds, see `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area', see
+    `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what
+    fits; `mask`: an EXR file that is 0 in pixels to leave out; `all_metrics`: see
+    `validation.comparison.images.compare_images`; `margin`: largest relative bias [1] that counts
+    as agreement; with standard errors, what they can show counts.
     """
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
@@ -191,27 +205,34 @@ def judge_image(
     margin: float | None = None,
     **metrics: Any,
 ) -> EngineComparison:
-    """Judge a layer of an image by the reference of its scene, as `compare_scene` and the report do.
+    """Judge a layer of an image by the reference of its scene, as
+    `compare_scene` and the report do.
 
-    `image`, `judged`: the image, and the layer of it; `loaded`, `reference_of`: the scene at its size, and what
-    computes its reference for 'centre' or 'area'; `mask`: which pixels are compared, (height, width); all by default;
-    `metrics`: more for `validation.comparison.images.compare_images`.
+    `image`, `judged`: the image, and the layer of it; `loaded`, `reference_of`: the scene at its
+    size, and what computes its reference for 'centre' or 'area'; `mask`: which pixels are compared,
+    (height, width); all by default; `metrics`: more for
+    `validation.comparison.images.compare_images`.
     """
     check_margin(margin)
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
-        judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))
+        judged = replace(
+            judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan)
+        )
     kind, hints = fitting_kind(judged, reference_of, kinds)
     # Light of another kind says nothing of the pixels: either reference may fit it.
     other = _other_light(judged, [reference_of(each) for each in (kinds[0], kind.pixel)])
     hints, fitting = replace(hints, words=(*hints.words, *other)), reference_of(kind.pixel)
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
-    layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
+    layers = {name: image.layers[name]} | (
+        {f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {}
+    )
     wanted = expected_layer(fitting, judged)
     expected = {name: wanted}
     own_error = reference_error(fitting, judged.holds)
     if with_errors and own_error is not None:
-        # Where no path of the image arrived it has no standard error: the reference alone must not judge such a value.
+        # Where no path of the image arrived it has no standard error: the reference alone
+        # must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
     comparison = compare_images(
         Image(expected, attributes={BATCHES: REPLICATES}),
@@ -245,20 +266,32 @@ def judge_image(
     )
 
 
-def references(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], ReferenceImage]:
-    """Return a function that computes the reference at pixel centres or over their areas, or reads the cache."""
+def references(
+    loaded: LoadedScene, progress: Progress | None = None
+) -> Callable[[str], ReferenceImage]:
+    """Return a function that computes the reference at pixel centres or over their
+    areas, or reads the cache.
+    """
     tell = None if progress is None else lambda done, total, what: progress(done / total, what)
     return cache(lambda pixel: reference_image(loaded.scene, pixel=pixel, progress=tell))
 
 
 def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
-    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
+    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in
+    the middle of the image].
+    """
     angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
-    return reference.light_angle / angle if angle > 0 else np.full(reference.light_angle.shape, math.inf)
+    return (
+        reference.light_angle / angle
+        if angle > 0
+        else np.full(reference.light_angle.shape, math.inf)
+    )
 
 
 def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[str, ...]:
-    """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
+    """Say so where an image is the airlight or the surface alone, or all light, and
+    not what it was taken for.
+    """
     errors, powers = {}, {}
     if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
         shown, hidden = (
@@ -269,19 +302,26 @@ def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[st
             for emitted in (True, False)
         )
         if GAIN**2 * hidden < shown:
-            return ("the image does not show the area lights that the camera sees: compare its airlight",)
+            return (
+                "the image does not show the area lights that the camera sees: compare its airlight",
+            )
     for name in KINDS:
         layers = [reference_layer(reference, name, emitted=judged.emitted) for reference in fitting]
         errors[name] = min(_mean_square(judged.values - values) for values in layers)
         powers[name] = _mean_square(layers[0])
     nearest = min(errors, key=errors.__getitem__)
     # A dim image is near to a layer without light, but not nearer than a tenth of that layer's own.
-    if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
+    if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(
+        errors[judged.holds], powers[nearest]
+    ):
         return ()
     if nearest == TOTAL:
         return (f"the image is all light: say --layer {judged.name}=total",)
     channels = ", ".join(f"{nearest}.{channel}" for channel in "RGB")
-    return (f"the image is the {nearest} alone: name its channels {channels}, or say --layer {judged.name}={nearest}",)
+    return (
+        f"the image is the {nearest} alone: name its channels {channels}, or say --layer "
+        f"{judged.name}={nearest}",
+    )
 
 
 def _mean_square(values: NDArray[np.floating]) -> float:
@@ -289,11 +329,14 @@ def _mean_square(values: NDArray[np.floating]) -> float:
     return float(np.mean(finite**2)) if finite.size else math.inf
 
 
-def fitting_kind(judged: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> tuple[PixelKind, Hints]:
-    """Return the kind of an image's pixels, by the reference that fits it, and the suspected faults of the whole image.
+def fitting_kind(
+    judged: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]
+) -> tuple[PixelKind, Hints]:
+    """Return the kind of an image's pixels, by the reference that fits it, and the suspected
+    faults of the whole image.
 
-    `reference_of`: computes a reference; asked for the means only if the image does not fit the centres to `_EXACT`;
-    `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
+    `reference_of`: computes a reference; asked for the means only if the image does not fit the
+    centres to `_EXACT`; `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
 
     def attempt(kind: str) -> tuple[Array, Hints]:
@@ -302,10 +345,13 @@ def fitting_kind(judged: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence
 
     def errors(found: Sequence[tuple[Array, Hints]]) -> list[float]:
         (centre, _), (area, _) = found
-        apart = np.abs(area - centre) > _APART * np.maximum(area, centre)  # an infinite centre counts
+        # an infinite centre counts
+        apart = np.abs(area - centre) > _APART * np.maximum(area, centre)
         return [_error(wanted, hints.corrected, apart) for wanted, hints in found]
 
-    kind, (_, hints) = decide_pixel(kinds, attempt, errors, lambda found: _fits(found[0], found[1].corrected))
+    kind, (_, hints) = decide_pixel(
+        kinds, attempt, errors, lambda found: _fits(found[0], found[1].corrected)
+    )
     return kind, hints
 
 
@@ -328,8 +374,9 @@ def _error(reference: Array, image: Array, where: Bools) -> float:
 def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
     """Decide whether an image is right.
 
-    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of the image as a whole;
-    `failures`: why it must be called wrong anyway: values that are not finite, or negative.
+    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of
+    the image as a whole; `failures`: why it must be called wrong anyway: values that are not
+    finite, or negative.
     """
     side = min(BLOCK, max(1, min(reference.shape[:2]) // 10))
     error, noise = _block_errors(reference, image, side)
@@ -347,8 +394,12 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
 
 
 def all_but_few(compared: EngineComparison) -> str:
-    """Say which pixels are wrong where these are few and all others are right; nothing where that is not so."""
-    reference, image = (np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image))
+    """Say which pixels are wrong where these are few and all others are right;
+    nothing where that is not so.
+    """
+    reference, image = (
+        np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image)
+    )
     finite = np.isfinite(reference)
     floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
@@ -360,18 +411,22 @@ def all_but_few(compared: EngineComparison) -> str:
         return ""
     row, column = np.nonzero(wrong)
     return (
-        f"all is right but {len(row)} of {wrong.size} pixels, in columns {column.min()} to {column.max()} and rows "
+        f"all is right but {len(row)} of {wrong.size} pixels, in columns {column.min()} to "
+        f"{column.max()} and rows "
         f"{row.min()} to {row.max()} from the upper left"
     )
 
 
 def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
-    """Return the relative error of the means of lit blocks, and the fraction of it that noise explains."""
+    """Return the relative error of the means of lit blocks, and the fraction
+    of it that noise explains.
+    """
     finite = np.isfinite(reference) & np.isfinite(image)
     wanted, got = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
     difference = got - wanted
     count, light, seen, offset, square = (
-        block_sums(values, side) for values in (finite.astype(float), wanted, got, difference, difference**2)
+        block_sums(values, side)
+        for values in (finite.astype(float), wanted, got, difference, difference**2)
     )
     floor = _DIM * float(wanted.mean())
     lit = (count > 0) & (np.maximum(light, seen) > floor * count)
@@ -380,5 +435,8 @@ def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, flo
     scale = np.maximum(light, floor * count)[lit]
     error = np.abs(offset[lit]) / scale
     scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
-    kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]  # of few blocks none may be wrong
-    return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(float(np.mean((scatter / scale**2)[kept])))
+    # of few blocks none may be wrong
+    kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
+    return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(
+        float(np.mean((scatter / scale**2)[kept]))
+    )

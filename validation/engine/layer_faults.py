@@ -28,7 +28,9 @@ def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
 
     def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         old = getattr(guess.fog, entry)
-        new = tuple(value * p[0] if lights is None or n in lights else value for n, value in enumerate(old))
+        new = tuple(
+            value * p[0] if lights is None or n in lights else value for n, value in enumerate(old)
+        )
         given: dict[str, Any] = {entry: new}
         return replace(guess, fog=replace(guess.fog, **given))
 
@@ -36,10 +38,14 @@ def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
 
 
 def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
-    """Return the start of a factor: its part of the light then explains most of the residual of the rest."""
+    """Return the start of a factor: its part of the light then explains most of
+    the residual of the rest.
+    """
 
     def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-        once, none = (predictor.predicted(change(predictor, guess, (value,))) for value in (1.0, 0.0))
+        once, none = (
+            predictor.predicted(change(predictor, guess, (value,))) for value in (1.0, 0.0)
+        )
         part, left = once - none, predictor.shown(guess) - none
         lit = part > 0.01 * max(float(part.mean()), 1e-300)
         if not lit.any():
@@ -52,13 +58,17 @@ def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
 def _weighted_median(values: Array, weights: Array) -> float:
     order = np.argsort(values)
     heavier = np.cumsum(weights[order])
-    return float(values[order][min(int(np.searchsorted(heavier, 0.5 * heavier[-1])), len(order) - 1)])
+    return float(
+        values[order][min(int(np.searchsorted(heavier, 0.5 * heavier[-1])), len(order) - 1)]
+    )
 
 
 def factor_fault(name: str, words: str, change: Change, needs: tuple[str, ...] = ()) -> Fault:
     """Return a fault that multiplies a part of the light."""
     one = (Number(1e-9, 1e9, scale="log"),)
-    return Fault(name, words, change, one, begin=_times(change), needs=needs, factor=True, kind="layers")
+    return Fault(
+        name, words, change, one, begin=_times(change), needs=needs, factor=True, kind="layers"
+    )
 
 
 def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Change:
@@ -73,14 +83,19 @@ def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Ch
 
 def _ambient(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     fog = 1 - predictor.transmittance(guess)
-    return replace(guess, layers=(*guess.layers, lambda airlight, surface: (airlight + np.array(p) * fog, surface)))
+    return replace(
+        guess,
+        layers=(*guess.layers, lambda airlight, surface: (airlight + np.array(p) * fog, surface)),
+    )
 
 
 def _ambient_colour(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     fog = 1 - predictor.transmittance(guess)
     more = predictor.shown(guess) - predictor.predicted(guess)
     safe = np.maximum(fog, 1e-6)
-    return [tuple(max(_weighted_median(m / f, f), 0.0) for m, f in zip(more.T, safe.T, strict=True))]
+    return [
+        tuple(max(_weighted_median(m / f, f), 0.0) for m, f in zip(more.T, safe.T, strict=True))
+    ]
 
 
 def _fog_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
@@ -104,17 +119,20 @@ FOG_AND_SURFACES = (
         Fault("opacity", words, _opacity(change), needs=needs)
         for words, needs, change in (
             (
-                "the fog is multiplied by its opacity once more: it was blended as a colour, or premultiplied twice",
+                "the fog is multiplied by its opacity once more: it was blended as a colour, or "
+                "premultiplied twice",
                 ("fog",),
                 lambda airlight, surface, left: (airlight * (1 - left), surface),
             ),
             (
-                "the fog is divided by its opacity: it was not premultiplied, and is taken as if it were",
+                "the fog is divided by its opacity: it was not premultiplied, and is taken as if "
+                "it were",
                 ("fog",),
                 lambda airlight, surface, left: (airlight / np.maximum(1 - left, 1e-6), surface),
             ),
             (
-                "the fog is multiplied by the transmittance of the whole ray: it is attenuated once more",
+                "the fog is multiplied by the transmittance of the whole ray: it is attenuated "
+                "once more",
                 ("both",),
                 lambda airlight, surface, left: (airlight * left, surface),
             ),
@@ -162,7 +180,8 @@ FOG_AND_SURFACES = (
     *(
         Fault(
             "light-lag",
-            f"the first light is off by ({{0:.3g}}, {{1:.3g}}, {{2:.3g}}) m for {words}: one of them lags",
+            f"the first light is off by ({{0:.3g}}, {{1:.3g}}, {{2:.3g}}) m for {words}: one of "
+            "them lags",
             alone(at_position),
             PLACE,
             held=held,

@@ -24,8 +24,12 @@ from airlight.validation.fog_model.view import Scenery
 
 
 def _window(factor: Callable[..., Array]) -> Change:
-    """Return a function that gives the light a factor, by the distance from it and the numbers of a fault."""
-    return lambda predictor, guess, p: replace(guess, fog=replace(guess.fog, window=lambda r: factor(r, *p)))
+    """Return a function that gives the light a factor, by the distance from it
+    and the numbers of a fault.
+    """
+    return lambda predictor, guess, p: replace(
+        guess, fog=replace(guess.fog, window=lambda r: factor(r, *p))
+    )
 
 
 def _within(change: Callable[[Array], Array]) -> Callable[[Array, float], Array]:
@@ -38,14 +42,20 @@ def _softened(r: Array, size: float) -> Array:
 
 
 def _of_a_disk(r: Array, radius: float) -> Array:
-    """Return the light of a disk at a point that it faces, as a fraction of the light of a point light."""
+    """Return the light of a disk at a point that it faces, as a fraction of
+    the light of a point light.
+    """
     return 2 * r**2 / (r**2 + radius**2 + r * np.sqrt(r**2 + radius**2))
 
 
 def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    r = np.concatenate([each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).lights])
+    r = np.concatenate(
+        [each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).lights]
+    )
     if not len(r):
-        r = np.concatenate([e.surface.r for e in predictor.light.model(predictor.seen, Scenery(), 1).lights])
+        r = np.concatenate(
+            [e.surface.r for e in predictor.light.model(predictor.seen, Scenery(), 1).lights]
+        )
     far = float(np.median(r)) if len(r) else 1.0
     return [(far * part,) for part in (0.5, 1.0, 2.0, 4.0)]
 
@@ -100,9 +110,14 @@ LIGHTS = (
             needs=("lamps",),
         )
         for words, law in (
-            ("the light falls as 1/(r^2 + e) with e = {0:.3g} m^2: it is softened near its source", _softened),
             (
-                "the light falls as 2/(r^2 + R^2 + r sqrt(r^2 + R^2)), that of a disk of the radius R = {0:.3g} m that "
+                "the light falls as 1/(r^2 + e) with e = {0:.3g} m^2: it is softened near its "
+                "source",
+                _softened,
+            ),
+            (
+                "the light falls as 2/(r^2 + R^2 + r sqrt(r^2 + R^2)), that of a disk of the "
+                "radius R = {0:.3g} m that "
                 "faces every point: a soft falloff",
                 _of_a_disk,
             ),
@@ -110,10 +125,13 @@ LIGHTS = (
     ),
     Fault(
         "distance-law",
-        "the light falls as 1/(r^2 + e) with e = {0:.3g} m^2, and ends by (1 - (r/R)^4)^2 with R = {1:.4g} m",
+        "the light falls as 1/(r^2 + e) with e = {0:.3g} m^2, and ends by (1 - (r/R)^4)^2 with R = "
+        "{1:.4g} m",
         _window(lambda r, size, end: _softened(r, size) * (1 - np.minimum(r / end, 1.0) ** 4) ** 2),
         (Number(1e-6, 1e3, scale="log"), Number(1e-3, 1e6, scale="log")),
-        begin=lambda predictor, guess: [(size, *end) for size in (0.1, 1.0) for end in _ranges(predictor, guess)],
+        begin=lambda predictor, guess: [
+            (size, *end) for size in (0.1, 1.0) for end in _ranges(predictor, guess)
+        ],
         needs=("lamps",),
     ),
     *(
@@ -136,8 +154,16 @@ LIGHTS = (
     *(
         Fault("spot-angle", words, with_scenery(cone=factor), needs=("spots",))
         for words, factor in (
-            ("the angles of spots are twice what they should be: a half angle was taken for a whole one", 2.0),
-            ("the angles of spots are half of what they should be: a whole angle was taken for a half one", 0.5),
+            (
+                "the angles of spots are twice what they should be: a half angle was taken for a "
+                "whole one",
+                2.0,
+            ),
+            (
+                "the angles of spots are half of what they should be: a whole angle was taken for "
+                "a half one",
+                0.5,
+            ),
         )
     ),
     Fault(
@@ -148,7 +174,12 @@ LIGHTS = (
         costly=1,
         needs=("spots",),
     ),
-    Fault("spot-falloff", "spots have a hard edge, without falloff", with_scenery(edge="hard"), needs=("soft spots",)),
+    Fault(
+        "spot-falloff",
+        "spots have a hard edge, without falloff",
+        with_scenery(edge="hard"),
+        needs=("soft spots",),
+    ),
     Fault(
         "spot-falloff",
         "spots fall off from their axis on, not from the beam's edge",
@@ -156,7 +187,12 @@ LIGHTS = (
         needs=("spots",),
     ),
     *(
-        Fault("spot-falloff", f"spots fall off {words}", with_scenery(edge=edge), needs=("soft spots",))
+        Fault(
+            "spot-falloff",
+            f"spots fall off {words}",
+            with_scenery(edge=edge),
+            needs=("soft spots",),
+        )
         for words, edge in (
             ("as a line in the cosine, not in the angle", "linear"),
             ("squared in the cosine, as glTF has it, not as a line in the angle", "square"),
@@ -165,7 +201,8 @@ LIGHTS = (
     ),
     Fault(
         "spot-falloff",
-        "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
+        "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by "
+        "the cosine",
         scenery_number("blend"),
         (Number(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
         costly=1,

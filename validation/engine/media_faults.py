@@ -27,7 +27,8 @@ from airlight.validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
 _FACTOR = (0.5, 0.7, 1.4, 2.0)
 _SHIFT = Number(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]
-_USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and modelling programs [m]
+# of cameras in engines and modelling programs [m]
+_USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 
 
 def _optics(change: Callable[..., tuple[float, float]]) -> Change:
@@ -41,7 +42,9 @@ def changed_optics(fog: Fog, change: Callable[[float, float], tuple[float, float
         [change(s, a) if s > 0 else (s, a) for s, a in zip(sigma_t, albedo, strict=True)]
         for sigma_t, albedo in zip(fog.sigma_t, fog.albedo, strict=True)
     ]
-    sigma_t, albedo = (tuple(colour([pair[which] for pair in medium]) for medium in pairs) for which in (0, 1))
+    sigma_t, albedo = (
+        tuple(colour([pair[which] for pair in medium]) for medium in pairs) for which in (0, 1)
+    )
     return replace(fog, sigma_t=sigma_t, albedo=albedo)
 
 
@@ -55,7 +58,9 @@ def _absorption(sigma_t: float, albedo: float, factor: float = 0.0) -> tuple[flo
 def _lobes(choose: Callable[[float], float | PhaseLaw]) -> Change:
     """Return a function that changes every Henyey-Greenstein phase function by its g."""
     return changed_fog(
-        lambda fog: replace(fog, phase=tuple(choose(g) if isinstance(g, float) else g for g in fog.phase))
+        lambda fog: replace(
+            fog, phase=tuple(choose(g) if isinstance(g, float) else g for g in fog.phase)
+        )
     )
 
 
@@ -64,7 +69,9 @@ def _schlick(k: float) -> PhaseLaw:
 
 
 def _cornette_shanks(g: float) -> PhaseLaw:
-    return lambda cosine: 1.5 * (1 - g * g) / (2 + g * g) * (1 + cosine**2) / (1 + g * g - 2 * g * cosine) ** 1.5
+    return lambda cosine: (
+        1.5 * (1 - g * g) / (2 + g * g) * (1 + cosine**2) / (1 + g * g - 2 * g * cosine) ** 1.5
+    )
 
 
 def _rayleigh(cosine: Array) -> Array:
@@ -80,26 +87,39 @@ def _every_phase(law: float | PhaseLaw) -> Change:
 
 
 def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    """Return the guess with all lengths times a factor: paths grow with it, and light from points falls as its square.
+    """Return the guess with all lengths times a factor: paths grow with it, and light from
+    points falls as its square.
 
     Irradiance and radiance, of lights that are far or have extent, are what they were.
     """
     near = len(predictor.reference.lights)
-    intensity = tuple(value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
+    intensity = tuple(
+        value / p[0] ** 2 if light < near else value
+        for light, value in enumerate(guess.fog.intensity)
+    )
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[0], albedo))
     return replace(guess, fog=replace(fog, intensity=intensity))
 
 
 def _between(spherical: bool, end: str, at: float | None = None) -> Change:
-    """Return a function that begins or ends the medium at a distance, a given one or a parameter of the fault."""
-    return changed_fog(lambda fog, *p: replace(fog, **{end: short(p[0]) if at is None else at, "spherical": spherical}))
+    """Return a function that begins or ends the medium at a distance, a given one or
+    a parameter of the fault.
+    """
+    return changed_fog(
+        lambda fog, *p: replace(
+            fog, **{end: short(p[0]) if at is None else at, "spherical": spherical}
+        )
+    )
 
 
 def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     """Return distances at which a fog may end: parts of those that the image shows."""
     view = predictor.view
     seen = view.distance[np.isfinite(view.distance)]
-    lights = [float(np.linalg.norm(light.position - view.reference.origin)) for light in view.reference.lights]
+    lights = [
+        float(np.linalg.norm(light.position - view.reference.origin))
+        for light in view.reference.lights
+    ]
     far = float(np.quantile(seen, 0.9)) if seen.size else 2 * max(lights, default=5.0)
     return [(far * part,) for part in (0.9, 0.6, 0.35)]
 
@@ -114,7 +134,9 @@ def _falling(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 def _even(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return height fog with one extinction at all heights."""
-    return replace(guess, fog=replace(guess.fog, sigma_t=((p[0],) * 3,), height=HeightFog(constant=1.0)))
+    return replace(
+        guess, fog=replace(guess.fog, sigma_t=((p[0],) * 3,), height=HeightFog(constant=1.0))
+    )
 
 
 def _densities(predictor: Predictor, guess: Guess) -> Sequence[Values]:
@@ -166,7 +188,10 @@ def _multiple(of_surfaces: bool) -> Change:
         if more is None:
             return lambda airlight, surface: (airlight, surface)
         orders = more[:, predictor.pixels]
-        return lambda airlight, surface: (airlight + p[0] * orders[0], surface + p[0] * of_surfaces * orders[1])
+        return lambda airlight, surface: (
+            airlight + p[0] * orders[0],
+            surface + p[0] * of_surfaces * orders[1],
+        )
 
     return changed_layers(make)
 
@@ -212,7 +237,10 @@ MEDIUM = (
                 "decoded by the sRGB curve, as the value of a colour picker",
                 lambda sigma_t, albedo: (sigma_t, float(from_srgb(np.array(albedo)))),
             ),
-            ("encoded by the sRGB curve", lambda sigma_t, albedo: (sigma_t, float(to_srgb(np.array(albedo))))),
+            (
+                "encoded by the sRGB curve",
+                lambda sigma_t, albedo: (sigma_t, float(to_srgb(np.array(albedo)))),
+            ),
         )
     ),
     Fault(
@@ -239,13 +267,18 @@ MEDIUM = (
         Fault("phase", f"the phase function is {words}", change, needs=("lobes",))
         for words, change in (
             ("isotropic", _lobes(lambda g: 0.0)),
-            ("Schlick's, with k = 1.55 g - 0.55 g^3", _lobes(lambda g: _schlick(1.55 * g - 0.55 * g**3))),
+            (
+                "Schlick's, with k = 1.55 g - 0.55 g^3",
+                _lobes(lambda g: _schlick(1.55 * g - 0.55 * g**3)),
+            ),
             ("Schlick's, with k = g", _lobes(_schlick)),
             ("Cornette and Shanks's, with the same g", _lobes(_cornette_shanks)),
         )
     ),
     Fault("phase", "the phase function is Rayleigh's", _every_phase(_rayleigh), needs=("fog",)),
-    Fault("phase", "a cosine was taken for the phase function", _every_phase(_cosine), needs=("fog",)),
+    Fault(
+        "phase", "a cosine was taken for the phase function", _every_phase(_cosine), needs=("fog",)
+    ),
     *(
         Fault(
             name,
@@ -256,7 +289,8 @@ MEDIUM = (
     ),
     Fault(
         "no-extinction",
-        "nothing is attenuated, neither on the way from the light nor on the way to the camera: the extinction is "
+        "nothing is attenuated, neither on the way from the light nor on the way to the camera: "
+        "the extinction is "
         "missing, what is scattered is right",
         with_law(light_segment=(0.0, 0.0), camera_segment=(0.0, 0.0)),
     ),
@@ -280,7 +314,8 @@ MEDIUM = (
         (Number(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), scale="log"),),
         needs=("lamps",),
     ),
-    # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
+    # Where the fog before it is dark, a near plane is a factor with all digits
+    # of one that engines have.
     *(
         Fault(
             "near-plane",
@@ -313,7 +348,10 @@ MEDIUM = (
             costly=1,
             needs=("no bounds", "fog"),
         )
-        for words, spherical in (("before the camera, at a plane", False), ("away from the camera", True))
+        for words, spherical in (
+            ("before the camera, at a plane", False),
+            ("away from the camera", True),
+        )
     ),
     *(
         Fault(
@@ -323,7 +361,11 @@ MEDIUM = (
             needs=needs,
         )
         for where, change, needs in (
-            ("in the attenuation and where rays end", _depth_for_distance("surfaces", "ends"), ("fog",)),
+            (
+                "in the attenuation and where rays end",
+                _depth_for_distance("surfaces", "ends"),
+                ("fog",),
+            ),
             ("in the attenuation", _depth_for_distance("nodes", "surfaces"), ("shapes",)),
             (
                 "in the attenuation and the steps of the march",
@@ -335,7 +377,8 @@ MEDIUM = (
     ),
     Fault(
         "height-fog",
-        "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should be at the camera",
+        "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should "
+        "be at the camera",
         _falling,
         (Number(1e-2, 1e4, scale="log"), Number(1e-2, 1e2, scale="log")),
         begin=_heights,
@@ -344,7 +387,8 @@ MEDIUM = (
     ),
     Fault(
         "homogeneous",
-        "the fog is homogeneous, of the extinction {0:.4g} 1/m: its density does not fall with height",
+        "the fog is homogeneous, of the extinction {0:.4g} 1/m: its density does not fall with "
+        "height",
         _even,
         (Number(1e-5, 1e3, scale="log"),),
         begin=_densities,
@@ -354,10 +398,14 @@ MEDIUM = (
     *(
         Fault("scale-height", words, _stretched(factor), needs=("height fog",))
         for words, factor in (
-            ("scale heights are one over what they should be: a falloff was asked for", lambda h: 1 / h),
+            (
+                "scale heights are one over what they should be: a falloff was asked for",
+                lambda h: 1 / h,
+            ),
             ("densities halve in what should be the scale height", lambda h: h / math.log(2)),
             (
-                "scale heights are ln 2 times what they should be: heights were taken that halve densities",
+                "scale heights are ln 2 times what they should be: heights were taken that halve "
+                "densities",
                 lambda h: h * math.log(2),
             ),
         )
@@ -373,12 +421,20 @@ MEDIUM = (
         Fault(
             "base-height",
             f"layers {words}",
-            changed_fog(lambda fog, clamped=clamped: replace(fog, height=replace(fog.height, clamped=clamped))),
+            changed_fog(
+                lambda fog, clamped=clamped: replace(
+                    fog, height=replace(fog.height, clamped=clamped)
+                )
+            ),
             needs=("height fog", need),
         )
         for words, clamped, need in (
             ("are clamped: their density is constant below their base", True, "rising layers"),
-            ("are not clamped: their density goes on rising below their base", False, "clamped layers"),
+            (
+                "are not clamped: their density goes on rising below their base",
+                False,
+                "clamped layers",
+            ),
         )
     ),
     Fault(
@@ -391,9 +447,15 @@ MEDIUM = (
     Fault(
         "height-fog",
         "scale heights are {0:.4g} times what they should be, and bases {1:+.4g} m higher",
-        _layers(lambda layer, factor, shift: Layer(layer.sigma_t, layer.base + shift, layer.scale_height * factor)),
+        _layers(
+            lambda layer, factor, shift: Layer(
+                layer.sigma_t, layer.base + shift, layer.scale_height * factor
+            )
+        ),
         (Number(1e-3, 1e3, scale="log"), _SHIFT),
-        begin=lambda predictor, guess: [(factor, shift) for factor in (0.5, 1.0, 2.0) for shift in (-1.0, 0.0, 1.0)],
+        begin=lambda predictor, guess: [
+            (factor, shift) for factor in (0.5, 1.0, 2.0) for shift in (-1.0, 0.0, 1.0)
+        ],
         single=True,
         needs=("height fog",),
     ),

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The image of an engine with a fault, pixel by pixel: the fog model of a changed scene, then changed values."""
+"""The image of an engine with a fault, pixel by pixel: the fog model of a changed
+scene, then changed values.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,8 @@ from airlight.validation.fog_model.view import Ends, Scenery, View
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
 _FEW_RAYS = 800  # with which faults that move paths are told apart
-_MANY_TRIANGLES = 20_000  # of which exact paths cost much: few pixels are looked at, and faults are searched by others
+# of which exact paths cost much: few pixels are looked at, and faults are searched by others
+_MANY_TRIANGLES = 20_000
 _STEPS = 64  # shadow rays that find the lit parts of a ray there
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
@@ -36,7 +39,8 @@ class Guess:
     fog: Fog
     scenery: Scenery = field(default_factory=Scenery)
     surfaces: Scenery | None = None  #: of what surfaces reflect, where that is another one
-    layers: tuple[Layers, ...] = ()  #: what was done to airlight and surfaces before they were added
+    #: what was done to airlight and surfaces before they were added
+    layers: tuple[Layers, ...] = ()
     values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
     #: Takes back what was done to the grid, (height, width, 3) -> the same.
     undo: Callable[[Array], Array] | None = None
@@ -47,13 +51,17 @@ class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
     reference: ReferenceScene
-    most: float = 12_000_000  #: numbers of paths that are kept, those used last: some eight bytes each
+    #: numbers of paths that are kept, those used last: some eight bytes each
+    most: float = 12_000_000
     # By kind, with their sizes; the one used last comes last.
-    _kept: dict[str, dict[Any, tuple[Any, int]]] = field(default_factory=lambda: {"paths": {}, "radiance": {}})
+    _kept: dict[str, dict[Any, tuple[Any, int]]] = field(
+        default_factory=lambda: {"paths": {}, "radiance": {}}
+    )
 
     @cached_property
     def higher_orders(self) -> Array | None:
-        """Light of higher orders in airlight and surfaces, (2, pixels, 3), by Mitsuba's path tracer.
+        """Light of higher orders in airlight and surfaces, (2, pixels, 3),
+        by Mitsuba's path tracer.
 
         None where an image is so large that this would take minutes.
         """
@@ -62,8 +70,12 @@ class SceneLight:
             return None
         parts = []
         for seed in range(_BATCHES):
-            whole, single = (volpath_batch(reference, seed, _PATHS, max_depth=depth).mean for depth in (64, 2))
-            parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
+            whole, single = (
+                volpath_batch(reference, seed, _PATHS, max_depth=depth).mean for depth in (64, 2)
+            )
+            parts.append(
+                (whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]]
+            )
         image = np.mean(parts, axis=0).reshape(2, reference.height, reference.width, 3)
         # It is smooth except for edges, and noisy.
         width = reference.width / _SMOOTH
@@ -72,13 +84,22 @@ class SceneLight:
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
-        return self._once("paths", key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size)
+        return self._once(
+            "paths", key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size
+        )
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
-        """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
+        """Return the paths of a layer of an image in a scenery, 0: airlight, 1:
+        surfaces; `ends`: of a fog.
+        """
         key = "model", scenery, layer, ends, _sight(seen)
         view = self.view(seen, scenery)
-        return self._once("paths", key, lambda: seen.model(view, scenery, layer, ends), lambda model: 20 * model.places)
+        return self._once(
+            "paths",
+            key,
+            lambda: seen.model(view, scenery, layer, ends),
+            lambda model: 20 * model.places,
+        )
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""
@@ -86,11 +107,16 @@ class SceneLight:
         ends = fog.ends if layer == 0 else None
         key = scenery, plain, layer, _sight(seen)
         made = self._once(
-            "radiance", key, lambda: self.model(seen, scenery, layer, ends).by_light(plain), lambda each: each.size
+            "radiance",
+            key,
+            lambda: self.model(seen, scenery, layer, ends).by_light(plain),
+            lambda each: each.size,
         )
         return fog.combined(made)[layer]
 
-    def _once(self, kind: str, key: Any, made: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+    def _once(
+        self, kind: str, key: Any, made: Callable[[], Any], size: Callable[[Any], int]
+    ) -> Any:
         kept, most = self._kept[kind], self.most if kind == "paths" else _MOST_RADIANCE
         known = kept.pop(key, None)
         if known is None:
@@ -104,7 +130,15 @@ class SceneLight:
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
     """Return the key of the paths of an image: all that its pixels depend on."""
-    return seen.area, seen.holds, seen.samples, seen.rays, seen.steps, seen.used.tobytes(), seen.cut_off.tobytes()
+    return (
+        seen.area,
+        seen.holds,
+        seen.samples,
+        seen.rays,
+        seen.steps,
+        seen.used.tobytes(),
+        seen.cut_off.tobytes(),
+    )
 
 
 @dataclass
@@ -132,7 +166,10 @@ class Predictor:
     @cached_property
     def many(self) -> bool:
         """Whether a scene has so many triangles that exact paths cost much."""
-        return sum(shape.primitive_count() for shape in self.reference.occluders.shapes()) >= _MANY_TRIANGLES
+        return (
+            sum(shape.primitive_count() for shape in self.reference.occluders.shapes())
+            >= _MANY_TRIANGLES
+        )
 
     @cached_property
     def few(self) -> "Predictor":
@@ -153,7 +190,9 @@ class Predictor:
     @cached_property
     def coarse(self) -> "Predictor":
         """One with fewer pixels, and where exact paths cost much with shadow rays."""
-        return Predictor(replace(self.few.seen, steps=_STEPS), self.light) if self.many else self.few
+        return (
+            Predictor(replace(self.few.seen, steps=_STEPS), self.light) if self.many else self.few
+        )
 
     @cached_property
     def view(self) -> View:
@@ -167,7 +206,9 @@ class Predictor:
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
-        """Which rows of `errors` are pixels, and which their neighbours, those of the next columns if it can be."""
+        """Which rows of `errors` are pixels, and which their neighbours, those of the
+        next columns if it can be.
+        """
         pixels, width = self.pixels, self.shape[1]
         for apart in (1, APART) if len(pixels) == self.seen.used.sum() else (APART,):
             partner = np.searchsorted(pixels, pixels + apart)
@@ -179,14 +220,23 @@ class Predictor:
         return np.empty(0, np.int64), np.empty(0, np.int64)
 
     def layers(self, guess: Guess) -> tuple[Array, Array]:
-        """Return airlight and surfaces of the pixels, (m, 3) each; 0 where the image does not hold one."""
+        """Return airlight and surfaces of the pixels, (m, 3) each; 0 where the
+        image does not hold one.
+        """
         parts = []
         for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
             held = self.seen.holds != ("surface", "airlight")[layer]
-            # Where surfaces have their own scenery, a light that moves with its paths held moves for the fog alone.
-            fog = replace(guess.fog, moved=self.fog.moved) if layer == 1 and guess.surfaces else guess.fog
+            # Where surfaces have their own scenery, a light that moves with its paths held
+            # moves for the fog alone.
+            fog = (
+                replace(guess.fog, moved=self.fog.moved)
+                if layer == 1 and guess.surfaces
+                else guess.fog
+            )
             parts.append(self.light.radiance(self.seen, scenery, fog, layer) if held else None)
-        airlight, surface = (np.zeros((len(self.pixels), 3)) if part is None else part for part in parts)
+        airlight, surface = (
+            np.zeros((len(self.pixels), 3)) if part is None else part for part in parts
+        )
         for change in guess.layers:
             airlight, surface = change(airlight, surface)
         return airlight, surface
@@ -208,7 +258,9 @@ class Predictor:
         return np.asarray(self.reference.direction[self.pixels] @ self.view.axis)
 
     def shown(self, guess: Guess) -> Array:
-        """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""
+        """Return the values of the image in these pixels, (m, 3), with the
+        fault of the grid taken back.
+        """
         values = self.seen.values
         if guess.undo is not None:
             values = np.ascontiguousarray(guess.undo(values.reshape(*self.shape, 3))).reshape(-1, 3)
@@ -223,11 +275,15 @@ class Predictor:
         return max(_FLOOR * float(np.mean(np.abs(finite))) if finite.size else 0.0, self._least)
 
     def errors(self, guess: Guess) -> Array:
-        """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
+        """Return the errors of a guess, relative to the larger of both
+        values, (m, 3), from -1 to 1.
+        """
         shown = self.shown(guess)
         return relative_errors(self.predicted(guess), shown, self._floor(shown))
 
     def lit(self, guess: Guess) -> Bools:
-        """Return which values of the image are not dark, (m, 3): the others have no noise that could be seen."""
+        """Return which values of the image are not dark, (m, 3): the others have no
+        noise that could be seen.
+        """
         shown = self.shown(guess)
         return np.asarray(np.abs(shown) > self._floor(shown))

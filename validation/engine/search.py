@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters with which faults fit an image best, one alone or two together.
 
-The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale: pixels that disagree
-cannot decide (Cauchy's loss). One parameter is looked for on the line, since there may be several minima; several by
-steps of Gauss and Newton with Cauchy's weights. A light that is off moves shadows, whose pixels are off by all of their
-light whatever a small step does, so that there are no slopes to follow: it is looked for along the axes first, by steps
-as long as its shadows are wide (Hooke and Jeeves 1961, J. ACM 8, 212). The scale begins at what the unchanged scene
-leaves and ends at what the search leaves.
+The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale:
+pixels that disagree cannot decide (Cauchy's loss). One parameter is looked for on the line, since
+there may be several minima; several by steps of Gauss and Newton with Cauchy's weights. A light
+that is off moves shadows, whose pixels are off by all of their light whatever a small step does, so
+that there are no slopes to follow: it is looked for along the axes first, by steps as long as its
+shadows are wide (Hooke and Jeeves 1961, J. ACM 8, 212). The scale begins at what the unchanged
+scene leaves and ends at what the search leaves.
 """
 
 import math
@@ -20,12 +21,15 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.fault import Fault, Number, Values
 from airlight.validation.engine.prediction import Guess, Predictor
 
-_LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
-_COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell faults apart
-# Starts that are followed where no paths move, on a line and by steps: the best one may lead to a lesser minimum. Half
-# of the starts of fog that thins with height lead to even fog.
+# where most pixels do not know a parameter, those that do are no outliers
+_LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2
+# on a line, of a logarithm or in units of the parameter: enough to tell faults apart
+_COARSE = 0.02
+# Starts that are followed where no paths move, on a line and by steps: the best one may lead to a
+# lesser minimum. Half of the starts of fog that thins with height lead to even fog.
 _BEGUN, _BEGUN_BY_STEPS = 2, 3
-_TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3  # steps of Gauss and Newton at most; the last with all paths
+# steps of Gauss and Newton at most; the last with all paths
+_TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3
 _STRIDES = 10  # rounds of steps along the axes at most
 _DONE = 0.02  # fraction of the loss at which slopes find what is left
 _LOST = 0.5  # fraction of the loss that is left of what is not this fault, after steps of two sizes
@@ -43,7 +47,8 @@ class Explanation:
     values: tuple[Values, ...]
     guess: Guess
     errors: Array  #: relative, (pixels, 3)
-    lit: Bools  #: which values of the image are not dark, (pixels, 3): their errors say what the noise is
+    #: which values of the image are not dark, (pixels, 3): their errors say what the noise is
+    lit: Bools
     error: float  #: mean of their sizes
 
     @property
@@ -62,11 +67,12 @@ def explain(
 ) -> Explanation:
     """Return the best explanation by some faults together.
 
-    `faults`: in the order in which they change the guess; `near`: values to begin with; by default all starts of the
-    faults are tried; `fine`: whether the values are found to all digits, or to some per cent, which is enough for a
-    wrong fault.
+    `faults`: in the order in which they change the guess; `near`: values to begin with; by default
+    all starts of the faults are tried; `fine`: whether the values are found to all digits, or to
+    some per cent, which is enough for a wrong fault.
     """
-    # Faults that move paths, which are found again for each value, are tried on few pixels first to tell faults apart.
+    # Faults that move paths, which are found again for each value, are tried on few pixels
+    # first to tell faults apart.
     coarse = _coarse(predictor, faults)
     sought = [coarse, *[predictor] * fine]
     if predictor.many and not fine:
@@ -74,7 +80,9 @@ def explain(
     searches = [_Search(each, tuple(faults)) for each in sought]
     search = searches[0]
     parameters = search.numbers
-    starts = [tuple(value for part in near for value in part)] if near else _starts(sought[0], faults)
+    starts = (
+        [tuple(value for part in near for value in part)] if near else _starts(sought[0], faults)
+    )
     best = starts[0]
     if all(fault.solved or not fault.parameters for fault in faults):
         parameters = ()
@@ -90,21 +98,33 @@ def explain(
         for turn, search in enumerate(searches):
             scale = scale if turn == 0 else search.scale(outward(parameters, places[0]), fine)
             if on_a_line:
-                places = [search.on_line(place, scale, fine, moves and turn > 0) for place in places]
+                places = [
+                    search.on_line(place, scale, fine, moves and turn > 0) for place in places
+                ]
             else:
-                places = [search.by_steps(place, scale, fine, moves and turn > 0) for place in places]
-        best = min((outward(parameters, place) for place in places), key=lambda values: search.loss(values, scale))
+                places = [
+                    search.by_steps(place, scale, fine, moves and turn > 0) for place in places
+                ]
+        best = min(
+            (outward(parameters, place) for place in places),
+            key=lambda values: search.loss(values, scale),
+        )
     guess = guess_of(predictor, faults, best)
     errors = predictor.errors(guess)
     error = float(np.abs(errors).mean())
-    return Explanation(tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error)
+    return Explanation(
+        tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error
+    )
 
 
 def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
     """Return the least mean error at the starts of some faults together, and the values there."""
     predictor = _coarse(predictor, faults) if predictor.many else predictor
     starts = _starts(predictor, faults)
-    left = [float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean()) for start in starts]
+    left = [
+        float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean())
+        for start in starts
+    ]
     return min(left), _parted(faults, starts[int(np.argmin(left))])
 
 
@@ -125,8 +145,8 @@ def guess_of(
 ) -> Guess:
     """Return the guess for some faults with these values.
 
-    `at`: values for which paths are found, and held for others by the faults that can do with that; `guess`: what the
-    faults change; the scene as it is by default.
+    `at`: values for which paths are found, and held for others by the faults that can do with that;
+    `guess`: what the faults change; the scene as it is by default.
     """
     guess = guess or Guess(predictor.fog)
     olds = _parted(faults, values if at is None else at)
@@ -163,7 +183,9 @@ class _Search:
 
     def errors(self, values: Values) -> Array:
         if values not in self.known:
-            self.known[values] = self.predictor.errors(guess_of(self.predictor, self.faults, values))
+            self.known[values] = self.predictor.errors(
+                guess_of(self.predictor, self.faults, values)
+            )
         return self.known[values]
 
     def loss(self, values: Values, scale: float) -> float:
@@ -173,11 +195,15 @@ class _Search:
         return self.loss(outward(self.numbers, place), scale)
 
     def scale(self, values: Values, fine: bool) -> float:
-        left = self.errors(values)[self.predictor.lit(guess_of(self.predictor, self.faults, values))]
+        left = self.errors(values)[
+            self.predictor.lit(guess_of(self.predictor, self.faults, values))
+        ]
         return max(usual_size(left), _LEAST_SCALE if fine else _LEAST_COARSE)
 
     def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
-        """Return the best value of one parameter; `near`: it is known except for a few steps of differences."""
+        """Return the best value of one parameter; `near`: it is known except for a
+        few steps of differences.
+        """
         (parameter,) = self.numbers
         low, high = (parameter.inward(end) for end in (parameter.low, parameter.high))
 
@@ -187,20 +213,27 @@ class _Search:
         place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
         if near:
-            ends = max(ends[0], place[0] - _NEAR * parameter.step), min(ends[1], place[0] + _NEAR * parameter.step)
+            ends = (
+                max(ends[0], place[0] - _NEAR * parameter.step),
+                min(ends[1], place[0] + _NEAR * parameter.step),
+            )
         enough = (_SMALL * parameter.step or 1e-7) if fine else _COARSE
         solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": enough})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
 
     def along_axes(self, place: Array, scale: float) -> Array:
-        """Return the end of steps along the axes, halved where none of them gains; of two sizes if these gain little.
+        """Return the end of steps along the axes, halved where none of them gains; of two
+        sizes if these gain little.
 
-        Where they have gained, diagonals are tried too: a shadow stays where a light moves towards what casts it.
+        Where they have gained, diagonals are tried too: a shadow stays where a light
+        moves towards what casts it.
         """
         longest = strides = np.array([parameter.stride for parameter in self.numbers])
         least = begun = self.loss_at(place, scale)
         axes = np.eye(len(place))
-        diagonals = [a + sign * b for n, a in enumerate(axes) for b in axes[n + 1 :] for sign in (1, -1)]
+        diagonals = [
+            a + sign * b for n, a in enumerate(axes) for b in axes[n + 1 :] for sign in (1, -1)
+        ]
         for _ in range(_STRIDES):
             before = least
             if least < _DONE * begun:
@@ -221,15 +254,21 @@ class _Search:
         return place
 
     def by_steps(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
-        """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
-        low, high = (inward(self.numbers, [getattr(p, end) for p in self.numbers]) for end in ("low", "high"))
+        """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved
+        while they make it worse.
+        """
+        low, high = (
+            inward(self.numbers, [getattr(p, end) for p in self.numbers]) for end in ("low", "high")
+        )
         steps = np.array([parameter.step or _STEP for parameter in self.numbers])
         least = self.loss_at(place, scale)
         for _ in range(_TURNS_LAST if near else _TURNS if fine else _TURNS_COARSE):
             left = self.errors(outward(self.numbers, place)).ravel()
             slopes = self._slopes(place, left, steps)
             weights = 1 / (1 + (left / scale) ** 2)
-            move = -np.linalg.lstsq(slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10)[0]
+            move = -np.linalg.lstsq(
+                slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10
+            )[0]
             for _ in range(4 if fine else 2):
                 trial = np.clip(place + move, low, high)
                 reached = self.loss_at(trial, scale)
@@ -238,7 +277,9 @@ class _Search:
                 move = 0.5 * move
             else:
                 return place
-            small = np.all(np.abs(trial - place) < _SMALL * steps) or (not fine and reached > _LITTLE * least)
+            small = np.all(np.abs(trial - place) < _SMALL * steps) or (
+                not fine and reached > _LITTLE * least
+            )
             place, least = trial, reached
             if small:
                 break
@@ -261,11 +302,15 @@ class _Search:
 
 
 def _between(parameter: Number, inner: float, low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a search on the line: a start's are the starts beside it, others have some room."""
+    """Return the ends of a search on the line: a start's are the starts beside
+    it, others have some room.
+    """
     step = 0.7 if parameter.scale == "log" else max(0.3 * abs(inner), 0.1)
     ends = inner - step, inner + step
     if parameter.scale != "log" and inner in parameter.starts:
-        below, above = ([start for start in parameter.starts if sign * (start - inner) > 0] for sign in (-1, 1))
+        below, above = (
+            [start for start in parameter.starts if sign * (start - inner) > 0] for sign in (-1, 1)
+        )
         ends = max(below, default=low), min(above, default=high if math.isfinite(high) else ends[1])
     return max(low, ends[0]), min(high, ends[1])
 
@@ -284,11 +329,17 @@ def _starts(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
     starts: list[Values] = [()]
     for number, fault in enumerate(faults):
         before = faults[:number]
-        starts = [(*start, *more) for start in starts for more in _own_starts(predictor, fault, before, start)]
+        starts = [
+            (*start, *more)
+            for start in starts
+            for more in _own_starts(predictor, fault, before, start)
+        ]
     return starts
 
 
-def _own_starts(predictor: Predictor, fault: Fault, before: Sequence[Fault], values: Values) -> Sequence[Values]:
+def _own_starts(
+    predictor: Predictor, fault: Fault, before: Sequence[Fault], values: Values
+) -> Sequence[Values]:
     if fault.begin is not None:
         return fault.begin(predictor, guess_of(predictor, before, values))
     if len(fault.parameters) == 1:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An image that is to be judged or explained: which layer of it, its values, and which of its pixels take part."""
+"""An image that is to be judged or explained: which layer of it, its values, and which
+of its pixels take part.
+"""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +23,15 @@ from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.estimates.quadrature import reference_layer
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
-from airlight.validation.fog_model.view import SAMPLES, SCENERY, Ends, Scenery, View, scattering_paths, view_of
+from airlight.validation.fog_model.view import (
+    SAMPLES,
+    SCENERY,
+    Ends,
+    Scenery,
+    View,
+    scattering_paths,
+    view_of,
+)
 from airlight.validation.metrics.errors import wrong_pixels
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 
@@ -30,22 +40,27 @@ Found = TypeVar("Found")  #: what an attempt at an image is
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
 
-# The last part of a layer's name, in small letters; Blender calls its passes VolumeDir and Volume Direct.
+# The last part of a layer's name, in small letters; Blender calls its passes
+# VolumeDir and Volume Direct.
 _HOLDS = {AIRLIGHT: AIRLIGHT, "volumedir": AIRLIGHT, "volume direct": AIRLIGHT, SURFACE: SURFACE}
 _WHOLE = "combined"  # the last part of the name that Blender gives to all light
 PIXEL_WORDS = {"centre": "at pixel centres", "area": "means over pixels"}
-PIXELS = tuple(PIXEL_WORDS)  #: what a pixel may be: the radiance at its centre, or the mean over its area
+#: what a pixel may be: the radiance at its centre, or the mean over its area
+PIXELS = tuple(PIXEL_WORDS)
 
-#: Pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours.
+#: Pixels between those whose errors are compared: a filter that is wider than
+#: a pixel joins neighbours.
 APART = 2
 
 _MOST_RAYS = 3200  # every pixel of an image of 64 x 48
 _FEWEST = 64  # pixels, whatever rays they need
-_FEW = 4  # pixels that values may be cut off in, and that are looked at: chance may meet none of them
+# pixels that values may be cut off in, and that are looked at: chance may meet none of them
+_FEW = 4
 _STOPPED = 8  # values
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
-_SETTLED = 0.005  # mean relative change of an image with twice the samples, below which there are enough
+# mean relative change of an image with twice the samples, below which there are enough
+_SETTLED = 0.005
 _TRIED = 48  # pixels that say how many samples a light needs
 
 
@@ -56,7 +71,8 @@ class JudgedLayer:
     name: str
     holds: str  #: 'airlight', 'surface' or 'total'
     values: NDArray[np.floating]  #: (height, width, 3) [W/(m^2 sr)]
-    emitted: bool = True  #: whether its total shows the area lights themselves: files of our own do not
+    #: whether its total shows the area lights themselves: files of our own do not
+    emitted: bool = True
 
     @property
     def size(self) -> tuple[int, int]:
@@ -69,16 +85,18 @@ def judged_layer(
 ) -> JudgedLayer:
     """Return the layer to judge.
 
-    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the only layer, else the
-    only one that Blender calls Combined; `holds`: what it holds, one of `KINDS`: by default what its name says, else
-    all light.
+    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the
+    only layer, else the only one that Blender calls Combined; `holds`: what it holds, one of
+    `KINDS`: by default what its name says, else all light.
     """
     if holds is not None and holds not in KINDS:
         raise InputError(f"holds {holds}; expected one of {', '.join(KINDS)}")
     chosen = _usual(image, path) if name is None else name or TOTAL
     values = layer(image, chosen, path)
     emitted = "emitted" not in image.layers and "airlight:scene" not in image.attributes
-    return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
+    return JudgedLayer(
+        chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted
+    )
 
 
 def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
@@ -112,40 +130,61 @@ class Seen:
     area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
     samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
     rays: int = _MOST_RAYS  #: that are looked at, at most
-    apart: int = APART  #: pixels between those that are looked at in pairs, where not all are; 0: each by itself
+    #: pixels between those that are looked at in pairs, where not all are; 0: each by itself
+    apart: int = APART
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
 
     def view(self, scenery: Scenery = SCENERY) -> View:
-        """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image."""
+        """Return the rays of the pixels that take part: one at random of each of as many
+        equal parts of the image.
+        """
         pixels, count = np.flatnonzero(self.used), self.most_pixels
         if len(pixels) > count:
-            places = (np.arange(count) + np.random.default_rng(0).random(count)) * (len(pixels) / count)
+            places = (np.arange(count) + np.random.default_rng(0).random(count)) * (
+                len(pixels) / count
+            )
             pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
             if self.apart:
                 pixels = self._with_partners(pixels[::2])
-            pixels = np.union1d(pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))])
+            pixels = np.union1d(
+                pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))]
+            )
         side = _SIDE if self.area else 0
         return view_of(self.reference, pixels, scenery, rays_per_side=side, steps=self.steps)
 
     @cached_property
     def cut_off(self) -> Index:
         """The pixels with values that are cut off, (n,)."""
-        return np.flatnonzero(stopped(np.where(self.used[:, None], self.values, np.nan)).any(axis=1))
+        return np.flatnonzero(
+            stopped(np.where(self.used[:, None], self.values, np.nan)).any(axis=1)
+        )
 
     def model(self, view: View, scenery: Scenery, layer: int, ends: Ends | None) -> FogModel:
-        """Return the paths of a layer of the image, 0: airlight, 1: surfaces, with nodes between ends of a fog."""
-        return FogModel(view, scattering_paths(view, scenery, layers=(layer,), ends=ends, samples=self.samples))
+        """Return the paths of a layer of the image, 0: airlight, 1: surfaces, with
+        nodes between ends of a fog.
+        """
+        return FogModel(
+            view, scattering_paths(view, scenery, layers=(layer,), ends=ends, samples=self.samples)
+        )
 
     @property
     def most_pixels(self) -> int:
         """How many pixels the rays allow, or the fewest that are looked at."""
         return max(
-            _FEWEST, self.rays // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1))
+            _FEWEST,
+            self.rays
+            // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1)),
         )
 
     def held(self, layers: Array) -> Array:
         """Return the light that the image holds of airlight and surfaces, (2, m, 3)."""
-        return np.asarray(layers[0] if self.holds == AIRLIGHT else layers[1] if self.holds == SURFACE else sum(layers))
+        return np.asarray(
+            layers[0]
+            if self.holds == AIRLIGHT
+            else layers[1]
+            if self.holds == SURFACE
+            else sum(layers)
+        )
 
     def _with_partners(self, pixels: Index) -> Index:
         """Return pixels, and those to the right of them that can take part too."""
@@ -155,69 +194,96 @@ class Seen:
 
 
 def stopped(values: Array) -> Bools:
-    """Return which values stop, with seven others at least, at the largest one, as those do that are cut off there."""
+    """Return which values stop, with seven others at least, at the largest one, as those
+    do that are cut off there.
+    """
     most = values[np.isfinite(values)].max(initial=0.0)
     found = values == most
-    return np.asarray(found if most > 0 and np.count_nonzero(found) >= _STOPPED else np.zeros_like(found))
+    return np.asarray(
+        found if most > 0 and np.count_nonzero(found) >= _STOPPED else np.zeros_like(found)
+    )
 
 
 def _evenly(count: int, fraction: float) -> Index:
     """Return that fraction of so many numbers, and `_FEW` at least, spread evenly."""
-    return np.linspace(0, count - 1, min(count, max(_FEW, round(count * fraction)))).astype(np.int64)
+    return np.linspace(0, count - 1, min(count, max(_FEW, round(count * fraction)))).astype(
+        np.int64
+    )
 
 
 def seen_image(
     image: Image, judged: JudgedLayer, scene: Any, *, mask: Bools | None = None
 ) -> tuple[Seen, tuple[str, ...]]:
-    """Return a layer of an image as what is to be explained, and what is wrong with the file: pixels not finite.
+    """Return a layer of an image as what is to be explained, and what is wrong with the
+    file: pixels not finite.
 
-    Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels that show one take
-    no part, nor do those beside it, nor those that a file does not hold or a mask leaves out.
+    Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels
+    that show one take no part, nor do those beside it, nor those that a file does not hold or a
+    mask leaves out.
     """
     if mask is not None and np.shape(mask) != judged.values.shape[:2]:
         shape = " x ".join(str(side) for side in np.shape(mask)[::-1])
         raise InputError(
-            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; give one of the image's size"
+            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; give one "
+            "of the image's size"
         )
     reference = read_reference(scene)
     if isinstance(reference.medium, GridMedium):
         raise InputError(
-            "the medium is a density grid, whose images fits and diagnoses do not predict; expected homogeneous media "
+            "the medium is a density grid, whose images fits and diagnoses do not predict; "
+            "expected homogeneous media "
             "or height fog: compare with the reference alone, without --fit and --diagnose"
         )
     if reference.sky is not None:
         raise InputError(
-            f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not know; expected "
+            f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not "
+            "know; expected "
             "lights of type 'point', 'spot', 'directional' or 'area'"
         )
     values = np.asarray(judged.values, dtype=np.float64)
-    values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
+    values = np.broadcast_to(
+        values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)
+    ).copy()
     finite: Bools = np.asarray(np.isfinite(values).all(axis=1))
     used: Bools = finite.copy()
     chosen = image.with_data(None if mask is None else np.asarray(mask) != 0)
     if chosen is not None:
         used &= np.asarray(chosen).ravel()
         finite |= ~np.asarray(chosen).ravel()
-    if (reference.area or reference.background is not None) and judged.holds == TOTAL and judged.emitted:
+    if (
+        (reference.area or reference.background is not None)
+        and judged.holds == TOTAL
+        and judged.emitted
+    ):
         lit = (
             emitted_light(reference, surface_hits(reference).distance)
             .any(axis=1)
             .reshape(reference.height, reference.width)
         )
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
-    seen = Seen(reference, values, judged.holds, np.asarray(used), samples=needed_samples(reference))
-    return seen, wrong_pixels(~finite.reshape(reference.height, reference.width), "left out, NaN or infinite")
+    seen = Seen(
+        reference, values, judged.holds, np.asarray(used), samples=needed_samples(reference)
+    )
+    return seen, wrong_pixels(
+        ~finite.reshape(reference.height, reference.width), "left out, NaN or infinite"
+    )
 
 
-def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> tuple[JudgedLayer, ...]:
-    """Return the layers to explain: the one that is named, or airlight and surface where an image has both."""
+def layers_of(
+    image: Image, path: str, name: str | None, holds: str | None
+) -> tuple[JudgedLayer, ...]:
+    """Return the layers to explain: the one that is named, or airlight and surface
+    where an image has both.
+    """
     if name is None and holds is None and {AIRLIGHT, SURFACE} <= image.layers.keys():
         return tuple(judged_layer(image, path, name=each) for each in (AIRLIGHT, SURFACE))
     return (judged_layer(image, path, name=name, holds=holds),)
 
 
 def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
-    """Return the possible kinds of an image's pixels: as given, as an image of ours says, or both."""
+    """Return the possible kinds of an image's pixels: as given, as an
+    image of ours says, or both.
+    """
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"pixel: got {pixel}, expected 'centre' or 'area'")
     said = pixel or image.attributes.get("airlight:pixel")
@@ -233,7 +299,8 @@ class PixelKind:
     """Whether the pixels of an image are centres or areas."""
 
     pixel: str  #: 'centre' or 'area'
-    errors: Mapping[str, float] = field(default_factory=dict)  #: mean relative ones by kind, if several were compared
+    #: mean relative ones by kind, if several were compared
+    errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
@@ -241,7 +308,9 @@ class PixelKind:
         names = {"centre": "centres", "area": "means over the area"}
         if not self.errors:
             return f"judged by {names[self.pixel]}"
-        own, other = (f"{100 * self.errors[kind]:.3g} % off" for kind in sorted(PIXELS, key=self.pixel.__ne__))
+        own, other = (
+            f"{100 * self.errors[kind]:.3g} % off" for kind in sorted(PIXELS, key=self.pixel.__ne__)
+        )
         another = next(names[kind] for kind in PIXELS if kind != self.pixel)
         return f"{names[self.pixel]} fit: {own} where the two differ; {another}: {other}"
 
@@ -254,8 +323,9 @@ def decide_pixel(
 ) -> tuple[PixelKind, Found]:
     """Return the kind of an image's pixels, and the attempt for this kind.
 
-    `kinds`: what they may be, see `pixel_kinds`; `errors`: what is left by attempts, which are compared where there are
-    several; `exact`: whether one leaves so little that no other can leave less.
+    `kinds`: what they may be, see `pixel_kinds`; `errors`: what is left by attempts, which are
+    compared where there are several; `exact`: whether one leaves so little that no other can leave
+    less.
     """
     found: list[Found] = []
     for kind in kinds:
@@ -268,22 +338,30 @@ def decide_pixel(
 
 
 def relative_errors(predicted: Array, shown: Array, floor: float) -> Array:
-    """Return the errors of values relative to the larger of both, or to a floor; 1 where one is not finite."""
+    """Return the errors of values relative to the larger of both, or to a floor; 1
+    where one is not finite.
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
-        errors = (shown - predicted) / np.maximum(np.maximum(np.abs(shown), np.abs(predicted)), floor)
+        errors = (shown - predicted) / np.maximum(
+            np.maximum(np.abs(shown), np.abs(predicted)), floor
+        )
     return np.where(np.isfinite(errors), errors, 1.0)
 
 
 def needed_samples(reference: ReferenceScene) -> int:
-    """Return how many samples stand for an area light: twice as many until the image hardly changes.
+    """Return how many samples stand for an area light: twice as many until
+    the image hardly changes.
 
-    A window before pillars needs 128 where a lamp above an edge needs 16: each sample has its own shadows.
+    A window before pillars needs 128 where a lamp above an edge needs 16: each
+    sample has its own shadows.
     """
     samples, fog = SAMPLES, scene_fog(reference)
     if not reference.area:
         return samples
     count = reference.width * reference.height
-    view = view_of(reference, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64)))
+    view = view_of(
+        reference, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64))
+    )
 
     def image(samples: int) -> Array:
         return FogModel(view, scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
@@ -301,10 +379,19 @@ def needed_samples(reference: ReferenceScene) -> int:
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
     """Return a scene at the size of an image of it."""
     loaded = load_scene(scene)
-    width, height = (int(n) for n in loaded.scene.sensors()[0].film().size()) if loaded.scene.sensors() else size
-    if abs(size[0] * height / width - size[1]) >= 1 and abs(size[1] * width / height - size[0]) >= 1:
+    width, height = (
+        (int(n) for n in loaded.scene.sensors()[0].film().size())
+        if loaded.scene.sensors()
+        else size
+    )
+    if (
+        abs(size[0] * height / width - size[1]) >= 1
+        and abs(size[1] * width / height - size[0]) >= 1
+    ):
         raise InputError(
-            f"{path} is {size[0]} x {size[1]} pixels, {size[0] / size[1]:.4g} to 1; {loaded.name} is {width} x "
-            f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or a fraction of it"
+            f"{path} is {size[0]} x {size[1]} pixels, {size[0] / size[1]:.4g} to 1; {loaded.name} "
+            f"is {width} x "
+            f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or a "
+            "fraction of it"
         )
     return load_scene(scene, size)

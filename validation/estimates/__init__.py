@@ -3,8 +3,8 @@
 
 Read in this order:
 
-- `quadrature.py`: the quadrature image of a scene, radiance that is refused as infinite, and what the reference of
-  another renderer's image holds;
+- `quadrature.py`: the quadrature image of a scene, radiance that is refused as infinite, and what
+  the reference of another renderer's image holds;
 - `monte_carlo.py`: batches of a Monte Carlo estimator;
 - `images.py`: references as layered images, and when a Monte Carlo run ends;
 - `merge.py`: references of several machines as one;

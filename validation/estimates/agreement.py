@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The routes to the reference against each other: the quadrature image, our own integrator and Mitsuba's path tracer.
+"""The routes to the reference against each other: the quadrature image, our own integrator
+and Mitsuba's path tracer.
 
-They share no code but Mitsuba's ray casting. `single-scatter` estimates the same integral as the quadrature by other
-means: agreement of a few hundredths of a percent says that neither has a fault. `volpath` is code that nobody here
-wrote. It attenuates over a shadow ray that ends a relative epsilon before the light (DESIGN section 6.1), so it is
-compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
-this machine. The bias without this correction is given beside it.
+They share no code but Mitsuba's ray casting. `single-scatter` estimates the same integral as the
+quadrature by other means: agreement of a few hundredths of a percent says that neither has a fault.
+`volpath` is code that nobody here wrote. It attenuates over a shadow ray that ends a relative
+epsilon before the light (DESIGN section 6.1), so it is compared with the quadrature image of *that*
+integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on this machine. The bias
+without this correction is given beside it.
 
-Under area lights the quadrature has standard errors of its own, and both sides' count: the interval of the image takes
-the spread of its replicates' means, as it takes that of whole batches of the samplers. volpath's light comes in part by
-rays that the phase function sends on, which are not shortened: the bias that is corrected for is the most that the
-epsilon can do, and the one without correction is given beside it.
+Under area lights the quadrature has standard errors of its own, and both sides' count: the interval
+of the image takes the spread of its replicates' means, as it takes that of whole batches of the
+samplers. volpath's light comes in part by rays that the phase function sends on, which are not
+shortened: the bias that is corrected for is the most that the epsilon can do, and the one without
+correction is given beside it.
 
-Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of one path there is
-bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6). Lights with
-extent leave out none: their fluence is bounded.
+Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of
+one path there is bounded only by 1/h^2, so that no number of samples gives a standard error to
+trust (DESIGN section 6.6). Lights with extent leave out none: their fluence is bounded.
 """
 
 import math
@@ -31,7 +34,11 @@ from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
-from airlight.validation.estimates.quadrature import reference_error, reference_image, reference_layer
+from airlight.validation.estimates.quadrature import (
+    reference_error,
+    reference_image,
+    reference_layer,
+)
 from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
 from airlight.validation.statistics.records import Agreement, Statistics
 
@@ -54,31 +61,38 @@ def agreement(
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
 
-    It runs until the half width of every interval is below 0.4 times the margin. This rule looks at the spread
-    alone, so that stopping favours no verdict; nor does the end of the time.
+    It runs until the half width of every interval is below 0.4 times the margin. This rule looks at
+    the spread alone, so that stopping favours no verdict; nor does the end of the time.
 
-    The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
-    the 95 % interval of the relative bias lies inside +- `margin`. At most `batches` are traced, of `samples` a
-    pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.batches`). After
-    `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. `points` are
-    those of area lights in the reference of volpath (`validation.estimates.quadrature.reference_image`), whose margins
-    are wider; single-scatter is compared with as many as the error of a pixel needs. The result is by layer,
-    without the surface where nothing lit is visible.
+    The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or
+    'single-scatter', agrees if the 95 % interval of the relative bias lies inside +- `margin`. At
+    most `batches` are traced, of `samples` a pixel each; volpath places its samples where its pilot
+    spread most (`reference.monte_carlo.batches`). After `seconds`, the pilot not counted, no
+    further batch is traced; `spread` lets other processes trace some. `points` are those of area
+    lights in the reference of volpath (`validation.estimates.quadrature.reference_image`), whose
+    margins are wider; single-scatter is compared with as many as the error of a pixel needs. The
+    result is by layer, without the surface where nothing lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     plain = reference_image(scene)
-    shortened = reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
+    shortened = (
+        reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
+    )
     masks = layer_masks(read_reference(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
     def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]
         test = batch_estimate(traced, layer, mask)
-        return compare_statistics(reference_estimate(shortened, layer, test, mask), test, mask=mask, margin=margin)
+        return compare_statistics(
+            reference_estimate(shortened, layer, test, mask), test, mask=mask, margin=margin
+        )
 
     counts = None
     if estimator == "volpath" and layers:
-        pilot = monte_carlo_batches(scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2)
+        pilot = monte_carlo_batches(
+            scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2
+        )
         counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
     # From here on: where a pilot alone takes long, no time was left for the batches that count.
     took = stopwatch()
@@ -130,24 +144,31 @@ def agreements(
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
-    By estimator there are the `margins` of the relative bias [1] and the `samples`; each takes so many `batches` and
-    `seconds` at most; `points`: see `agreement`. The result is by estimator and layer, as in 'volpath airlight'.
+    By estimator there are the `margins` of the relative bias [1] and the `samples`; each takes so
+    many `batches` and `seconds` at most; `points`: see `agreement`. The result is by estimator and
+    layer, as in 'volpath airlight'.
     """
     by_name: dict[str, Agreement] = {}
     for estimator, margin in margins.items():
-        how: dict[str, Any] = {"batches": batches, "samples": (samples or {}).get(estimator, _SAMPLES)}
+        how: dict[str, Any] = {
+            "batches": batches,
+            "samples": (samples or {}).get(estimator, _SAMPLES),
+        }
         how |= {"seconds": seconds, "points": points, "spread": spread}
         by_layer = agreement(scene, estimator=estimator, margin=margin, **how)
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 
 
-def reference_estimate(image: ReferenceImage, layer: str, test: NoisyImage, mask: Bools) -> NoisyImage:
-    """Return a layer of a quadrature image as the reference of a comparison of the pixels of a mask with some batches.
+def reference_estimate(
+    image: ReferenceImage, layer: str, test: NoisyImage, mask: Bools
+) -> NoisyImage:
+    """Return a layer of a quadrature image as the reference of a comparison of the pixels of
+    a mask with some batches.
 
-    Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the image of each. A value
-    that no sample of the batches reached has no standard error of theirs, and must not be judged by that of the
-    quadrature alone.
+    Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the
+    image of each. A value that no sample of the batches reached has no standard error of theirs,
+    and must not be judged by that of the quadrature alone.
     """
     error = reference_error(image, layer)
     reached = np.asarray(test.standard_error) > 0
@@ -165,13 +186,20 @@ def _bias(expected: Array, batches: Batches, layer: str, mask: Bools) -> float:
 
 
 def layer_masks(reference: ReferenceScene, image: ReferenceImage) -> dict[str, Bools]:
-    """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
+    """Return the pixels to compare, by layer, (height, width): of the airlight those whose
+    ray keeps off the lights.
+    """
     near = image.light_angle <= MASK_PIXELS * pixel_angle(reference)
-    return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
+    return {
+        "airlight": ~near & np.isfinite(image.airlight).all(axis=2),
+        "surface": np.ones_like(near),
+    }
 
 
 def layer_mean(batches: Batches, layer: str, mask: Bools) -> Array:
-    """Return the mean image of a layer, (height, width, 3) [W/(m^2 sr)]; the mask, (height, width), gives its size."""
+    """Return the mean image of a layer, (height, width, 3) [W/(m^2 sr)]; the mask,
+    (height, width), gives its size.
+    """
     return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
 
 
@@ -188,14 +216,18 @@ def batch_estimate(batches: Batches, layer: str, mask: Bools) -> NoisyImage:
 
 
 def widest_interval(statistics: Statistics) -> tuple[float, float] | None:
-    """Return the ends of the wider of the 95 % intervals of the relative bias [1]; None where none is known."""
+    """Return the ends of the wider of the 95 % intervals of the relative bias [1];
+    None where none is known.
+    """
     intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches or (None, None)]
     known = [(low, high) for low, high in intervals if low is not None and high is not None]
     return max(known, key=lambda pair: pair[1] - pair[0], default=None)
 
 
 def width_to_reach(statistics: Statistics, margin: float) -> float:
-    """Return the half width of the wider interval over 0.4 times `margin` [1], both relative: runs stop below 1."""
+    """Return the half width of the wider interval over 0.4 times `margin` [1], both
+    relative: runs stop below 1.
+    """
     widest = widest_interval(statistics)
     return math.inf if widest is None else 0.5 * (widest[1] - widest[0]) / (0.4 * margin)
 
@@ -204,4 +236,6 @@ def pixel_angle(reference: ReferenceScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
     middle = (reference.height // 2) * reference.width + reference.width // 2
     beside = middle - 1 if reference.width > 1 else middle
-    return float(np.arccos(np.clip(reference.direction[middle] @ reference.direction[beside], -1, 1)))
+    return float(
+        np.arccos(np.clip(reference.direction[middle] @ reference.direction[beside], -1, 1))
+    )

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """References as layered images, ready to be written, and when a Monte Carlo run ends.
 
-It ends after so many samples, after a time, or when its error is small enough: the standard error relative to the
-radiance, either of the image, *pooled*, or of its *worst* pixel:
+It ends after so many samples, after a time, or when its error is small enough: the standard error
+relative to the radiance, either of the image, *pooled*, or of its *worst* pixel:
 
     pooled = sqrt(sum_p se_p^2) / sum_p L_p             worst = max_p se_p / max(L_p, 0.001 mean(L))
 
-for each channel of each layer, the largest of which counts; pixels are independent of each other. The floor of a
-thousandth of the mean is that of `airlight compare`. Rays that pass a light within
-`validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error: there no number of
-samples gives a standard error to trust (DESIGN section 6.6). Where that leaves out all light of a layer, the error of
-the image is not known.
+for each channel of each layer, the largest of which counts; pixels are independent of each other.
+The floor of a thousandth of the mean is that of `airlight compare`. Rays that pass a light within
+`validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error:
+there no number of samples gives a standard error to trust (DESIGN section 6.6). Where that leaves
+out all light of a layer, the error of the image is not known.
 
-The rule looks at the spread alone, never at a reference, so that stopping favours no verdict, and no run stops on a
-target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(2 (K - 1)) of it, 13 % at K = 32.
+The rule looks at the spread alone, never at a reference, so that stopping favours no verdict, and
+no run stops on a target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(2
+(K - 1)) of it, 13 % at K = 32.
 """
 
 import math
@@ -63,19 +64,36 @@ class Budget:
             what = f"{' and '.join(given)} exclude each other" if given else "a budget of nothing"
             raise InputError(f"{what}; give one of {', '.join(vars(self))}")
         for name, value in given.items():
-            kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
+            kind, words = (
+                (int, "a whole number") if name == "samples" else (int | float, "a number")
+            )
             if not isinstance(value, kind) or not 0 < value < np.inf:
                 raise InputError(f"{name}: got {value!r}, expected {words} above 0")
         if self.error is not None and self.error >= 1:
             raise InputError(f"error: got {self.error:g}, expected less than 1; 0.01 is 1 %")
 
 
-def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre") -> Image:
-    """Return the quadrature reference of a loaded scene as layers; the header says of which bytes of the scene."""
-    layers = {"airlight": reference.airlight, "airlight_bound": reference.airlight_bound, "surface": reference.surface}
-    extent = {"airlight_se": reference.airlight_se, "surface_se": reference.surface_se, "emitted": reference.emitted}
+def layered_reference(
+    loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre"
+) -> Image:
+    """Return the quadrature reference of a loaded scene as layers; the header says of
+    which bytes of the scene.
+    """
+    layers = {
+        "airlight": reference.airlight,
+        "airlight_bound": reference.airlight_bound,
+        "surface": reference.surface,
+    }
+    extent = {
+        "airlight_se": reference.airlight_se,
+        "surface_se": reference.surface_se,
+        "emitted": reference.emitted,
+    }
     layers |= {layer: values for layer, values in extent.items() if values is not None}
-    made: dict[str, str | int | float] = {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"}
+    made: dict[str, str | int | float] = {
+        "airlight:scene": loaded.name,
+        "airlight:estimator": "quadrature",
+    }
     made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
     made[BOUND] = reference.bound_kind
     if reference.airlight_se is not None:
@@ -124,9 +142,10 @@ def monte_carlo_reference(
 
     The same samples and seed give the same numbers, whatever was in the cache.
 
-    The `budget` says when to stop by the error of the layers `airlight` and `surface`. The first batch has the `seed`,
-    the others count up. A scene of clouds has layers for sets of `orders`, see `cloud_orders`. Progress is called with
-    (share done, what) after every batch; `elsewhere` traces batches in other processes.
+    The `budget` says when to stop by the error of the layers `airlight` and `surface`. The first
+    batch has the `seed`, the others count up. A scene of clouds has layers for sets of `orders`,
+    see `cloud_orders`. Progress is called with (share done, what) after every batch; `elsewhere`
+    traces batches in other processes.
     """
     seen = None
     if orders is None:
@@ -154,17 +173,25 @@ def monte_carlo_reference(
         elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
-    reached = None if budget.error is None else errors.pooled is not None and errors.pooled <= budget.error
+    reached = (
+        None
+        if budget.error is None
+        else errors.pooled is not None and errors.pooled <= budget.error
+    )
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
     if seen is not None:
         transmittance = seen.transmittance.reshape(*shape, 3)
         behind = np.isinf(distance).reshape(*shape, 1) * transmittance * clouds.sky
-        image = replace(image, layers=dict(image.layers) | {"opacity": 1 - transmittance, "background": behind})
+        image = replace(
+            image, layers=dict(image.layers) | {"opacity": 1 - transmittance, "background": behind}
+        )
     return MonteCarloReference(image, errors, reached, int(near.sum()), run.cached, run.damaged)
 
 
 def cloud_orders(words: str) -> tuple[str, ...]:
-    """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none."""
+    """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the
+    usual ones, 'all' for none.
+    """
     from airlight.validation.slab.request import order_range, parse_orders
 
     names = tuple(name for name in parse_orders(words) if name != "all")
@@ -172,7 +199,8 @@ def cloud_orders(words: str) -> tuple[str, ...]:
     for (_, last), (first, _) in pairwise(ranges):
         if first <= last:
             raise InputError(
-                f"--orders: got {words!r}, which names order {first} twice; expected disjoint sets of orders"
+                f"--orders: got {words!r}, which names order {first} twice; expected disjoint sets "
+                "of orders"
             )
     return names
 
@@ -187,7 +215,8 @@ class _Watch:
         self._took, self._last, self._step = stopwatch(), 0.0, 0.0
 
     def enough(self, batches: Batches) -> bool:
-        """Say whether to stop: at the target, or where the error is not known, which more batches do not change.
+        """Say whether to stop: at the target, or where the error is not known, which
+        more batches do not change.
 
         The error falls with the square root of the batches, which says how many are expected.
         """
@@ -196,7 +225,9 @@ class _Watch:
         done = len(batches.seeds)
         if error is None:
             return done >= LEAST_BATCHES
-        self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
+        self._expected = max(
+            LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2)
+        )
         self._words = f", pooled error {error:.3g} of {self._budget.error:.3g}"
         return done >= LEAST_BATCHES and error <= self._budget.error
 
@@ -219,7 +250,9 @@ class _Watch:
         self._progress(min(1.0, fraction), f"{estimator}, {done} batches{self._words}")
 
 
-def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: Array) -> Image:
+def _layered_batches(
+    loaded: LoadedScene, estimator: str, batches: Batches, *, distance: Array
+) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
     for number, name in enumerate(batches.layers):
@@ -241,8 +274,9 @@ def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, d
 def batch_plan(budget: Budget, pixels: int) -> tuple[int, int]:
     """Return how many batches at most, and of how many samples a pixel.
 
-    A given number of samples is split into at least 32 batches where it has as many samples, and rounded up to whole
-    ones. The samples of a batch are a power of two up to 64, so that runs of other lengths go on from the same batches.
+    A given number of samples is split into at least 32 batches where it has as many samples, and
+    rounded up to whole ones. The samples of a batch are a power of two up to 64, so that runs of
+    other lengths go on from the same batches.
     """
     if budget.samples is not None:
         samples = _power_of_two(min(USUAL_BATCH, budget.samples // LEAST_BATCHES))
@@ -255,10 +289,12 @@ def _power_of_two(number: int) -> int:
 
 
 def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
-    """Return the relative standard errors of some batches, less the airlight of pixels `near` a light, (pixels,).
+    """Return the relative standard errors of some batches, less the airlight of pixels
+    `near` a light, (pixels,).
 
-    The largest of all layers and channels counts; one that is dark has none. They are not known where a layer is lit
-    only in pixels that are left out, where no sample brought light, and where a number is not finite.
+    The largest of all layers and channels counts; one that is dark has none. They are not known
+    where a layer is lit only in pixels that are left out, where no sample brought light, and where
+    a number is not finite.
     """
     pooled: list[float] = []
     worst: list[float] = []
@@ -271,7 +307,9 @@ def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
         mean, error = mean[keep][:, lit], error[keep][:, lit]
         total = mean.sum(axis=0)
         if not (total > 0).all():
-            return RelativeErrors(None, None, f"all pixels with {layer} lie beside a light, and are left out")
+            return RelativeErrors(
+                None, None, f"all pixels with {layer} lie beside a light, and are left out"
+            )
         if lit.any():
             pooled.append(float((np.sqrt((error**2).sum(axis=0)) / total).max()))
             worst.append(float((error / np.maximum(mean, _FLOOR * total / len(mean))).max()))
@@ -281,7 +319,8 @@ def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
 
 
 def near_light(reference: ReferenceScene, distance: Array) -> Bools:
-    """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,).
+    """Return which pixels' rays pass a light that they see within `MASK_PIXELS`
+    pixel widths, (pixels,).
 
     `distance` is that to the visible surface, (pixels,) [m].
     """

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""References of several machines as one.
 
-A file holds for each value the mean m of its K batches and their standard error s, so the sum of squared deviations is
-K (K - 1) s^2, and files add up as batches do: the spread within each and that between their means
-(`reference.monte_carlo.batches.combined_moments`). Merging loses only the rounding of files to single precision: the
-mean keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by
-rounding alone shows as a relative standard error of the order of 6e-8, where the estimator has no noise at all.
+A file holds for each value the mean m of its K batches and their standard error s, so the sum of
+squared deviations is K (K - 1) s^2, and files add up as batches do: the spread within each and that
+between their means (`reference.monte_carlo.batches.combined_moments`). Merging loses only the
+rounding of files to single precision: the mean keeps a relative 2^-24 = 6e-8 or so, the standard
+error likewise. The spread between two means that differ by rounding alone shows as a relative
+standard error of the order of 6e-8, where the estimator has no noise at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from airlight.errors import InputError
-from airlight.reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
+from airlight.reference.monte_carlo.batches import (
+    LAYERS,
+    combined_moments,
+    parse_seed_ranges,
+    seed_ranges,
+)
 from airlight.reference.storage.exr import TOTAL, Attribute, Image
 from airlight.validation.arrays import Array
 
@@ -36,15 +42,18 @@ class _Part:
     def moments(self, layer: str) -> tuple[int, Array, Array]:
         """Return the number of batches, their mean and the sum of their squared deviations."""
         count = len(self.seeds)
-        mean, error = (np.asarray(self.image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se"))
+        mean, error = (
+            np.asarray(self.image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se")
+        )
         return count, mean, error**2 * (count * (count - 1))
 
 
 def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     """Return the reference of all batches of several files.
 
-    Each has a name and an image: one of `validation.estimates.images.monte_carlo_reference`, or a merged one. Their
-    order does not matter; those that were not made alike, or share a seed, are refused.
+    Each has a name and an image: one of `validation.estimates.images.monte_carlo_reference`, or a
+    merged one. Their order does not matter; those that were not made alike, or share a seed, are
+    refused.
     """
     if len(files) < 2:
         raise InputError(f"got {len(files)} file to merge; expected at least two")
@@ -56,7 +65,8 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     if any(names != held[0] for names in held):
         odd = sorted(held[0].union(*held) - held[0].intersection(*held))
         raise InputError(
-            f"the files to merge differ in their layers: {', '.join(odd)}; make all with the same --orders"
+            f"the files to merge differ in their layers: {', '.join(odd)}; make all with the same "
+            "--orders"
         )
     # Those without a standard error are the same in all files; the total is written again.
     layers = {name: values for name, values in parts[0].image.layers.items() if name != TOTAL}
@@ -82,13 +92,21 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
 def _read(name: str, image: Image) -> _Part:
     """Check that a file is a reference with batches."""
     header = image.attributes
-    missing = [key for key in ("estimator", "scene_digest", "batch_spp", "batches", "seeds") if not _of(header, key)]
+    missing = [
+        key
+        for key in ("estimator", "scene_digest", "batch_spp", "batches", "seeds")
+        if not _of(header, key)
+    ]
     missing += [
-        f"layer {layer}{suffix}" for layer in LAYERS for suffix in ("", "_se") if layer + suffix not in image.layers
+        f"layer {layer}{suffix}"
+        for layer in LAYERS
+        for suffix in ("", "_se")
+        if layer + suffix not in image.layers
     ]
     if missing:
         raise InputError(
-            f"{name} is no Monte Carlo reference of `airlight reference`: it lacks {', '.join(missing)}; "
+            f"{name} is no Monte Carlo reference of `airlight reference`: it lacks "
+            f"{', '.join(missing)}; "
             "compute it with --estimator single-scatter, volpath or cloud-paths"
         )
     try:
@@ -97,7 +115,8 @@ def _read(name: str, image: Image) -> _Part:
         raise InputError(f"{name}: its header names no seeds: {error}; compute it again") from error
     if str(len(seeds)) != _of(header, "batches") or len(seeds) < 2:
         raise InputError(
-            f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; compute it again"
+            f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; "
+            "compute it again"
         )
     return _Part(name, image, seeds)
 
@@ -111,13 +130,15 @@ def _check_same(first: _Part, second: _Part) -> None:
         values = [_of(part.image.attributes, key) for part in (first, second)]
         if values[0] != values[1]:
             raise InputError(
-                f"{first.name} and {second.name} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
+                f"{first.name} and {second.name} differ in {meaning} ({values[0][:24]} and "
+                f"{values[1][:24]}); "
                 "merge references that were made alike"
             )
     shapes = [part.image.layers[LAYERS[0]].shape for part in (first, second)]
     if shapes[0] != shapes[1]:
         raise InputError(
-            f"{first.name} and {second.name} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
+            f"{first.name} and {second.name} have images of two sizes, {shapes[0][1::-1]} and "
+            f"{shapes[1][1::-1]}"
         )
 
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Batches of a Monte Carlo estimator, from the cache where they were traced before.
 
-Every batch is kept as soon as it is finished, so a run that was interrupted or killed goes on from there. Eight batches
-whose seeds begin at a multiple of eight are kept as one block, which takes a quarter of the room. The result of a run
-depends on its seeds and their number alone, never on the cache: blocks and the batches in them are always added up in
-the same order, and a run of fewer batches than are kept uses those alone (up to seven that are only kept within a block
-are traced again).
+Every batch is kept as soon as it is finished, so a run that was interrupted or killed goes on from
+there. Eight batches whose seeds begin at a multiple of eight are kept as one block, which takes a
+quarter of the room. The result of a run depends on its seeds and their number alone, never on the
+cache: blocks and the batches in them are always added up in the same order, and a run of fewer
+batches than are kept uses those alone (up to seven that are only kept within a block are traced
+again).
 """
 
 import errno
@@ -31,7 +32,17 @@ from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.cache import cache_folder
 from airlight.reference.storage.files import NO_SPACE
 from airlight.reference.storage.scene_digest import scene_content
-from airlight.reference.storage.store import Content, Inputs, add_spent, counted, drop, is_damaged, is_kept, load, store
+from airlight.reference.storage.store import (
+    Content,
+    Inputs,
+    add_spent,
+    counted,
+    drop,
+    is_damaged,
+    is_kept,
+    load,
+    store,
+)
 from airlight.validation.arrays import Counted
 from airlight.validation.estimates.quadrature import check_camera, check_rays
 
@@ -50,8 +61,8 @@ class Run:
     damaged: int  #: files of the cache that were damaged; their batches have been traced again
 
 
-#: Batches that other processes trace: from seeds to their batches and what these took, where what is missing is traced
-#: here; and how many seeds are asked for at once.
+#: Batches that other processes trace: from seeds to their batches and what these took, where what
+#: is missing is traced here; and how many seeds are asked for at once.
 Elsewhere = tuple[Callable[[list[int]], Iterator[tuple[Batches, Spent]]], int]
 #: Estimator, samples a batch, and their counts by pixel or None -> who traces such batches.
 ElsewhereFor = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
@@ -110,31 +121,36 @@ def monte_carlo_batches(
 ) -> Run:
     """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.
 
-    The estimator is 'single-scatter', 'volpath' or 'cloud-paths'. There are 2 `batches` at least, of at most 256
-    `samples` a pixel; the first has the seed `first_seed`, the others count up. For volpath alone there are
-    `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.volpath_batch`), and `counts`,
-    samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.batches`).
-    `orders` are names of disjoint sets of orders of scattering, '3-4', each with its own layer: for a scene of
+    The estimator is 'single-scatter', 'volpath' or 'cloud-paths'. There are 2 `batches` at least,
+    of at most 256 `samples` a pixel; the first has the seed `first_seed`, the others count up. For
+    volpath alone there are `max_depth`, the most edges of a path
+    (`reference.monte_carlo.volpath.volpath_batch`), and `counts`, samples of each pixel in each
+    batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.batches`). `orders` are
+    names of disjoint sets of orders of scattering, '3-4', each with its own layer: for a scene of
     clouds, by 'volpath' or 'cloud-paths'.
 
-    `enough` is asked after every block, whose last seed is one less than a multiple of eight, whether to stop; `go_on`
-    with the number of finished batches before each one that is traced, from the third on. `progress` is called with
-    (done, total, estimator) after every batch that was traced. `elsewhere` traces batches in other processes; what
-    these do not bring is traced here.
+    `enough` is asked after every block, whose last seed is one less than a multiple of eight,
+    whether to stop; `go_on` with the number of finished batches before each one that is traced,
+    from the third on. `progress` is called with (done, total, estimator) after every batch that was
+    traced. `elsewhere` traces batches in other processes; what these do not bring is traced here.
     """
     if batches < 2:
         raise ValueError(f"batches: got {batches}, expected at least 2 for a standard error")
     if batches > LARGEST_SEED:
         raise InputError(
-            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; expected at most "
+            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; "
+            "expected at most "
             f"{LARGEST_SEED * samples}: each batch has its own seed"
         )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(
-            f"seed: got {first_seed} for {batches} batches, which count up; expected 0 to {LARGEST_SEED - batches}"
+            f"seed: got {first_seed} for {batches} batches, which count up; expected 0 to "
+            f"{LARGEST_SEED - batches}"
         )
     folder = _INPUTS[estimator](scene_content(scene), samples, max_depth, orders, counts).key
-    layers, trace = batch_tracer(scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders)
+    layers, trace = batch_tracer(
+        scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders
+    )
     tally: Counter[str] = Counter()
 
     def kept_or_traced(seed: int) -> Batches | None:
@@ -164,17 +180,23 @@ def monte_carlo_batches(
                     if progress is not None:
                         progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
                 add_spent(Spent() - waited())  # what they spent counts, when their batches are read
-            block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
+            block, whole = _block(
+                folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced
+            )
             if block is not None:
                 done = block if done is None else merged(done, block)
-            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
+            if not whole or (
+                enough is not None and 2 <= tally["done"] < batches and enough(_all(done))
+            ):
                 break
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
         reason = os.strerror(error.errno or errno.ENOSPC)
         hint = "make room, or name another folder by AIRLIGHT_CACHE_DIR, and run again to go on"
-        raise OSError(error.errno, f"{reason}; {_kept(tally)}; {hint}", str(cache_folder())) from error
+        raise OSError(
+            error.errno, f"{reason}; {_kept(tally)}; {hint}", str(cache_folder())
+        ) from error
     return Run(_all(done), max(0, tally["cached"] - tally["brought"]), tally["damaged"])
 
 
@@ -187,24 +209,34 @@ def batch_tracer(
     counts: NDArray[np.integer] | None = None,
     orders: tuple[str, ...] | None = None,
 ) -> tuple[tuple[str, ...], Trace]:
-    """Return the layers of a batch, and the function that traces one from its seed; see `monte_carlo_batches`."""
+    """Return the layers of a batch, and the function that traces one from its seed;
+    see `monte_carlo_batches`.
+    """
     if orders is None:
         reference = read_reference(scene)
         check_camera(reference)
         check_rays(reference, surface_hits(reference).distance)
         if estimator == "volpath":
-            return LAYERS, lambda seed: volpath_batch(reference, seed, samples, max_depth=max_depth, counts=counts)
+            return LAYERS, lambda seed: volpath_batch(
+                reference, seed, samples, max_depth=max_depth, counts=counts
+            )
         if estimator == "single-scatter" and max_depth == 2 and counts is None:
             return LAYERS, lambda seed: single_scatter_batch(reference, seed, samples)
     else:
         from airlight.validation.slab.request import order_range
 
-        clouds, sets, layers = read_clouds(scene), [(name, order_range(name)) for name in orders], set_layers(orders)
+        clouds, sets, layers = (
+            read_clouds(scene),
+            [(name, order_range(name)) for name in orders],
+            set_layers(orders),
+        )
         if estimator == "volpath":
             return layers[:-1], lambda seed: volpath_orders_batch(clouds, seed, samples, sets=sets)
         if estimator == "cloud-paths":
             seen = seen_clouds(clouds).meets
-            return layers, lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
+            return layers, lambda seed: cloud_paths_batch(
+                clouds, seed, samples, sets=sets, seen=seen
+            )
     given = f"estimator: got {estimator!r} with max_depth {max_depth} and orders {orders}"
     raise ValueError(f"{given}, expected one of {', '.join(ESTIMATORS)}")
 
@@ -212,7 +244,10 @@ def batch_tracer(
 def _has(folder: str | None, seed: int) -> bool:
     """Return whether the batch of a seed is kept, alone or in its block."""
     start = seed // BLOCK * BLOCK
-    return any(is_kept(_name(folder, seeds)) for seeds in (range(seed, seed + 1), range(start, start + BLOCK)))
+    return any(
+        is_kept(_name(folder, seeds))
+        for seeds in (range(seed, seed + 1), range(start, start + BLOCK))
+    )
 
 
 def _all(done: Batches | None) -> Batches:
@@ -259,7 +294,11 @@ def _block(
 
 
 def _name(folder: str | None, seeds: range) -> str | None:
-    return None if folder is None else f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
+    return (
+        None
+        if folder is None
+        else f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
+    )
 
 
 def _store(folder: str | None, batches: Batches, spent: Spent) -> None:
@@ -284,4 +323,8 @@ def _load(
 
 
 def _kept(tally: Counter[str]) -> str:
-    return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"
+    return (
+        f"{tally['done']} finished batches are kept"
+        if tally["done"]
+        else "nothing was finished yet"
+    )

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much multiple scattering a scene has: the fraction of light that every single-scattering method leaves out.
+"""How much multiple scattering a scene has: the fraction of light that every
+single-scattering method leaves out.
 
-volpath is run twice with the same seeds, with max_depth = 2 (one scattering) and with a large one. Over the batches b,
-with S_b and T_b the image means of the two, the fraction is
+volpath is run twice with the same seeds, with max_depth = 2 (one scattering) and with a large one.
+Over the batches b, with S_b and T_b the image means of the two, the fraction is
 
     1 - R,    R = mean(S) / mean(T),    s_R = std(S_b - R T_b) / (sqrt(K) mean(T))
 
-(the estimate of a ratio, and its standard error to first order; Cochran 1977, eq. 2.46). Paths of one seed begin alike,
-so that S and T rise and fall together: the smaller the fraction, the more of the noise cancels in S - R T. The ratio is
-biased by about s_R^2, which is far below its interval. The interval is Student's, for K - 1 degrees of freedom.
+(the estimate of a ratio, and its standard error to first order; Cochran 1977, eq. 2.46). Paths of
+one seed begin alike, so that S and T rise and fall together: the smaller the fraction, the more of
+the noise cancels in S - R T. The ratio is biased by about s_R^2, which is far below its interval.
+The interval is Student's, for K - 1 degrees of freedom.
 """
 
 from typing import Any
@@ -46,7 +48,9 @@ def multiple_scattering_fraction(
 
 
 def left_out(part: Array, whole: Array) -> Fraction:
-    """Return 1 - part/whole with its 95 % interval, from image means of paired batches, (batches,); 0 without light."""
+    """Return 1 - part/whole with its 95 % interval, from image means of paired batches,
+    (batches,); 0 without light.
+    """
     count = len(whole)
     if not whole.mean() > 0:
         return Fraction(0.0, (0.0, 0.0))

@@ -1,26 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of a scene, from the cache where it was computed before, and what the image of a renderer holds of it.
+"""The reference of a scene, from the cache where it was computed before, and what the image
+of a renderer holds of it.
 
-Refused are references that are infinite, of rays that meet a light, and what is not finite for any other reason.
+Refused are references that are infinite, of rays that meet a light, and what is not
+finite for any other reason.
 
-With q = (x - t) + r = h E, t the foot of the light and h its distance from the ray (DESIGN section 2),
+With q = (x - t) + r = h E, t the foot of the light and h its distance from
+the ray (DESIGN section 2),
 
     h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
 
-Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all E > 0 and the
-exponential that of t alone:
+Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all
+E > 0 and the exponential that of t alone:
 
     h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
 
-J and the radiance grow like 1/h, without a bound. A ray that ends at the light has E up to 1, one that begins there, at
-the camera, E from 1 on: parts of the same integral. A light at the camera is on every ray. That the samples of an
-estimator are finite makes no difference: their mean is infinite.
+J and the radiance grow like 1/h, without a bound. A ray that ends at the light has E up to 1, one
+that begins there, at the camera, E from 1 on: parts of the same integral. A light at the camera is
+on every ray. That the samples of an estimator are finite makes no difference: their mean is
+infinite.
 
-The mean over the area of a pixel is finite, since int 2 pi h dh / h is: `pixel="area"` is refused only where the camera
-is at the light.
+The mean over the area of a pixel is finite, since int 2 pi h dh / h is: `pixel="area"` is refused
+only where the camera is at the light.
 
-How near is on the ray? Mitsuba holds positions as float32 numbers, the largest coordinate of camera and light known to
-2^-24 of it. A smaller h is not known to be anything but 0.
+How near is on the ray? Mitsuba holds positions as float32 numbers, the largest coordinate of camera
+and light known to 2^-24 of it. A smaller h is not known to be anything but 0.
 """
 
 from collections.abc import Callable, Mapping
@@ -57,18 +61,22 @@ class ReferenceInputs(Inputs):
     checks: int = 32  #: see `reference.quadrature.image.quadrature_image`
     shadow_scale: float = 1.0  #: the same
     pixel: str = "centre"  #: the same
-    points: int | None = None  #: samples of area lights of each replicate; None for as many as their error needs
+    #: samples of area lights of each replicate; None for as many as their error needs
+    points: int | None = None
 
 
 def reference_inputs(scene, **settings: Any) -> ReferenceInputs:
-    """Return the inputs of the reference of an `mi.Scene`, `settings` by the names of `ReferenceInputs`."""
+    """Return the inputs of the reference of an `mi.Scene`, `settings` by the
+    names of `ReferenceInputs`.
+    """
     return ReferenceInputs(scene_content(scene), **settings)
 
 
 def reference_result(
     scene, inputs: ReferenceInputs | None = None, *, progress: Counted | None = None
 ) -> Kept[ReferenceImage]:
-    """Return the quadrature reference of an `mi.Scene`, and what it took, from the cache or computed now.
+    """Return the quadrature reference of an `mi.Scene`, and what it took, from
+    the cache or computed now.
 
     `inputs`: of this scene, with the settings of `reference_inputs`; by default with its defaults.
 
@@ -79,7 +87,8 @@ def reference_result(
 
 
 def reference_image(scene, *, progress: Counted | None = None, **settings: Any) -> ReferenceImage:
-    """Return the quadrature reference of an `mi.Scene` at its own size, (height, width, 3) [W/(m^2 sr)].
+    """Return the quadrature reference of an `mi.Scene` at its own size,
+    (height, width, 3) [W/(m^2 sr)].
 
     `settings`: by the names of `ReferenceInputs`.
 
@@ -101,8 +110,11 @@ def _computed(scene, inputs: ReferenceInputs, progress: Counted | None) -> Refer
     return _checked_image(reference, settings, keep=keep, progress=progress)
 
 
-def reference_of_pixels(scene, pixels: NDArray[np.integer], plan: PointPlan | None = None) -> ReferenceImage:
-    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row, (1, count, 3); not kept.
+def reference_of_pixels(
+    scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
+) -> ReferenceImage:
+    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row,
+    (1, count, 3); not kept.
 
     `plan`: how many samples stand for area lights.
     """
@@ -128,7 +140,9 @@ def _checked_image(
 
 
 def _parts(key: str | None) -> Keep:
-    """Return a store for parts of a reference until it is done: a run that was interrupted goes on from them."""
+    """Return a store for parts of a reference until it is done: a run that was
+    interrupted goes on from them.
+    """
 
     def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
         part = None if key is None else f"{key}/{name}"
@@ -141,11 +155,12 @@ def _parts(key: str | None) -> Keep:
 def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
     """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
 
-    A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless `hide_emitters` is set, and
-    so do those of Blender for an emitting mesh. `total` is therefore airlight, lit surface and `emitted` together. It
-    is without `emitted` where a file has that as a layer beside it, as the files of `airlight reference` do, and for
-    frames of our own methods, which show no light. Where a renderer hides its lights (Blender's light objects by
-    default, `hide_emitters`), compare the layer `airlight`, or leave the lights out here.
+    A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless
+    `hide_emitters` is set, and so do those of Blender for an emitting mesh. `total` is therefore
+    airlight, lit surface and `emitted` together. It is without `emitted` where a file has that as a
+    layer beside it, as the files of `airlight reference` do, and for frames of our own methods,
+    which show no light. Where a renderer hides its lights (Blender's light objects by default,
+    `hide_emitters`), compare the layer `airlight`, or leave the lights out here.
     """
     if layer != TOTAL:
         return np.asarray(getattr(reference, layer))
@@ -154,9 +169,11 @@ def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = Tr
 
 
 def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
-    """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without area lights, where it is 0.
+    """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without
+    area lights, where it is 0.
 
-    Airlight and surface have their own draws, so that the variances of the total add up; what lights emit is exact.
+    Airlight and surface have their own draws, so that the variances of the total add up;
+    what lights emit is exact.
     """
     if reference.airlight_se is None or reference.surface_se is None:
         return None
@@ -166,11 +183,12 @@ def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
 
 
 def known_to(reference: ReferenceImage, layer: str) -> Estimate:
-    """Return the mean of a layer, and the mean error of its pixels, where these are finite [W/(m^2 sr)].
+    """Return the mean of a layer, and the mean error of its pixels, where these
+    are finite [W/(m^2 sr)].
 
-    That of the airlight is proven or estimated as its bound is, and statistical where lights or positions are sampled:
-    a standard error then. Surfaces are Mitsuba's in single precision: nothing says how far they are off where they are
-    not sampled.
+    That of the airlight is proven or estimated as its bound is, and statistical where lights or
+    positions are sampled: a standard error then. Surfaces are Mitsuba's in single precision:
+    nothing says how far they are off where they are not sampled.
     """
     values, sampled = reference_layer(reference, layer), reference_error(reference, layer)
     kind: Kind = reference.bound_kind if sampled is None else "statistical"
@@ -181,7 +199,9 @@ def known_to(reference: ReferenceImage, layer: str) -> Estimate:
     if not finite.any():
         return UNKNOWN
     unknown = layer != "airlight" and sampled is None
-    return Estimate(float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind)
+    return Estimate(
+        float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind
+    )
 
 
 def known_words(estimate: Estimate) -> str:
@@ -194,7 +214,9 @@ def known_words(estimate: Estimate) -> str:
 
 def relative_error(estimate: Estimate) -> float | None:
     """Return an error over its value; None where one is not known, or the value is 0."""
-    return estimate.error / estimate.value if estimate.value and estimate.error is not None else None
+    return (
+        estimate.error / estimate.value if estimate.value and estimate.error is not None else None
+    )
 
 
 def check_camera(reference: ReferenceScene) -> None:
@@ -203,25 +225,35 @@ def check_camera(reference: ReferenceScene) -> None:
         distance = float(np.linalg.norm(light.position - reference.origin))
         if distance <= _uncertainty(reference, light) and _scatters(reference, light):
             raise InputError(
-                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which grows like "
+                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which "
+                "grows like "
                 "1/distance, is infinite in every pixel; move the light or the camera"
             )
 
 
 def check_rays(reference: ReferenceScene, distance: Array) -> None:
-    """Refuse rays through pixel centres that meet a light before the visible surface, so far away, (rays,) [m]."""
+    """Refuse rays through pixel centres that meet a light before the visible surface,
+    so far away, (rays,) [m].
+    """
     ends = np.ravel(distance)
     for number, light in enumerate(reference.lights, 1):
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
         foot, height = foot_and_height(origin, reference.direction, light.position)
         known = _uncertainty(reference, light)
-        meets = (height <= known) & (foot > 0) & (foot <= ends + known) & _looks_along(light, reference.direction)
+        meets = (
+            (height <= known)
+            & (foot > 0)
+            & (foot <= ends + known)
+            & _looks_along(light, reference.direction)
+        )
         if meets.any() and _scatters(reference, light):
             pixel = int(np.argmax(meets))
             row, column = divmod(pixel, reference.width)
             raise InputError(
-                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre of the pixel in "
-                f"column {column} of row {row}: the airlight there, which grows like 1/distance, is infinite; move the "
+                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre "
+                "of the pixel in "
+                f"column {column} of row {row}: the airlight there, which grows like 1/distance, "
+                "is infinite; move the "
                 "light or the camera, take another size, or the mean over pixels (--pixel area)"
             )
 
@@ -234,8 +266,10 @@ def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             raise InputError(
-                f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not finite, first in "
-                f"column {column} of row {row}; a light may lie on its ray, or a number of the scene be too large: "
+                f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not "
+                "finite, first in "
+                f"column {column} of row {row}; a light may lie on its ray, or a number of the "
+                "scene be too large: "
                 "move the light, or use other units"
             )
 

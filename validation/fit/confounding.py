@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which parameters an image does not tell apart.
 
-Where a combination of steps changes no pixel, the derivatives are linearly dependent: albedo against intensity in the
-airlight, always; exposure against the intensity of the only light. Singular vectors of the derivatives, each column
-divided by its length, identify the combinations: those with a singular value below a millionth of the largest. As many
-of their parameters as can be known stay free; later ones in the list are held, and free ones stand for products with
-them.
+Where a combination of steps changes no pixel, the derivatives are linearly dependent: albedo
+against intensity in the airlight, always; exposure against the intensity of the only light.
+Singular vectors of the derivatives, each column divided by its length, identify the combinations:
+those with a singular value below a millionth of the largest. As many of their parameters as can be
+known stay free; later ones in the list are held, and free ones stand for products with them.
 """
 
 import math
@@ -17,7 +17,9 @@ import numpy as np
 from airlight.validation.arrays import Array
 from airlight.validation.fit.unknowns import Unknown
 
-_ZERO = 1e-6  # singular value over the largest: rounding of float64 sums is 1e-12, real dependence on anything 1e-4
+# singular value over the largest: rounding of float64 sums is 1e-12, real
+# dependence on anything 1e-4
+_ZERO = 1e-6
 _SILENT = 1e-12  # length of a column over the longest: a parameter that does nothing
 _INVOLVED = 1e-3
 
@@ -65,11 +67,14 @@ def _group(columns: Array, length: Array, null: Array, members: Sequence[int]) -
         if values[-1] > _ZERO * max(float(values[0]), 1e-300):
             kept.append(number)
     held = [number for number in members if number not in kept]
-    # A step of the null space N changes log p_k + sum_h a_kh log p_h by N_k + sum_h a_kh N_h, which must be nothing.
+    # A step of the null space N changes log p_k + sum_h a_kh log p_h by N_k + sum_h a_kh
+    # N_h, which must be nothing.
     steps = null / np.where(length > 0, length, 1.0)[:, None]
     powers = -steps[kept] @ np.linalg.pinv(steps[held])
     known = {
-        number: {h: float(power) for h, power in zip(held, row, strict=True) if abs(power) > _INVOLVED}
+        number: {
+            h: float(power) for h, power in zip(held, row, strict=True) if abs(power) > _INVOLVED
+        }
         for number, row in zip(kept, powers, strict=True)
     }
     return Group(tuple(members), tuple(held), known)
@@ -81,8 +86,8 @@ class Confounded:
 
     parameters: tuple[str, ...]
     held: tuple[str, ...]  #: which of them were held at the value to begin with
-    #: Known of them are products of their powers, such as 'albedo * intensity', each with the ends of its
-    #: interval; the high one is None where the image sets none.
+    #: Known of them are products of their powers, such as 'albedo * intensity', each with the ends
+    #: of its interval; the high one is None where the image sets none.
     products: Mapping[str, tuple[float, float, float | None]]
     way_out: str
 
@@ -91,23 +96,38 @@ class Confounded:
         """The lines that `airlight compare --fit` prints of them."""
         names = ", ".join(self.parameters)
         alone = len(self.parameters) == 1
-        lines = [f"This image says nothing of {names}." if alone else f"This image does not tell apart: {names}."]
+        lines = [
+            f"This image says nothing of {names}."
+            if alone
+            else f"This image does not tell apart: {names}."
+        ]
         for name, (value, low, high) in self.products.items():
             ends = f"{low:.6g} or more" if high is None else f"{low:.6g} to {high:.6g}"
             lines.append(f"Known is {name} = {value:.6g} ({ends}).")
         return [*lines, f"Way out: {self.way_out}."]
 
 
-def confounded(group: Group, unknowns: Sequence[Unknown], inner: Array, lengths: Array, holds: str) -> Confounded:
-    """Return the products that an image tells of a group, from the numbers on the whole line and their intervals."""
+def confounded(
+    group: Group, unknowns: Sequence[Unknown], inner: Array, lengths: Array, holds: str
+) -> Confounded:
+    """Return the products that an image tells of a group, from the numbers on the whole
+    line and their intervals.
+    """
     names = {number: unknowns[number].name for number in group.members}
     products: dict[str, tuple[float, float, float | None]] = {}
     for kept, powers in group.powers.items():
         if all(unknowns[number].number.scale == "log" for number in (kept, *powers)):
-            words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
+            words = [
+                names[kept],
+                *(_power(names[number], power) for number, power in powers.items()),
+            ]
             middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
             low, high = (float(np.exp(middle + float(length))) for length in lengths[kept])
-            products[" * ".join(words)] = math.exp(middle), low, high if math.isfinite(high) else None
+            products[" * ".join(words)] = (
+                math.exp(middle),
+                low,
+                high if math.isfinite(high) else None,
+            )
     held = tuple(names[number] for number in group.held)
     return Confounded(tuple(names.values()), held, products, _way_out(group, unknowns, holds))
 
@@ -122,7 +142,8 @@ def _way_out(group: Group, unknowns: Sequence[Unknown], holds: str) -> str:
         return "these do nothing in the pixels of this image: fit a layer in which they show"
     if "albedo" in kinds and holds == "airlight":
         return (
-            "the airlight holds only their product: leave all but one out of the fit, or fit a layer with lit "
+            "the airlight holds only their product: leave all but one out of the fit, or fit a "
+            "layer with lit "
             "surfaces, which the albedo does not change, such as --layer total"
         )
     return "leave all but one out of the fit; what is left out keeps the value of the scene"

@@ -42,7 +42,8 @@ from airlight.validation.scenes.loading import LoadedScene
 _MOVES = 12  # rounds in which lit intervals are found again
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
 _STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
-_KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32
+# a standard error that is always there: scenes are read, and images written, in float32
+_KNOWN = 1e-6
 _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
 _MANY_RAYS = 20_000  # that are looked at: more say nothing new of few numbers
 _FEW_RAYS = 3000  # on which starts are compared
@@ -80,7 +81,8 @@ class Fit:
     noise: float  #: median of the relative residual, as a standard deviation
     confounded: tuple[Confounded, ...]
     seconds: float  #: that the fit took, with the paths of light
-    failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
+    #: what is wrong with the file, such as pixels that are not finite
+    failures: tuple[str, ...] = ()
     note: str = ""  #: what the reader of the file changed or left out, such as other primaries
 
     @property
@@ -89,10 +91,14 @@ class Fit:
         holds = "airlight + surface" if self.holds == "total" else self.holds
         left = f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and are left out"
         lines = [
-            f"{self.path} as {holds} of {self.scene}, {PIXEL_WORDS[self.pixel]}: {100 * self.explained:.6g} % of its "
-            f"variance is explained; the relative rmse left is {self.residual:.3g}, the usual error of a value "
+            f"{self.path} as {holds} of {self.scene}, {PIXEL_WORDS[self.pixel]}: "
+            f"{100 * self.explained:.6g} % of its "
+            f"variance is explained; the relative rmse left is {self.residual:.3g}, the usual "
+            "error of a value "
             f"{self.noise:.2g}.",
-            left + (": look where, by airlight compare" if self.left_out > _MANY * self.pixels else "") + ".",
+            left
+            + (": look where, by airlight compare" if self.left_out > _MANY * self.pixels else "")
+            + ".",
         ]
         if self.explained < _BAD:
             lines.append("That is no explanation: something that was not looked for is different.")
@@ -123,15 +129,17 @@ def fit_image(
 ) -> Fit:
     """Find the parameters that explain an image.
 
-    `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it, and what is not looked
-    for; `parameters`, `starts`: what is looked for, see `validation.fit.unknowns`, and values to begin with; the
-    scene's own by default; `layer`, `holds`: which layer, and what it holds, see
-    `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area'; by default what the image says of
-    itself, or what fits better; `mask`: which pixels may take part, (height, width); all by default.
+    `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it,
+    and what is not looked for; `parameters`, `starts`: what is looked for, see
+    `validation.fit.unknowns`, and values to begin with; the scene's own by default; `layer`,
+    `holds`: which layer, and what it holds, see `validation.engine.seen.judged_layer`; `pixel`:
+    'centre' or 'area'; by default what the image says of itself, or what fits better; `mask`: which
+    pixels may take part, (height, width); all by default.
 
-    Valid for single scattering: homogeneous media and height fog, point and spot lights, directional ones where media
-    have bounds or density falls with height; area lights are 16 to 128 samples here, which leaves some 0.5 % in a
-    pixel. The intervals count pixels as independent of one another.
+    Valid for single scattering: homogeneous media and height fog, point and spot lights,
+    directional ones where media have bounds or density falls with height; area lights are 16 to 128
+    samples here, which leaves some 0.5 % in a pixel. The intervals count pixels as independent of
+    one another.
     """
     took = stopwatch()
     kinds = pixel_kinds(image, pixel)
@@ -143,7 +151,8 @@ def fit_image(
     fewest = max(_FEWEST, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
         raise InputError(
-            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; expected at least "
+            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; "
+            "expected at least "
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
 
@@ -158,7 +167,9 @@ def fit_image(
         lambda each: _wrong(each.solution) < _EXACT,
     )
     fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, found)
-    return replace(fit, seconds=took().seconds, failures=wrong, note=str(image.attributes.get(NOTE, "")))
+    return replace(
+        fit, seconds=took().seconds, failures=wrong, note=str(image.attributes.get(NOTE, ""))
+    )
 
 
 def _predictor(seen: Seen) -> Predictor:
@@ -178,15 +189,22 @@ class _Solved:
     solution: Solution
 
 
-def _solved(predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progress | None) -> _Solved:
+def _solved(
+    predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progress | None
+) -> _Solved:
     """Solve for parameters; where lights move, with lit intervals found again in every round."""
     model = Model.of(predictor, unknowns)
     if progress is not None:
         progress(0.5, "lit intervals")
-    # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
+    # Paths cost more than what is done with them: starts have some of their own
+    # where these are far fewer.
     few = _predictor(replace(predictor.seen, rays=_FEW_RAYS))
-    start = best_start(Model.of(few, unknowns) if len(model.image) > _FEWER * few.seen.most_pixels else model)
-    groups = confounded_groups((model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns)))
+    start = best_start(
+        Model.of(few, unknowns) if len(model.image) > _FEWER * few.seen.most_pixels else model
+    )
+    groups = confounded_groups(
+        (model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns))
+    )
     free = ~np.isin(np.arange(len(unknowns)), [number for group in groups for number in group.held])
     model, inner = model.holding(free, model.at), start[free]
     if not free.any():
@@ -207,7 +225,10 @@ def _solved(predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progr
 
 
 def _size(reference: ReferenceScene) -> float:
-    return max((float(np.linalg.norm(light.position - reference.origin)) for light in reference.lights), default=1.0)
+    return max(
+        (float(np.linalg.norm(light.position - reference.origin)) for light in reference.lights),
+        default=1.0,
+    )
 
 
 def _left(solution: Solution) -> Array:
@@ -218,8 +239,15 @@ def _left(solution: Solution) -> Array:
 
 def _wrong(solution: Solution) -> float:
     """Return how far values are off, as `validation.engine.judge` does: no single one decides."""
-    floor, image = FLOOR * float(np.abs(solution.radiance).mean()), solution.radiance + solution.residual
-    return float(np.abs(relative_errors(solution.radiance, image, floor)).mean()) if image.size else math.inf
+    floor, image = (
+        FLOOR * float(np.abs(solution.radiance).mean()),
+        solution.radiance + solution.residual,
+    )
+    return (
+        float(np.abs(relative_errors(solution.radiance, image, floor)).mean())
+        if image.size
+        else math.inf
+    )
 
 
 def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], found: _Solved) -> Fit:
@@ -232,7 +260,9 @@ def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], found: 
     lengths[found.free] = np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1])
     rows = []
     for number, unknown in enumerate(unknowns):
-        value, low, high = (unknown.number.outward(inner[number] + part) for part in (0.0, *lengths[number]))
+        value, low, high = (
+            unknown.number.outward(inner[number] + part) for part in (0.0, *lengths[number])
+        )
         ends = (None, None) if number in doubtful else (_finite(low), _finite(high))
         rows.append(Fitted(unknown.name, value, *ends, unknown.unit, unknown.scene))
     kept = solution.kept

@@ -1,38 +1,44 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Levenberg and Marquardt's method on the pixels of an image, robust to those that disagree, with intervals.
+"""Levenberg and Marquardt's method on the pixels of an image, robust to those that
+disagree, with intervals.
 
-1. Starts are tried over three decades of extinction and the whole range of g, each with the factor on the image that
-   fits best, by a loss of relative errors that no single pixel decides (Cauchy's).
-2. From the best of them the same loss is minimised, on few pixels first. 3. The residuals tell the noise of the image:
-least squares with the weights 1/sigma^2, without outliers, until neither changes. Weights that depend on the model, not
-on the values, stay unbiased even if the noise is skewed.
+1. Starts are tried over three decades of extinction and the whole range of g, each with the factor
+   on the image that fits best, by a loss of relative errors that no single pixel decides
+   (Cauchy's).
+2. From the best of them the same loss is minimised, on few pixels first. 3. The residuals
+   tell the noise of the image:
+least squares with the weights 1/sigma^2, without outliers, until neither changes. Weights that
+depend on the model, not on the values, stay unbiased even if the noise is skewed.
 
 Noise of renderers has a constant part and a part that grows with the radiance f, so
 
     sigma^2 = a^2 + b^2 f^2,    a, b >= 0,
 
-is fitted to the scatter of the residuals in groups of like radiance. The scatter of a group is 1.4826 times the median
-of |residual|, the standard deviation of a normal distribution, which pixels that are wrong by any amount do not move as
-long as they are less than half. Values that are off by more than six sigma are outliers, which not one of a million
-normal values is. They are left out, with all of their pixel.
+is fitted to the scatter of the residuals in groups of like radiance. The scatter of a group is
+1.4826 times the median of |residual|, the standard deviation of a normal distribution, which pixels
+that are wrong by any amount do not move as long as they are less than half. Values that are off by
+more than six sigma are outliers, which not one of a million normal values is. They are left out,
+with all of their pixel.
 
 The covariance is the sandwich
 
     C = B^-1 M B^-1,    B = sum w J J^T,    M = sum_pixels s s^T,    s = sum_channels w J e,
 
-which is right for noise that differs from pixel to pixel and is shared by the channels of one; pixels must be
-independent (White 1980, Econometrica 48, 817; its form for clusters by Liang and Zeger 1986, Biometrika 73, 13).
+which is right for noise that differs from pixel to pixel and is shared by the channels of one;
+pixels must be independent (White 1980, Econometrica 48, 817; its form for clusters by Liang and
+Zeger 1986, Biometrika 73, 13).
 
-An ellipse of the covariance is right where the image is linear in the parameters. With 20 % of noise an extinction may
-be known to a factor of two, and the intervals of the ellipse held the value in 83 to 89 % of cases. The profile of the
-sum of squares Q depends on no choice of parameters: with Q_k(t) the least one with parameter k held at t, and at its
-least Q,
+An ellipse of the covariance is right where the image is linear in the parameters. With 20 % of
+noise an extinction may be known to a factor of two, and the intervals of the ellipse held the value
+in 83 to 89 % of cases. The profile of the sum of squares Q depends on no choice of parameters: with
+Q_k(t) the least one with parameter k held at t, and at its least Q,
 
     (Q_k(t) - Q) / a_k
 
-has the distribution of chi squared with one degree of freedom, where a_k is the variance of the sandwich over that of
-independent values of these weights (Venzon and Moolgavkar 1988, Appl. Statist. 37, 87; with the factor: Rotnitzky and
-Jewell 1990, Biometrika 77, 485). Where the image is linear, these are the ends of the ellipse.
+has the distribution of chi squared with one degree of freedom, where a_k is the variance of the
+sandwich over that of independent values of these weights (Venzon and Moolgavkar 1988, Appl.
+Statist. 37, 87; with the factor: Rotnitzky and Jewell 1990, Biometrika 77, 485). Where the image is
+linear, these are the ends of the ellipse.
 """
 
 import math
@@ -52,7 +58,8 @@ from airlight.validation.fit.unknowns import Unknown
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
 
-_STEP = 1e-4  # of numbers on the whole line: central differences err by its square, and by rounding over it
+# of numbers on the whole line: central differences err by its square, and by rounding over it
+_STEP = 1e-4
 _SIGMA_STARTS = (1.0, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0)
 _G_STARTS = (0.0, -0.6, 0.5, 0.85)
 _FACTORS = ("intensity", "exposure", "albedo")
@@ -74,7 +81,9 @@ _UNBOUNDED = 30.0  # a factor of 10^13: where an image allows it, there is no en
 
 @dataclass(frozen=True)
 class Model:
-    """The values of an image's pixels, as a function of the places of parameters on the whole line."""
+    """The values of an image's pixels, as a function of the places of
+    parameters on the whole line.
+    """
 
     predictor: Predictor
     unknowns: tuple[Unknown, ...]
@@ -85,7 +94,12 @@ class Model:
     def of(predictor: Predictor, unknowns: tuple[Unknown, ...]) -> "Model":
         """Return the model of an image with the paths where parameters begin."""
         numbers = [unknown.number for unknown in unknowns]
-        return Model(predictor, unknowns, inward(numbers, [each.starts[0] for each in numbers]), Guess(predictor.fog))
+        return Model(
+            predictor,
+            unknowns,
+            inward(numbers, [each.starts[0] for each in numbers]),
+            Guess(predictor.fog),
+        )
 
     @property
     def numbers(self) -> list[Number]:
@@ -109,7 +123,13 @@ class Model:
     def slopes(self, place: Array) -> Array:
         """Return the derivatives of `values` by each place, (m, 3, unknowns)."""
         steps = _STEP * np.eye(len(place))
-        return np.stack([(self.values(place + step) - self.values(place - step)) / (2 * _STEP) for step in steps], 2)
+        return np.stack(
+            [
+                (self.values(place + step) - self.values(place - step)) / (2 * _STEP)
+                for step in steps
+            ],
+            2,
+        )
 
     def holding(self, free: Bools, place: Array) -> "Model":
         """Return the model with the parameters that are not free held where they are at a place."""
@@ -140,9 +160,11 @@ class Solution:
 
 
 def best_start(model: Model) -> Array:
-    """Return where the search should begin: the best end of short searches from the best of many starts.
+    """Return where the search should begin: the best end of short searches from
+    the best of many starts.
 
-    Thin fog of a large albedo looks much like thick fog from afar, so that the best start may lead to a worse end.
+    Thin fog of a large albedo looks much like thick fog from afar, so that the best start
+    may lead to a worse end.
     """
     trials = sorted(_trials(model), key=lambda trial: trial[0])[:_SEARCHES]
     ends = [_search(model, trial, _SHORT) for _, trial in trials]
@@ -150,7 +172,9 @@ def best_start(model: Model) -> Array:
 
 
 def robust_fit(model: Model, start: Array) -> Array:
-    """Return the parameters with the least Cauchy loss of relative errors, its scale that of what is left."""
+    """Return the parameters with the least Cauchy loss of relative errors, its
+    scale that of what is left.
+    """
     for _ in range(2):
         start = _search(model, start, _LONG)
     return start
@@ -171,34 +195,41 @@ def _least(
     start: Array,
     **how: Any,
 ) -> Array:
-    """Return the place with the least sum of squares, or of another loss of SciPy's, in the ranges of the numbers.
+    """Return the place with the least sum of squares, or of another loss of SciPy's, in
+    the ranges of the numbers.
 
-    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image that needs more tells
-    nothing, and an unbounded step may overflow.
+    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image
+    that needs more tells nothing, and an unbounded step may overflow.
     """
     reach = np.array([math.inf if number.scale == "plain" else _FARTHEST for number in numbers])
-    low, high = (inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high"))
+    low, high = (
+        inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high")
+    )
     ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
     return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
 
 def _trials(model: Model) -> list[tuple[float, Array]]:
-    """Return starts with their losses: all extinctions times a factor, with some g, and the factor that fits best.
+    """Return starts with their losses: all extinctions times a factor, with some g, and
+    the factor that fits best.
 
-    The extinctions are those to begin with and, where these differ from one another, their mean: channels whose starts
-    lie decades apart lead to no common end.
+    The extinctions are those to begin with and, where these differ from one another, their mean:
+    channels whose starts lie decades apart lead to no common end.
     """
     given, unknowns = model.at, model.unknowns
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]
-    # If several parameters multiply the same, such as albedo and exposure, only the first kind takes the factor.
+    # If several parameters multiply the same, such as albedo and exposure, only the
+    # first kind takes the factor.
     chosen = [n for n in factors if unknowns[n].kind == unknowns[factors[0]].kind]
     trials = []
     grey = given.copy()
     grey[sigmas] = given[sigmas].mean() if sigmas else 0.0
     bases = (given,) if np.array_equal(grey, given) else (given, grey)
-    for base, times, g in product(bases, _SIGMA_STARTS if sigmas else (1.0,), (None, *_G_STARTS) if gs else (None,)):
+    for base, times, g in product(
+        bases, _SIGMA_STARTS if sigmas else (1.0,), (None, *_G_STARTS) if gs else (None,)
+    ):
         trial = base.copy()
         trial[sigmas] += math.log(times)
         trial[gs] = given[gs] if g is None else math.atanh(g)
@@ -217,7 +248,9 @@ def _loss(model: Model, radiance: Array) -> float:
 
 
 def weighted_fit(model: Model, start: Array) -> Solution:
-    """Return the solution of least squares with the weights that the noise asks for, and without outliers."""
+    """Return the solution of least squares with the weights that the noise asks
+    for, and without outliers.
+    """
     inner, kept = start, np.ones(len(model.image), dtype=bool)
     for _ in range(_ROUNDS):
         radiance = model.values(inner)
@@ -226,10 +259,14 @@ def weighted_fit(model: Model, start: Array) -> Solution:
         before, kept = kept, np.all(np.abs(residual) <= _OUTLIER * sigma, axis=1)
         weights = 1 / sigma
         if kept.mean() < _LEAST_KEPT:
-            # Nothing explains most of the image: what is left is no noise. All pixels count, relative to themselves.
+            # Nothing explains most of the image: what is left is no noise. All pixels
+            # count, relative to themselves.
             weights, kept = 1 / model.relative, np.ones_like(kept)
             break
-        last, inner = inner, _least(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40)
+        last, inner = (
+            inner,
+            _least(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40),
+        )
         moved = float(np.max(np.abs(inner - last), initial=0.0))
         if moved < 1e-9 and np.array_equal(before, kept):
             break
@@ -243,19 +280,29 @@ def no_solution(model: Model) -> Solution:
     """Return the solution where no parameter is free."""
     radiance, empty = model.values(np.empty(0)), np.empty(0)
     residual, kept = model.image - radiance, np.ones(len(model.image), dtype=bool)
-    return Solution(empty, np.empty((0, 0)), residual, radiance, kept, np.ones_like(radiance), empty)
+    return Solution(
+        empty, np.empty((0, 0)), residual, radiance, kept, np.ones_like(radiance), empty
+    )
 
 
-def _weighted(model: Model, weights: Array, kept: Bools) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """Return the function whose squares are summed, of the parameters, (values,), and its derivatives."""
+def _weighted(
+    model: Model, weights: Array, kept: Bools
+) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """Return the function whose squares are summed, of the parameters,
+    (values,), and its derivatives.
+    """
     return (
         lambda inner: ((model.image - model.values(inner)) * weights)[kept].ravel(),
         lambda inner: -(model.slopes(inner) * weights[:, :, None])[kept].reshape(-1, len(inner)),
     )
 
 
-def _sandwich(derivatives: Array, residual: Array, weights: Array, kept: Bools) -> tuple[Array, Array]:
-    """Return the covariance, and its variances over those of independent values of these weights."""
+def _sandwich(
+    derivatives: Array, residual: Array, weights: Array, kept: Bools
+) -> tuple[Array, Array]:
+    """Return the covariance, and its variances over those of independent
+    values of these weights.
+    """
     slopes, count = (derivatives * weights[:, :, None])[kept], derivatives.shape[2]
     flat = slopes.reshape(-1, count)
     scores = np.einsum("pck,pc->pk", slopes, (residual * weights)[kept])
@@ -277,7 +324,11 @@ def noise_of(radiance: Array, residual: Array) -> Array:
     usual = float(np.mean(np.abs(radiance + residual)))  # of the image
     least = _ROUNDING * (np.abs(radiance) + 1e-3 * usual) + 1e-140
     order = np.argsort(radiance)
-    groups = [group for group in np.array_split(order, min(_GROUPS, max(1, len(order) // 8))) if len(group)]
+    groups = [
+        group
+        for group in np.array_split(order, min(_GROUPS, max(1, len(order) // 8)))
+        if len(group)
+    ]
     scatter = np.array([1.4826 * np.median(np.abs(residual[group])) for group in groups])
     scatter = np.maximum(scatter, [np.median(least[group]) for group in groups])
     squares = np.array([np.median(radiance[group] ** 2) for group in groups])
@@ -288,7 +339,8 @@ def noise_of(radiance: Array, residual: Array) -> Array:
 
 
 def interval_ends(model: Model, solution: Solution) -> Array:
-    """Return the ends of the 95 % intervals as numbers on the whole line, infinite where the image sets none.
+    """Return the ends of the 95 % intervals as numbers on the whole line, infinite
+    where the image sets none.
 
     Returns
     -------
@@ -297,7 +349,8 @@ def interval_ends(model: Model, solution: Solution) -> Array:
     """
     reach = SIGMAS * np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     ends = [
-        [_end(model, solution, number, sign * float(step)) for sign in (-1, 1)] for number, step in enumerate(reach)
+        [_end(model, solution, number, sign * float(step)) for sign in (-1, 1)]
+        for number, step in enumerate(reach)
     ]
     return np.array(ends).reshape(-1, 2)
 
@@ -307,17 +360,23 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
     best = float(solution.inner[number])
     if not _LINEAR < abs(step) < math.inf:
         return best + step
-    way = solution.covariance[:, number] / solution.covariance[number, number]  # how the others go with it
-    below, above = (0.0, -SIGMAS), (math.nan, math.nan)  # distances, and standard errors beyond the end there
+    # how the others go with it
+    way = solution.covariance[:, number] / solution.covariance[number, number]
+    # distances, and standard errors beyond the end there
+    below, above = (0.0, -SIGMAS), (math.nan, math.nan)
     distance = step
     for _ in range(_TURNS):
         place, errors = _profile(model, solution, number, solution.inner + distance * way)
         way, beyond = (place - solution.inner) / distance, errors - SIGMAS
         if abs(beyond) < _CLOSE * SIGMAS or abs(above[0] - below[0]) < _CLOSE * abs(above[0]):
             return best + distance
-        # The root of a profile is nearly a line. An end that stays counts half each time (the Illinois algorithm).
+        # The root of a profile is nearly a line. An end that stays counts half each time
+        # (the Illinois algorithm).
         if beyond > 0:
-            below, above = (below[0], below[1] if math.isnan(above[0]) else 0.5 * below[1]), (distance, beyond)
+            below, above = (
+                (below[0], below[1] if math.isnan(above[0]) else 0.5 * below[1]),
+                (distance, beyond),
+            )
         else:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
@@ -330,7 +389,9 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
 
 
 def _profile(model: Model, solution: Solution, number: int, place: Array) -> tuple[Array, float]:
-    """Return the best place with one parameter held, and how many standard errors it is away from the best of all."""
+    """Return the best place with one parameter held, and how many standard errors it is
+    away from the best of all.
+    """
     free = np.arange(len(place)) != number
     best = place.copy()
     if free.any():
@@ -341,4 +402,6 @@ def _profile(model: Model, solution: Solution, number: int, place: Array) -> tup
         best[free] = _least(*weighted, others.numbers, place[free], **how)
     residual, _ = _weighted(model, solution.weights, solution.kept)
     least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
-    return best, math.sqrt(max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number]))
+    return best, math.sqrt(
+        max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number])
+    )

@@ -12,12 +12,12 @@
 | `light.x`, `light.y`, `light.z` | position of a light [m] |
 | `exposure` | factor on the whole image; `exposure.r`, `.g`, `.b` |
 
-Where a scene has several media or lights, the name of one follows after a colon, `sigma_t:fog` or `intensity:lamp`, or
-its number, from 1 on; without it all of them are meant, one parameter for each. In a medium whose channels differ
-`sigma_t` and `albedo` stand for three parameters.
+Where a scene has several media or lights, the name of one follows after a colon, `sigma_t:fog` or
+`intensity:lamp`, or its number, from 1 on; without it all of them are meant, one parameter for
+each. In a medium whose channels differ `sigma_t` and `albedo` stand for three parameters.
 
-Positive parameters are looked for by their logarithms, g by artanh g: all values are allowed that are possible, and a
-step is a relative change.
+Positive parameters are looked for by their logarithms, g by artanh g: all values are allowed that
+are possible, and a step is a relative change.
 """
 
 import math
@@ -36,8 +36,10 @@ from airlight.validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
 AXES = ("x", "y", "z")
-LAYERS = ("sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2", "sigma_0")  #: of height fog, as scenes have them
-_PARTS = {"sigma": "sigma_t", "z": "base", "H": "scale_height"}  # of a layer of height fog, by the letters of a scene
+#: of height fog, as scenes have them
+LAYERS = ("sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2", "sigma_0")
+# of a layer of height fog, by the letters of a scene
+_PARTS = {"sigma": "sigma_t", "z": "base", "H": "scale_height"}
 _RANGES = {"log": (1e-300, 1e300), "tanh": (-1 + 1e-15, 1 - 1e-15), "plain": (-math.inf, math.inf)}
 _BY_LETTERS = {"sigma": ("log", "1/m"), "z": ("plain", "m"), "H": ("log", "m")}
 _KINDS = {  # how a parameter is looked for, and its unit
@@ -55,7 +57,9 @@ _OF_MEDIA = ("sigma_t", "albedo", "phase.g")
 
 @dataclass(frozen=True)
 class Unknown(Fault):
-    """A parameter that is looked for: a fault that sets a number, whose kind is one of `NAMES` or `LAYERS`."""
+    """A parameter that is looked for: a fault that sets a number, whose kind is
+    one of `NAMES` or `LAYERS`.
+    """
 
     paths: tuple[Path, ...] = ()  #: the numbers of a fog that it stands for
     scene: float = math.nan  #: value in the scene
@@ -80,11 +84,15 @@ def _unknown(name: str, kind: str, paths: tuple[Path, ...], scene: float) -> Unk
             fog = fog.put(path, p[0])
         return replace(guess, fog=fog)
 
-    return Unknown(name, f"{name} is {{0:.6g}}", change, (number,), kind=kind, paths=paths, scene=scene)
+    return Unknown(
+        name, f"{name} is {{0:.6g}}", change, (number,), kind=kind, paths=paths, scene=scene
+    )
 
 
 def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> Unknown:
-    """Return a coordinate of the position of a light: shadows move with it, except where paths are held."""
+    """Return a coordinate of the position of a light: shadows move with it,
+    except where paths are held.
+    """
     axis, places = AXES.index(kind[-1]), [each.position for each in reference.lights]
     scene, path = float(places[light][axis]), ("moved", light, axis)
 
@@ -92,17 +100,30 @@ def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> 
         moved = np.zeros((len(places), 3))
         moved[: len(guess.scenery.moved)] = guess.scenery.moved
         moved[light, axis] = p[0] - scene
-        return replace(guess, scenery=replace(guess.scenery, moved=tuple(colour(each) for each in moved)))
+        return replace(
+            guess, scenery=replace(guess.scenery, moved=tuple(colour(each) for each in moved))
+        )
 
     def held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
         guess = change(predictor, guess, at)
         return replace(guess, fog=guess.fog.put(path, p[0] - at[0]))
 
     number = Number(*_RANGES["plain"], starts=(scene,))
-    return Unknown(name, f"{name} is {{0:.6g}}", change, (number,), held=held, kind=kind, paths=(path,), scene=scene)
+    return Unknown(
+        name,
+        f"{name} is {{0:.6g}}",
+        change,
+        (number,),
+        held=held,
+        kind=kind,
+        paths=(path,),
+        scene=scene,
+    )
 
 
-def read_unknowns(names: Sequence[str], reference: ReferenceScene, starts: Mapping[str, float]) -> tuple[Unknown, ...]:
+def read_unknowns(
+    names: Sequence[str], reference: ReferenceScene, starts: Mapping[str, float]
+) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
     `starts`: values to begin with, by name; those of the scene by default.
@@ -120,7 +141,8 @@ def read_unknowns(names: Sequence[str], reference: ReferenceScene, starts: Mappi
         if name not in {unknown.name for unknown in unknowns}:
             known = [unknown.name for unknown in unknowns]
             raise InputError(
-                f"start: '{name}' is not looked for; expected one of {', '.join(known)}" + nearest(name, known)
+                f"start: '{name}' is not looked for; expected one of {', '.join(known)}"
+                + nearest(name, known)
             )
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
@@ -131,19 +153,33 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
     alone = base in ("sigma_t", "albedo", "exposure") and letter in CHANNELS
     kind, channels = (base, (CHANNELS.index(letter),)) if alone else (word, (0, 1, 2))
     if fog.height is None and kind in LAYERS:
-        raise InputError(f"fit: got '{name}'; the scene has no height fog: write it as such, or look for 'sigma_t'")
+        raise InputError(
+            f"fit: got '{name}'; the scene has no height fog: write it as such, or look for "
+            "'sigma_t'"
+        )
     names = NAMES if fog.height is None else (*_layers_of(fog.height), *NAMES[1:])
     if kind not in names:
-        raise InputError(f"fit: got '{name}', expected some of {', '.join(names)}" + nearest(word, names))
+        raise InputError(
+            f"fit: got '{name}', expected some of {', '.join(names)}" + nearest(word, names)
+        )
     if kind in LAYERS:
         assert fog.height is not None
         part, layer = _PARTS[kind[:-2]], int(kind[-1]) - 1
         if layer < 0:
             return [_unknown(kind, kind, (("height", "constant"),), fog.height.constant)]
-        return [_unknown(kind, kind, (("height", "layers", layer, part),), getattr(fog.height.layers[layer], part))]
+        return [
+            _unknown(
+                kind,
+                kind,
+                (("height", "layers", layer, part),),
+                getattr(fog.height.layers[layer], part),
+            )
+        ]
     if kind == "exposure":
         if place:
-            raise InputError(f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'")
+            raise InputError(
+                f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'"
+            )
         return [_unknown(name, kind, tuple((kind, channel) for channel in channels), 1.0)]
     found = []
     for number, own in _chosen(name, place, kind, reference, fog):
@@ -163,11 +199,18 @@ def _of_medium(
         phase, g = (reference.medium, *reference.media)[number].phase, fog.phase[number]
         if not phase.is_constant and phase.name != "hg":
             raise InputError(
-                f"fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has '{phase.name}'"
+                "fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has "
+                f"'{phase.name}'"
             )
-        return [_unknown(kind + own, kind, (("phase", number),), g if isinstance(g, float) else 0.0)]
+        return [
+            _unknown(kind + own, kind, (("phase", number),), g if isinstance(g, float) else 0.0)
+        ]
     values = getattr(fog, kind)[number]
-    groups = [channels] if len({values[c] for c in channels}) == 1 else [(channel,) for channel in channels]
+    groups = (
+        [channels]
+        if len({values[c] for c in channels}) == 1
+        else [(channel,) for channel in channels]
+    )
     return [
         _unknown(
             kind + (f".{CHANNELS[group[0]]}" if len(group) == 1 else "") + own,
@@ -181,11 +224,17 @@ def _of_medium(
 
 def _layers_of(height: HeightFog) -> tuple[str, ...]:
     """Return the names of the numbers that height fog has."""
-    return tuple(name for name in LAYERS if 0 < int(name[-1]) <= len(height.layers) or name == "sigma_0")
+    return tuple(
+        name for name in LAYERS if 0 < int(name[-1]) <= len(height.layers) or name == "sigma_0"
+    )
 
 
-def _chosen(name: str, place: str, kind: str, reference: ReferenceScene, fog: Fog) -> list[tuple[int, str]]:
-    """Return the numbers of media or lights, and the endings that names have for them where there are several."""
+def _chosen(
+    name: str, place: str, kind: str, reference: ReferenceScene, fog: Fog
+) -> list[tuple[int, str]]:
+    """Return the numbers of media or lights, and the endings that names have for them
+    where there are several.
+    """
     if kind in _OF_MEDIA:
         what, names = "medium", ["medium", *(medium.name for medium in reference.media)]
         # The medium without bounds is the camera's: its id in the file is another name of it.
@@ -200,7 +249,9 @@ def _chosen(name: str, place: str, kind: str, reference: ReferenceScene, fog: Fo
     names = [names[number] for number in numbers]
     if not numbers:
         raise InputError(f"fit: got '{name}'; the scene has no {what} of this kind")
-    found = [(number, f":{own}" if several else "") for number, own in zip(numbers, names, strict=True)]
+    found = [
+        (number, f":{own}" if several else "") for number, own in zip(numbers, names, strict=True)
+    ]
     if not place:
         return found
     if place in names:
@@ -208,7 +259,8 @@ def _chosen(name: str, place: str, kind: str, reference: ReferenceScene, fog: Fo
     if place.isdigit() and 1 <= int(place) <= len(found):
         return [found[int(place) - 1]]
     raise InputError(
-        f"fit: got '{name}', expected a {what} of the scene, {', '.join(names)}, or its number" + nearest(place, names)
+        f"fit: got '{name}', expected a {what} of the scene, {', '.join(names)}, or its number"
+        + nearest(place, names)
     )
 
 
@@ -217,9 +269,14 @@ def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
     scale = unknown.number.scale
     if scale == "log" and unknown.name not in starts and value <= 0:
         raise InputError(
-            f"fit: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give start {unknown.name}=VALUE"
+            f"fit: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give start "
+            f"{unknown.name}=VALUE"
         )
-    expected = {"log": "a number above 0", "tanh": "a number between -1 and 1", "plain": "a finite number"}[scale]
+    expected = {
+        "log": "a number above 0",
+        "tanh": "a number between -1 and 1",
+        "plain": "a finite number",
+    }[scale]
     if not (math.isfinite(value) and unknown.number.low <= value <= unknown.number.high):
         raise InputError(f"start: {unknown.name}={value:g}, expected {expected}")
     return replace(unknown, parameters=(replace(unknown.number, starts=(value,)),))

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The single scattering of an image as a function of what describes the fog.
 
-Where light passes and where it is hidden is found once, by the reference's own lit intervals. The rest is a sum over
-nodes on them in which extinction, albedo, phase function and intensities are free, and so are the laws that an engine
-may get wrong: `airlight compare --fit` and `airlight compare --diagnose` search among these for what explains an image.
+Where light passes and where it is hidden is found once, by the reference's own lit intervals. The
+rest is a sum over nodes on them in which extinction, albedo, phase function and intensities are
+free, and so are the laws that an engine may get wrong: `airlight compare --fit` and `airlight
+compare --diagnose` search among these for what explains an image.
 
 Read in this order:
 

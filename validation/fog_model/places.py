@@ -5,19 +5,20 @@ On a piece of a ray in one medium, with w = asinh((x - foot)/height),
 
     dx / r^2 = dw / (height cosh w),      r = height cosh w,
 
-and everything in the integrand of the airlight has its singularities at |Im w| >= pi/2, whatever the phase function
-(`reference.quadrature.homogeneous` says why). With half a panel of the width 1.2 the ellipse of regularity has
-rho = 1.31 + sqrt(1 + 1.31^2) = 2.96, so eight Gauss-Legendre nodes err by about rho^-16 = 3e-8, and four nodes on a
-panel of the width 0.6 (rho = 10.6) by 6e-9. The extinction adds exp(-sigma_t height e^w), entire in w; a panel over
-which it falls by many orders is the only hard one, and what is left beyond it is small.
+and everything in the integrand of the airlight has its singularities at |Im w| >= pi/2, whatever
+the phase function (`reference.quadrature.homogeneous` says why). With half a panel of the width 1.2
+the ellipse of regularity has rho = 1.31 + sqrt(1 + 1.31^2) = 2.96, so eight Gauss-Legendre nodes
+err by about rho^-16 = 3e-8, and four nodes on a panel of the width 0.6 (rho = 10.6) by 6e-9. The
+extinction adds exp(-sigma_t height e^w), entire in w; a panel over which it falls by many orders is
+the only hard one, and what is left beyond it is small.
 
-The path from a directional light is unbounded, so that only media with bounds attenuate it; between the kinks of its
-lengths (`reference.quadrature.segments`) the integrand is an exponential of a linear function, and eight nodes
-are exact to rounding over up to four optical depths.
+The path from a directional light is unbounded, so that only media with bounds attenuate it; between
+the kinks of its lengths (`reference.quadrature.segments`) the integrand is an exponential of a
+linear function, and eight nodes are exact to rounding over up to four optical depths.
 
-In height fog pieces end where the density has kinks too, and panels span four scale heights at most, two under a sun:
-over these the density changes smoothly. A light path out of the fog has the length 0 here, as in homogeneous fog; its
-optical depth is that of a column, which the fog knows.
+In height fog pieces end where the density has kinks too, and panels span four scale heights at
+most, two under a sun: over these the density changes smoothly. A light path out of the fog has the
+length 0 here, as in homogeneous fog; its optical depth is that of a column, which the fog knows.
 """
 
 from collections.abc import Sequence
@@ -43,15 +44,19 @@ from airlight.validation.arrays import Array, Bools, Index
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
 
 _NOTHING_LEFT = 40.0  # optical depth after which e^-40 = 4e-18 of the light is left
-_THINNEST = 1 / 30  # fraction of the scene's extinction down to which unbounded rays are long enough
+# fraction of the scene's extinction down to which unbounded rays are long enough
+_THINNEST = 1 / 30
 _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
-_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
+# height over distance below which a light beside a piece may as well be at this height
+_NEAR_ZERO = 1e-15
 _PANEL, _SHORT = 2.4, 0.6
 _DEEP, _SHALLOW = 4.0, 0.5  # the same in optical depths, at the scene's own extinction
 _SCALE_HEIGHTS = 4.0  # that a panel spans at most
-_HALVES = 8  # times that a stretch before a sun is halved towards its beginning: dense fog ends within the first
+# times that a stretch before a sun is halved towards its beginning: dense fog ends within the first
+_HALVES = 8
 _MOST = 64  # panels of a piece
-_OF_ONE, _OF_MANY = (8, 4), (4, 2)  # nodes on a panel and on a short one: of a light, of a sample of an area light
+# nodes on a panel and on a short one: of a light, of a sample of an area light
+_OF_ONE, _OF_MANY = (8, 4), (4, 2)
 
 
 @dataclass(frozen=True)
@@ -66,14 +71,16 @@ class Places:
     light: Array  #: length in each medium between light and place, (n, media) [m]
     medium: Index  #: number of the medium that scatters there; of surfaces nothing, (0,)
     cosine: Array  #: of the scattering angle; of surfaces nothing, (0,)
-    #: For a node, the length of ray that it stands for times the profile of the light, (n, 1) [m]; for a surface, the
-    #: radiance to the camera without attenuation, (n, 3) [W/(m^2 sr)].
+    #: For a node, the length of ray that it stands for times the profile of the light, (n, 1) [m];
+    #: for a surface, the radiance to the camera without attenuation, (n, 3) [W/(m^2 sr)].
     value: Array
 
     @staticmethod
     def joined(parts: "Sequence[Places]") -> "Places":
         """Join places of several lights, or of several samples of one."""
-        return Places(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Places)))
+        return Places(
+            *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Places))
+        )
 
     @property
     def is_surface(self) -> bool:
@@ -83,22 +90,42 @@ class Places:
 
 def no_places(media: int, *, surface: bool) -> Places:
     """Return an empty record, for lights that reach nothing."""
-    none, empty, vectors, lengths = np.empty(0, np.int64), np.empty(0), np.empty((0, 3)), np.empty((0, media))
-    return Places(none, empty, empty, vectors, lengths, lengths, none, empty, np.empty((0, 3 if surface else 1)))
+    none, empty, vectors, lengths = (
+        np.empty(0, np.int64),
+        np.empty(0),
+        np.empty((0, 3)),
+        np.empty((0, media)),
+    )
+    return Places(
+        none,
+        empty,
+        empty,
+        vectors,
+        lengths,
+        lengths,
+        none,
+        empty,
+        np.empty((0, 3 if surface else 1)),
+    )
 
 
 def point_nodes(
-    reference: ReferenceScene, light: ReferenceLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    reference: ReferenceScene,
+    light: ReferenceLight,
+    reach: LitRays,
+    ends: tuple[Array, Array] | None = None,
 ) -> Places:
     """Return the nodes of a point or spot light, or of a sample of an area light.
 
-    `reach`: which parts of the rays it reaches; `ends`: distances between which rays have nodes, (rays,) each [m]; all
-    by default.
+    `reach`: which parts of the rays it reaches; `ends`: distances between which rays have nodes,
+    (rays,) each [m]; all by default.
     """
     rays = reach.rays
     stretches = _within(lit_stretches(light, rays, reach.lit), ends)
     if reference.media:
-        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), stretches)
+        pieces, _ = smooth_pieces(
+            reference, rays, camera_segments(reference, reach.distance), stretches
+        )
     else:
         pieces = _unbounded(reference, stretches, light.position)
     # The reference counts media with bounds from 0 and calls what surrounds them -1.
@@ -109,10 +136,17 @@ def point_nodes(
     start = np.arcsinh(s0 / height)
     width = np.arcsinh(s1 / height) - start
     if isinstance(reference.medium, HeightMedium):
-        piece, start, width = equal_panels(np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1))
+        piece, start, width = equal_panels(
+            np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1)
+        )
         low, high = (foot[piece] + height[piece] * np.sinh(w) for w in (start, start + width))
-        span = _scale_heights(reference.medium, *_heights(reference, ray[piece], low, high)) / _SCALE_HEIGHTS
-        number, start, width = equal_panels(np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST))
+        span = (
+            _scale_heights(reference.medium, *_heights(reference, ray[piece], low, high))
+            / _SCALE_HEIGHTS
+        )
+        number, start, width = equal_panels(
+            np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST)
+        )
         piece = piece[number]
         ray, foot, height, medium = ray[piece], foot[piece], height[piece], medium[piece]
     orders = _OF_MANY if light.cosine else _OF_ONE
@@ -124,12 +158,20 @@ def point_nodes(
     along = profile_of(light, rays)
     profile = 1.0 if along is None else along(x[:, None], ray)[:, 0]
     towards = sine[:, None] * direction + (1 / np.cosh(w))[:, None] * normal
-    camera, segment = lengths(reference, reference.origin, direction, x), lengths(reference, light.position, towards, r)
-    return Places(ray, x, r, towards, camera, segment, medium[owner], -sine, (weight * r * profile)[:, None])
+    camera, segment = (
+        lengths(reference, reference.origin, direction, x),
+        lengths(reference, light.position, towards, r),
+    )
+    return Places(
+        ray, x, r, towards, camera, segment, medium[owner], -sine, (weight * r * profile)[:, None]
+    )
 
 
 def parallel_nodes(
-    reference: ReferenceScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    reference: ReferenceScene,
+    light: DirectionalLight,
+    reach: LitRays,
+    ends: tuple[Array, Array] | None = None,
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
@@ -137,7 +179,9 @@ def parallel_nodes(
     if isinstance(reference.medium, HeightMedium):
         pieces, depth = _before_sun(reference, light, stretches)
     else:
-        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), stretches)
+        pieces, _ = smooth_pieces(
+            reference, rays, camera_segments(reference, reach.distance), stretches
+        )
         depth = (pieces.x1 - pieces.x0) * by_medium(reference, "sigma_t", pieces.medium).max(axis=1)
     width, depth = pieces.x1 - pieces.x0, np.maximum(depth, 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
@@ -147,16 +191,22 @@ def parallel_nodes(
     segment = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), unbounded)
     camera, medium = lengths(reference, reference.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
-    return Places(ray, x, np.ones_like(x), 0 * direction, camera, segment, medium, rays.foot[ray], value)
+    return Places(
+        ray, x, np.ones_like(x), 0 * direction, camera, segment, medium, rays.foot[ray], value
+    )
 
 
 def surface_points(
-    reference: ReferenceScene, light: ReferenceLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
+    reference: ReferenceScene,
+    light: ReferenceLight | DirectionalLight,
+    distance: Array,
+    reflected: Array,
+    lit: Bools,
 ) -> Places:
     """Return the visible surface points that a light reaches: L = f(w_i, w_o) cos I profile / r^2.
 
-    `distance`: of the surfaces along the rays, (rays,) [m]; `reflected`: f cos, (rays, 3) [1/sr]; `lit`: which of them
-    the light reaches, (rays,).
+    `distance`: of the surfaces along the rays, (rays,) [m]; `reflected`: f cos, (rays, 3) [1/sr];
+    `lit`: which of them the light reaches, (rays,).
     """
     ray = np.flatnonzero(lit & np.any(reflected > 0, axis=1))
     direction, x = reference.direction[ray], distance[ray]
@@ -176,12 +226,18 @@ def surface_points(
 
 
 def panel_nodes(
-    start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT, orders: tuple[int, int] = _OF_ONE
+    start: Array,
+    width: Array,
+    *,
+    most: float = _PANEL,
+    short: float = _SHORT,
+    orders: tuple[int, int] = _OF_ONE,
 ) -> tuple[Index, Array, Array]:
     """Return Gauss-Legendre nodes on intervals.
 
-    `start`, `width`: of the intervals, (n,), in any variable; `most`, `short`: widest panel, and the widest interval
-    that few nodes serve; `orders`: how many nodes a panel has, and how many are few.
+    `start`, `width`: of the intervals, (n,), in any variable; `most`, `short`: widest panel, and
+    the widest interval that few nodes serve; `orders`: how many nodes a panel has, and how many are
+    few.
 
     Returns
     -------
@@ -203,10 +259,11 @@ def panel_nodes(
 
 
 def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
-    """Return how much of straight lines lies in each medium, that without bounds first, (n, media) [m].
+    """Return how much of straight lines lies in each medium, that without
+    bounds first, (n, media) [m].
 
-    `origin`, `direction`: of the lines, (3,) or (n, 3) [m], and (n, 3); `reach`: how long they are, (n,) [m]; infinite
-    where nothing surrounds the media, whose length is then given as 0.
+    `origin`, `direction`: of the lines, (3,) or (n, 3) [m], and (n, 3); `reach`: how long they are,
+    (n,) [m]; infinite where nothing surrounds the media, whose length is then given as 0.
     """
     inside = []
     for medium in reference.media:
@@ -226,7 +283,8 @@ def _within(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches
 
 
 def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) -> Pieces:
-    """Return lit stretches in a medium without bounds, cut at the heights at which the density of height fog has kinks.
+    """Return lit stretches in a medium without bounds, cut at the heights at which the density
+    of height fog has kinks.
 
     `place`: an unbounded ray is followed from its foot point from there until little light is left.
     """
@@ -236,7 +294,11 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
         sigma_t = medium.sigma_t
     else:
         fog, up = fog_of(medium), medium.up
-        heights: list[Any] = [place @ up, reference.origin @ up, *(layer.base for layer in fog.layers)]
+        heights: list[Any] = [
+            place @ up,
+            reference.origin @ up,
+            *(layer.base for layer in fog.layers),
+        ]
         sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])
         with np.errstate(divide="ignore", invalid="ignore"):
             x = (np.array(fog.kinks)[:, None] - reference.origin @ up) / (direction @ up)
@@ -263,8 +325,12 @@ def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
     return np.asarray(np.abs(high - low) / least)
 
 
-def _before_sun(reference: ReferenceScene, light: DirectionalLight, stretches: Stretches) -> tuple[Pieces, Array]:
-    """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
+def _before_sun(
+    reference: ReferenceScene, light: DirectionalLight, stretches: Stretches
+) -> tuple[Pieces, Array]:
+    """Return pieces of lit stretches in height fog, and how long each is in
+    optical depths and in height.
+    """
     medium = reference.medium
     assert isinstance(medium, HeightMedium)
     fog, mu = fog_of(medium), float(-light.direction @ medium.up)
@@ -278,13 +344,19 @@ def _before_sun(reference: ReferenceScene, light: DirectionalLight, stretches: S
     low, high = _heights(reference, pieces.ray, pieces.x0, pieces.x1)
     steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
-    return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
+    return pieces, np.minimum(
+        np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP
+    )
 
 
 def _profile(light: ReferenceLight, direction: Array) -> Array:
-    """Return the profile of a light in directions away from it, (n,): on a ray along each, straight ahead."""
+    """Return the profile of a light in directions away from it, (n,): on a ray
+    along each, straight ahead.
+    """
     if light.axis is None:
         return np.ones(len(direction))
     inside = np.arccos(np.clip(direction @ light.axis, -1.0, 1.0)) <= light.cutoff
     straight = np.full((len(direction), 1), 0.5 * np.pi)
-    return inside * falloff(straight, rays_at(light.position, direction, light.position), light)[:, 0]
+    return (
+        inside * falloff(straight, rays_at(light.position, direction, light.position), light)[:, 0]
+    )

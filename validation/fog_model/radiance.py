@@ -5,15 +5,16 @@ With the lengths c_k to the camera and l_k to the light in the medium k, a node 
 
     albedo_m sigma_m I p_m(cos) / (4 pi)  weight / r^2  exp(-sum_k sigma_k (a c_k + b l_k)),
 
-a and b the fractions of the extinction that attenuate either segment, 1 if correct. A surface point adds its radiance
-times the same exponential. Visibility is fixed. Where a light is moved by d from where the paths begin, a node at r v
-from it (v of unit length, w along the ray) has
+a and b the fractions of the extinction that attenuate either segment, 1 if correct. A surface point
+adds its radiance times the same exponential. Visibility is fixed. Where a light is moved by d from
+where the paths begin, a node at r v from it (v of unit length, w along the ray) has
 
     r' = |r v - d|,    cos = -(r v - d) . w / r',
 
-and the lengths of its segment change as r'/r, which is right where the medium has no bounds. In height fog a path
-counts by its length times the mean density between its ends (`analytic.height_fog`), and one to a directional light by
-the column above over the cosine of the light's height; the extinction is then a factor on that density.
+and the lengths of its segment change as r'/r, which is right where the medium has no bounds. In
+height fog a path counts by its length times the mean density between its ends
+(`analytic.height_fog`), and one to a directional light by the column above over the cosine of the
+light's height; the extinction is then a factor on that density.
 """
 
 from collections.abc import Callable
@@ -33,7 +34,8 @@ from airlight.validation.fog_model.view import Ends, LightPaths, View
 
 Colour = tuple[float, float, float]
 Path = tuple[str | int, ...]  #: of a number in a fog: fields, and places in tuples
-PhaseLaw = Callable[[Array], Array]  #: of the cosine of the scattering angle, of mean 1 over the sphere
+#: of the cosine of the scattering angle, of mean 1 over the sphere
+PhaseLaw = Callable[[Array], Array]
 
 _LARGEST = 1e100  # whose square is a number too
 
@@ -49,33 +51,42 @@ def _put(whole: Any, path: Path, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Fog:
-    """Media, lights and laws. Tuples have an entry for each medium, that without bounds first, or for each light."""
+    """Media, lights and laws. Tuples have an entry for each medium, that without bounds
+    first, or for each light.
+    """
 
     sigma_t: tuple[Colour, ...]  #: extinction [1/m]; of height fog a factor on its density
     albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
-    phase: tuple[float | PhaseLaw | None, ...]  #: g of Henyey and Greenstein's function, or a law; None: the scene's
+    #: g of Henyey and Greenstein's function, or a law; None: the scene's
+    phase: tuple[float | PhaseLaw | None, ...]
     intensity: tuple[float, ...]  #: factors on the lights [1]
     airlight: tuple[float, ...]  #: factors on what the media scatter of each light [1]
     surface: tuple[float, ...]  #: factors on what surfaces reflect of each light [1]
     moved: tuple[Colour, ...]  #: how far the lights are from where the paths begin, x, y, z [m]
     exposure: Colour = (1.0, 1.0, 1.0)  #: factor on the image [1]
-    #: Fractions of the extinction that attenuate the way to the camera, and the way from the light: of what the medium
-    #: scatters, and of what surfaces reflect [1].
+    #: Fractions of the extinction that attenuate the way to the camera, and the way from the light:
+    #: of what the medium scatters, and of what surfaces reflect [1].
     camera_segment: tuple[float, float] = (1.0, 1.0)
     light_segment: tuple[float, float] = (1.0, 1.0)
-    near: float = 0.0  #: the medium without bounds is missing before this plane, along the camera's axis [m]
+    #: the medium without bounds is missing before this plane, along the camera's axis [m]
+    near: float = 0.0
     far: float = np.inf  #: it ends at this plane, or at this distance [m]
     spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
-    #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in what attenuates them,
-    #: 'steps' in the length of ray that a node stands for, 'ends' where rays end.
+    #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in
+    #: what attenuates them, 'steps' in the length of ray that a node stands for, 'ends' where rays
+    #: end.
     planar: frozenset[str] = frozenset()
     distance_power: float = 2.0  #: the irradiance falls as the distance to this power [1]
-    window: Callable[[Array], Array] | None = None  #: factor on the light by the distance from it [m]
-    height: HeightFog | None = None  #: how the density of the medium without bounds depends on height
+    #: factor on the light by the distance from it [m]
+    window: Callable[[Array], Array] | None = None
+    #: how the density of the medium without bounds depends on height
+    height: HeightFog | None = None
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
     def put(self, path: Path, value: Any) -> "Fog":
-        """Return the fog with another number, given by fields and by places in tuples, such as ('moved', 0, 2)."""
+        """Return the fog with another number, given by fields and by places in tuples,
+        such as ('moved', 0, 2).
+        """
         fog: Fog = _put(self, path, value)
         return fog
 
@@ -102,12 +113,21 @@ class Fog:
 def scene_fog(reference: ReferenceScene) -> Fog:
     """Return the fog as the scene has it."""
     media, medium = (reference.medium, *reference.media), reference.medium
-    height, up = (fog_of(medium), colour(medium.up)) if isinstance(medium, HeightMedium) else (None, (0.0, 0.0, 1.0))
+    height, up = (
+        (fog_of(medium), colour(medium.up))
+        if isinstance(medium, HeightMedium)
+        else (None, (0.0, 0.0, 1.0))
+    )
     one = (1.0,) * (len(reference.lights) + len(reference.directional) + len(reference.area))
     return Fog(
-        sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
+        sigma_t=tuple(colour(each.sigma_t) for each in media)
+        if height is None
+        else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
-        phase=tuple(medium.phase.g if isinstance(medium.phase, HenyeyGreenstein) else None for medium in media),
+        phase=tuple(
+            medium.phase.g if isinstance(medium.phase, HenyeyGreenstein) else None
+            for medium in media
+        ),
         intensity=one,
         airlight=one,
         surface=one,
@@ -146,7 +166,9 @@ class FogModel:
         return fog.combined(self.by_light(fog.without_factors))
 
     def by_light(self, fog: Fog) -> Array:
-        """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)]; no number is out of range."""
+        """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)];
+        no number is out of range.
+        """
         view = self.view
         radiance = np.zeros((2, len(self.lights), len(view.pixels), 3))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -168,7 +190,9 @@ class FogModel:
         some = np.any(np.array(fog.sigma_t) > 0, axis=1)
         depth = length[:, some] @ np.array(fog.sigma_t)[some]
         count = np.bincount(view.ray_pixel)
-        return np.stack([np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1)
+        return np.stack(
+            [np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1
+        )
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:
         """Return the light from the places to each pixel, for intensity 1, (m, 3)."""
@@ -176,7 +200,12 @@ class FogModel:
         layer = int(places.is_surface)
         direction, pixel = view.reference.direction[places.ray], view.ray_pixel[places.ray]
         slant = 1 / (direction @ view.axis)
-        r, cosine, light, away = places.r, places.cosine, places.light, places.towards * places.r[:, None]
+        r, cosine, light, away = (
+            places.r,
+            places.cosine,
+            places.light,
+            places.towards * places.r[:, None],
+        )
         if any(fog.moved[number]):
             away = away - np.array(fog.moved[number])
             r = np.linalg.norm(away, axis=1)
@@ -186,16 +215,30 @@ class FogModel:
         if places.is_surface:
             strength = strength * places.r**2
         else:
-            strength = strength * places.value[:, 0] / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
+            strength = (
+                strength
+                * places.value[:, 0]
+                / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
+            )
         flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
-        camera = _between_ends(places.camera / slant[:, None] if flat else places.camera, fog, slant)
+        camera = _between_ends(
+            places.camera / slant[:, None] if flat else places.camera, fog, slant
+        )
         log_density = np.zeros(len(places.r))
         if fog.height is not None:
             camera, light, log_density = self._by_height(places, fog, number, camera, light, away)
-        total, sigma_t, count = np.zeros((len(view.pixels), 3)), np.array(fog.sigma_t), len(view.pixels)
+        total, sigma_t, count = (
+            np.zeros((len(view.pixels), 3)),
+            np.array(fog.sigma_t),
+            len(view.pixels),
+        )
         for channels in _alike(fog):
-            depth = (fog.camera_segment[layer] * camera + fog.light_segment[layer] * light) @ sigma_t[:, channels[0]]
-            left = strength * np.exp(np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf))
+            depth = (
+                fog.camera_segment[layer] * camera + fog.light_segment[layer] * light
+            ) @ sigma_t[:, channels[0]]
+            left = strength * np.exp(
+                np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf)
+            )
             if places.is_surface:
                 for channel in channels:
                     total[:, channel] = np.bincount(pixel, left * places.value[:, channel], count)
@@ -205,13 +248,16 @@ class FogModel:
                 scattered = left[here] * self._phase(places, number, medium, fog, cosine)[here]
                 summed = np.bincount(pixel[here], scattered, count)
                 for channel in channels:
-                    total[:, channel] += fog.albedo[medium][channel] * sigma_t[medium, channel] * summed
+                    total[:, channel] += (
+                        fog.albedo[medium][channel] * sigma_t[medium, channel] * summed
+                    )
         return total
 
     def _by_height(
         self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
     ) -> tuple[Array, Array, Array]:
-        """Return lengths that in a density of 1 have the depths of height fog, and the logarithm of its density.
+        """Return lengths that in a density of 1 have the depths of height fog, and the
+        logarithm of its density.
 
         `away` is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
         """
@@ -222,7 +268,9 @@ class FogModel:
         camera, light, sun = camera.copy(), light.copy(), number - len(reference.lights)
         camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
         if 0 <= sun < len(reference.directional):
-            light[:, AROUND] = density.column(z) / max(float(-reference.directional[sun].direction @ fog.up), 1e-300)
+            light[:, AROUND] = density.column(z) / max(
+                float(-reference.directional[sun].direction @ fog.up), 1e-300
+            )
         else:
             light[:, AROUND] = density.optical_depth(z - away @ fog.up, z, light[:, AROUND])
         return camera, light, np.zeros_like(z) if places.is_surface else density.log_density(z)
@@ -233,21 +281,27 @@ class FogModel:
             return henyey_greenstein(law)(cosine)
         if law is not None:
             return law(cosine)
-        key = number, medium  # the scene's own does not change, not even where a light moves a little
+        # the scene's own does not change, not even where a light moves a little
+        key = number, medium
         if key not in self._phases:
             reference = self.view.reference
             own = (reference.medium, *reference.media)[medium].phase
-            self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
+            self._phases[key] = (
+                np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
+            )
         return self._phases[key]
 
 
 def _between_ends(length: Array, fog: Fog, slant: Array) -> Array:
-    """Return a copy of lengths from the camera in each medium, (n, media), where one begins and ends as the fog says.
+    """Return a copy of lengths from the camera in each medium, (n, media), where one begins
+    and ends as the fog says.
 
     `slant`: lengths of rays over their depth along the camera's axis, (n,).
     """
     ends, length = (1.0 if fog.spherical else slant), length.copy()
-    length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * ends) - fog.near * ends, 0.0)
+    length[:, AROUND] = np.maximum(
+        np.minimum(length[:, AROUND], fog.far * ends) - fog.near * ends, 0.0
+    )
     return length
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rays of some pixels, their lit intervals, and from both all single-scattering paths of a scene.
+"""The rays of some pixels, their lit intervals, and from both all
+single-scattering paths of a scene.
 
-The lit intervals depend on the place of a light and the width of its cone, not on its fall-off, the fog or the values:
-a view finds them once.
+The lit intervals depend on the place of a light and the width of its cone, not on its fall-off, the
+fog or the values: a view finds them once.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,11 +29,18 @@ from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.distances import exact_distance
 from airlight.reference.visibility.lit_intervals import before_light, obstacles
 from airlight.validation.arrays import Array, Bools, Index
-from airlight.validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
+from airlight.validation.fog_model.places import (
+    Places,
+    lengths,
+    no_places,
+    parallel_nodes,
+    point_nodes,
+    surface_points,
+)
 
 Light = ReferenceLight | DirectionalLight
-#: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around it; 'depth': the
-#: depth of the surface taken for the distance along the ray.
+#: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around
+#: it; 'depth': the depth of the surface taken for the distance along the ray.
 Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
@@ -42,17 +50,22 @@ _BEFORE = 1 - 1e-4  # fraction of the way to a light that a shadow ray goes
 
 @dataclass(frozen=True)
 class Scenery:
-    """The properties of a scene that decide the paths of light, besides its own; each combination has its own paths."""
+    """The properties of a scene that decide the paths of light, besides its own; each
+    combination has its own paths.
+    """
 
     shadows: bool = True
     unshadowed: tuple[int, ...] = ()  #: numbers of lights of which nothing casts a shadow
     offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
     zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
-    moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)  #: of the first point and spot lights [m]
+    #: of the first point and spot lights [m]
+    moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     cone: float = 1.0  #: factor on the angles of spots
-    edge: str = ""  #: of spots: 'hard', 'smooth' from the axis on, or one of `EDGES`; the scene's own
+    #: of spots: 'hard', 'smooth' from the axis on, or one of `EDGES`; the scene's own
+    edge: str = ""
     radius: float = 0.0  #: of spheres in the place of point lights [m]
-    blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
+    #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
+    blend: float = 0.0
 
     def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
         """Return the point and spot lights of a scene as this scenery has them."""
@@ -61,7 +74,9 @@ class Scenery:
             if number < len(self.moved):
                 light = replace(light, position=light.position + np.array(self.moved[number]))
             if light.axis is not None and self.cone != 1:
-                cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
+                cutoff, beam = (
+                    min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam)
+                )
                 light = replace(light, cutoff=cutoff, beam=beam)
             if light.axis is not None and self.edge in ("hard", "smooth"):
                 light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
@@ -71,7 +86,8 @@ class Scenery:
 
 SCENERY = Scenery()  #: as the scene has it
 
-#: How spots fall off, by the fraction of the way from the cosine of the cut-off to that of the beam's edge.
+#: How spots fall off, by the fraction of the way from the cosine of the cut-off to
+#: that of the beam's edge.
 EDGES: Mapping[str, Callable[[Array], Array]] = {
     "linear": lambda part: part,
     "square": lambda part: part**2,
@@ -91,7 +107,8 @@ class View:
     interaction: Any  #: Mitsuba's, at the surfaces
     shapes: Any  #: the shapes that shadow
     length: Array  #: of the rays up to the surfaces in each medium, (rays, media) [m]
-    steps: int = 0  #: shadow rays that find the lit parts of a ray, an end to half a step; 0: they are exact
+    #: shadow rays that find the lit parts of a ray, an end to half a step; 0: they are exact
+    steps: int = 0
     _found: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def ends(self, ends: Ends) -> tuple[Array, Array]:
@@ -101,11 +118,15 @@ class View:
         if word == "depth":
             return np.zeros_like(self.distance), self.distance * cosine
         slant = 1.0 if word == "spheres" else 1 / cosine
-        near_ends, far_ends = (np.broadcast_to(plane * slant, self.distance.shape) for plane in (near, far))
+        near_ends, far_ends = (
+            np.broadcast_to(plane * slant, self.distance.shape) for plane in (near, far)
+        )
         return near_ends, far_ends
 
     def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> Any:
-        """Return which parts of the rays a light reaches; the shape of an area light does not shadow its samples."""
+        """Return which parts of the rays a light reaches; the shape of an area light
+        does not shadow its samples.
+        """
 
         def found() -> Any:
             reference, shapes = self.reference, self.shapes
@@ -113,28 +134,39 @@ class View:
             if not shadows:
                 reference, shapes = replace(reference, occluders=empty), None
             elif area is not None:
-                reference, shapes = self._once(("before", area.name), lambda: before_light(reference, area))
+                reference, shapes = self._once(
+                    ("before", area.name), lambda: before_light(reference, area)
+                )
             if self.steps and shadows and not isinstance(light, DirectionalLight):
-                whole = lit_rays(replace(reference, occluders=empty), light, self.distance, checks=0)
+                whole = lit_rays(
+                    replace(reference, occluders=empty), light, self.distance, checks=0
+                )
                 return self._tested(whole, light, reference.occluders)
             # Intervals by geometry are what they are: random checks only say how far to trust them.
             known = None
-            if area is not None and not isinstance(light, DirectionalLight):  # shapes are searched once for all samples
+            # shapes are searched once for all samples
+            if area is not None and not isinstance(light, DirectionalLight):
                 ball = Ball(area.centre, area.radius)
                 known = self._once(
-                    ("near", area.name, shadows), lambda: obstacles(reference, ball, self.distance, shapes)
+                    ("near", area.name, shadows),
+                    lambda: obstacles(reference, ball, self.distance, shapes),
                 )
             return lit_rays(reference, light, self.distance, shapes=shapes, known=known, checks=0)
 
-        return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
+        return self._once(
+            ("reach", _place_of(light), shadows, None if area is None else area.name), found
+        )
 
     def _tested(self, reach: LitRays, light: ReferenceLight, occluders: Any) -> LitRays:
-        """Return the lit parts of rays by shadow rays from the middles of equal angles at the light."""
+        """Return the lit parts of rays by shadow rays from the middles of
+        equal angles at the light.
+        """
         rays, ray = reach.rays, reach.lit.ray
         if not len(ray):
             return reach
         low, high = (rays.theta(x, ray)[:, None] for x in (reach.lit.low, reach.lit.high))
-        steps = self.steps // 4 if light.cosine else self.steps  # many samples of a light smooth its shadows
+        # many samples of a light smooth its shadows
+        steps = self.steps // 4 if light.cosine else self.steps
         theta = low + (high - low) * np.arange(2 * steps + 1) / (2 * steps)
         x = rays.distance(theta, ray[:, None])
         x[:, 0], x[:, -1] = reach.lit.low, reach.lit.high
@@ -142,7 +174,9 @@ class View:
         way = (light.position - place).reshape(-1, 3)
         far = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(far, np.finfo(float).tiny)[:, None]
-        shadow_ray = mi.Ray3f(vectors(mi.Point3f, place.reshape(-1, 3)), vectors(mi.Vector3f, towards))
+        shadow_ray = mi.Ray3f(
+            vectors(mi.Point3f, place.reshape(-1, 3)), vectors(mi.Vector3f, towards)
+        )
         shadow_ray.maxt = on_device(mi.Float, _BEFORE * far)
         lit = ~np.array(occluders.ray_test(shadow_ray), dtype=bool).reshape(-1, steps)
         beside = np.pad(lit, ((0, 0), (1, 1)))
@@ -151,23 +185,33 @@ class View:
         return replace(reach, lit=LitIntervals(ray[row], x[row, 2 * first], x[row, 2 * last + 2]))
 
     def reflected(self, light: Light, *, shadows: bool) -> tuple[Array, Bools]:
-        """Return f cos at the surfaces towards a light, (rays, 3), and which of them it reaches, (rays,)."""
+        """Return f cos at the surfaces towards a light, (rays, 3), and which of
+        them it reaches, (rays,).
+        """
 
         def found() -> tuple[Array, Bools]:
             visible = np.isfinite(self.distance)
-            point = self.reference.origin + np.where(visible, self.distance, 0.0)[:, None] * self.reference.direction
+            point = (
+                self.reference.origin
+                + np.where(visible, self.distance, 0.0)[:, None] * self.reference.direction
+            )
             facing = self.interaction.is_valid()
             if isinstance(light, DirectionalLight):
                 towards = np.broadcast_to(-light.direction, point.shape)
                 shadow_ray = self.interaction.spawn_ray(vectors(mi.Vector3f, towards))
             else:
                 way = light.position - point
-                towards = way / np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
-                # An array, since a number would be a constant of a kernel, which each light would compile again.
+                towards = (
+                    way / np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
+                )
+                # An array, since a number would be a constant of a kernel, which each
+                # light would compile again.
                 place = np.broadcast_to(light.position, point.shape)
                 shadow_ray = self.interaction.spawn_ray_to(vectors(mi.Point3f, place))
             local = self.interaction.to_local(vectors(mi.Vector3f, towards))
-            reflected = as_rows(self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing))
+            reflected = as_rows(
+                self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing)
+            )
             lit = visible & np.any(reflected > 0, axis=1)
             if shadows:
                 lit &= ~np.array(self.reference.occluders.ray_test(shadow_ray, facing), dtype=bool)
@@ -185,7 +229,12 @@ def _place_of(light: Light) -> tuple[Any, ...]:
     """Return the properties that decide which parts of rays a light reaches."""
     if isinstance(light, DirectionalLight):
         return light.direction.tobytes(), None
-    return light.position.tobytes(), "near", None if light.axis is None else light.axis.tobytes(), light.cutoff
+    return (
+        light.position.tobytes(),
+        "near",
+        None if light.axis is None else light.axis.tobytes(),
+        light.cutoff,
+    )
 
 
 def view_of(
@@ -198,15 +247,17 @@ def view_of(
 ) -> View:
     """Return the rays of some pixels.
 
-    `pixels`: numbers of the pixels, row by row; all by default; `rays_per_side`: 0: one ray through the centre of each
-    pixel. n: n x n rays, one through the middle of each cell of a grid, whose mean is that over the pixel; `steps`: see
-    `View`.
+    `pixels`: numbers of the pixels, row by row; all by default; `rays_per_side`: 0: one ray through
+    the centre of each pixel. n: n x n rays, one through the middle of each cell of a grid, whose
+    mean is that over the pixel; `steps`: see `View`.
     """
     size = reference.width, reference.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
     positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
     positions = middle + scenery.zoom * (positions - middle) + np.asarray(scenery.offset)
-    rays = replace(reference, direction=film_directions(reference.scene.sensors()[0], positions, size))
+    rays = replace(
+        reference, direction=film_directions(reference.scene.sensors()[0], positions, size)
+    )
     shapes, hits = read_shapes(reference.occluders), surface_hits(rays)
     distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
     length = lengths(rays, reference.origin, rays.direction, distance)
@@ -222,7 +273,8 @@ def _positions(centres: Array, rays_per_side: int) -> Array:
         return centres
     row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
     cells = np.stack([column, row], axis=1)
-    # The middles: where the image is smooth, random places would err by its slope, these by its curvature.
+    # The middles: where the image is smooth, random places would err by its
+    # slope, these by its curvature.
     return (centres[:, None, :] - 0.5 + (cells + 0.5) / rays_per_side).reshape(-1, 2)
 
 
@@ -230,7 +282,8 @@ def _positions(centres: Array, rays_per_side: int) -> Array:
 class LightPaths:
     """All paths from one light of the scene."""
 
-    intensity: Array  #: radiant intensity, irradiance or radiance times area, (3,): what multiplies the nodes
+    #: radiant intensity, irradiance or radiance times area, (3,): what multiplies the nodes
+    intensity: Array
     nodes: Places
     surface: Places
 
@@ -245,18 +298,21 @@ def scattering_paths(
 ) -> tuple[LightPaths, ...]:
     """Return all paths of a view, by light.
 
-    `layers`: 0: airlight, 1: surfaces; `ends`: of a fog, between which rays have nodes; `samples`: how many stand for
-    an area light.
+    `layers`: 0: airlight, 1: surfaces; `ends`: of a fog, between which rays have nodes; `samples`:
+    how many stand for an area light.
     """
     reference = replace(view.reference, lights=scenery.lights(view.reference))
     between = None if ends is None else view.ends(ends)
-    # A directional light comes through a medium without bounds only where its density falls with height.
+    # A directional light comes through a medium without bounds only where its
+    # density falls with height.
     far = bool(reference.media) or isinstance(reference.medium, HeightMedium)
     edge = EDGES.get("smoothstep" if scenery.blend else scenery.edge)
     paths = []
     for number, source in enumerate(light_sources(reference, samples, scenery.radius)):
         shadows = scenery.shadows and number not in scenery.unshadowed
-        nodes, points = ([no_places(len(reference.media) + 1, surface=surface)] for surface in (False, True))
+        nodes, points = (
+            [no_places(len(reference.media) + 1, surface=surface)] for surface in (False, True)
+        )
         for given in source.lights:
             light = _whole_within(given, scenery.blend) if scenery.blend else given
             is_far = isinstance(light, DirectionalLight)
@@ -265,9 +321,13 @@ def scattering_paths(
                 make: Any = parallel_nodes if is_far else point_nodes
                 nodes.append(_edged(make(reference, light, reach, between), light, source, edge))
             if 1 in layers and reference.occluders.shapes():
-                lit = surface_points(reference, light, view.distance, *view.reflected(light, shadows=shadows))
+                lit = surface_points(
+                    reference, light, view.distance, *view.reflected(light, shadows=shadows)
+                )
                 points.append(_edged(lit, light, source, edge))
-        paths.append(LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(points)))
+        paths.append(
+            LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(points))
+        )
     return tuple(paths)
 
 
@@ -282,14 +342,19 @@ class Source:
     area: ReferenceAreaLight | None = None  #: that has this extent in the scene
 
 
-def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0) -> list[Source]:
+def light_sources(
+    reference: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0
+) -> list[Source]:
     """Return the lights of a scene: point and spot lights, directional ones, then area lights.
 
-    `samples`: how many stand for an area light; `radius`: of spheres that take the place of point lights [m].
+    `samples`: how many stand for an area light; `radius`: of spheres that take the
+    place of point lights [m].
     """
     emitters = reference.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
-    near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
+    near_names = [
+        emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)
+    ]
     plan = PointPlan(most=samples)
     near = [
         _as_sphere(name, light, PointPlan(most=max(samples, _SPHERE_SAMPLES)), radius)
@@ -298,7 +363,8 @@ def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: flo
         for name, light in zip(near_names, reference.lights, strict=True)
     ]
     far = [
-        Source(name, light.irradiance, (light,)) for name, light in zip(far_names, reference.directional, strict=True)
+        Source(name, light.irradiance, (light,))
+        for name, light in zip(far_names, reference.directional, strict=True)
     ]
     wide = [
         Source(
@@ -316,60 +382,90 @@ def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: flo
 def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float) -> Source:
     """Return a sphere of a point light's intensity.
 
-    Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it stands for the area
-    4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
+    Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it
+    stands for the area 4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that
+    of the light over N.
     """
-    wide = ReferenceAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
+    wide = ReferenceAreaLight(
+        "sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None
+    )
     samples = shared_samples(wide, square_points(plan, 0, 0, "sphere"))
     return Source(name, 4 * light.intensity / plan.most, samples, light.position)
 
 
-def _edged(places: Places, light: Light, source: Source, edge: Callable[[Array], Array] | None) -> Places:
-    """Return places with another edge of a spot, and as a sphere lights them that samples stand for."""
+def _edged(
+    places: Places, light: Light, source: Source, edge: Callable[[Array], Array] | None
+) -> Places:
+    """Return places with another edge of a spot, and as a sphere lights
+    them that samples stand for.
+    """
     factor = _over_own_edge(edge, places.towards, light) if edge else 1.0
     if source.centre is not None and isinstance(light, ReferenceLight):
         level = _level(places, light, source, source.centre)
-        factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)  # no sample sends to the others
-    return places if np.ndim(factor) == 0 else replace(places, value=places.value * np.asarray(factor)[:, None])
+        # no sample sends to the others
+        factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)
+    return (
+        places
+        if np.ndim(factor) == 0
+        else replace(places, value=places.value * np.asarray(factor)[:, None])
+    )
 
 
 def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array) -> Array:
-    """Return the light of all samples of a sphere at places, as a multiple of the sphere's light there, (n,).
+    """Return the light of all samples of a sphere at places, as a multiple of the
+    sphere's light there, (n,).
 
-    At the distance r from its centre a sphere of the radius R and the radiance L has the solid angle
-    2 pi (1 - sqrt(1 - (R/r)^2)), and an area that faces it the irradiance pi L (R/r)^2. N samples with the normals n_i
-    at the distances d_i along v_i stand for the area 4 pi R^2/N each, and give 4 pi R^2 L/N sum max(n_i.v_i, 0)/d_i^2,
-    each times the cosine to the way from the centre on such an area. Sixteen samples are 10 % off.
+    At the distance r from its centre a sphere of the radius R and the radiance L has the solid
+    angle 2 pi (1 - sqrt(1 - (R/r)^2)), and an area that faces it the irradiance pi L (R/r)^2. N
+    samples with the normals n_i at the distances d_i along v_i stand for the area 4 pi R^2/N each,
+    and give 4 pi R^2 L/N sum max(n_i.v_i, 0)/d_i^2, each times the cosine to the way from the
+    centre on such an area. Sixteen samples are 10 % off.
     """
     own = [each for each in sphere.lights if isinstance(each, ReferenceLight)]
     place = light.position - centre + places.r[:, None] * places.towards
     radius, r = float(np.linalg.norm(light.position - centre)), np.linalg.norm(place, axis=1)
     starts, normals = (
-        np.stack(rows) for rows in ([e.position - centre for e in own], [np.asarray(e.axis) for e in own])
+        np.stack(rows)
+        for rows in ([e.position - centre for e in own], [np.asarray(e.axis) for e in own])
     )
-    d = np.sqrt(np.maximum(r[:, None] ** 2 - 2 * place @ starts.T + radius**2, np.finfo(float).tiny))
+    d = np.sqrt(
+        np.maximum(r[:, None] ** 2 - 2 * place @ starts.T + radius**2, np.finfo(float).tiny)
+    )
     sent = np.maximum(place @ normals.T - (starts * normals).sum(axis=1), 0) / d**3
     if places.is_surface:
         whole = 1 / r**2
         sent *= (r[:, None] - (place / r[:, None]) @ starts.T) / d
     else:
         # The solid angle over pi R^2, written without a difference that far away is nothing.
-        whole = 2 / (np.maximum(r, radius) ** 2 * (1 + np.sqrt(1 - np.minimum(radius / r, 1.0) ** 2)))
+        whole = 2 / (
+            np.maximum(r, radius) ** 2 * (1 + np.sqrt(1 - np.minimum(radius / r, 1.0) ** 2))
+        )
     return np.asarray(4 * sent.mean(axis=1) / whole)
 
 
 def _whole_within(light: Light, blend: float) -> Light:
-    """Return a spot that ends its full intensity where that of Blender's `spot_blend` ends, a kink."""
+    """Return a spot that ends its full intensity where that of Blender's
+    `spot_blend` ends, a kink.
+    """
     if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
         return light
-    return replace(light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0))))
+    return replace(
+        light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0)))
+    )
 
 
 def _over_own_edge(edge: Callable[[Array], Array], towards: Array, light: Light) -> Array:
     """Return an edge over that of a spot with the same ends, which is linear in the angle, (n,)."""
-    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine or light.beam == light.cutoff:
+    if (
+        isinstance(light, DirectionalLight)
+        or light.axis is None
+        or light.cosine
+        or light.beam == light.cutoff
+    ):
         return np.ones(len(towards))
     cosine = np.clip(towards @ light.axis, -1.0, 1.0)
-    part = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)
+    part = np.clip(
+        (cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0
+    )
     linear = np.clip((light.cutoff - np.arccos(cosine)) / (light.cutoff - light.beam), 0.0, 1.0)
     return np.divide(edge(part), linear, out=np.zeros(len(cosine)), where=linear > 0)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The cost and error of kernels: nanoseconds a ray with the error, all kernels and sizes in one run.
+"""The cost and error of kernels: nanoseconds a ray with the error, all
+kernels and sizes in one run.
 
-Times are of frozen functions after warm-up, on rays that lie ready on the device: from Dr.Jit's kernel history (the
-kernel alone) and from the wall clock (launch and replay included). The kernels of one phase function take turns. Errors
-are of float32 on the set W of `validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
+Times are of frozen functions after warm-up, on rays that lie ready on the device: from Dr.Jit's
+kernel history (the kernel alone) and from the wall clock (launch and replay included). The kernels
+of one phase function take turns. Errors are of float32 on the set W of
+`validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,7 +39,8 @@ from airlight.validation.study.configuration import find_kernel, sized, split_na
 RAYS = 480_000  # 800 x 600
 ERROR_RAYS = 6000
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-#: Phase functions with their g, the first with all sizes of all kernels, the others with the default sizes.
+#: Phase functions with their g, the first with all sizes of all kernels, the
+#: others with the default sizes.
 PHASES = (("isotropic", 0.0), ("rayleigh", 0.0), ("hazy", 0.0), ("murky", 0.0), ("hg", 0.8))
 #: Sizes to try, by the name of the parameter.
 SIZES: dict[str, tuple[int, ...]] = {
@@ -56,22 +59,28 @@ def bench_kernels(
     phases: Sequence[tuple[str, float]] = PHASES,
     progress: Counted | None = None,
 ) -> list[KernelCost]:
-    """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
+    """Measure kernels, all of the registry by default: 'name' stands for all its
+    sizes, 'name-N' for one.
 
-    The first of the phase functions, given with their g, is measured with all sizes, the others with the default sizes.
+    The first of the phase functions, given with their g, is measured with all sizes, the
+    others with the default sizes.
     """
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)
     costs: list[KernelCost] = []
     for number, (phase, g) in enumerate(phases):
-        reference, rays = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, reference=False)
+        reference, rays = (
+            wide_rays(ERROR_RAYS, phase, g),
+            wide_rays(RAYS, phase, g, reference=False),
+        )
         tried: list[Tried] = []
         for done, (family, default, sizes) in enumerate(ladders):
             if progress is not None:
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
             for size in sizes if number == 0 else (default,):
                 each = try_kernel(family, size, reference=reference, rays=rays)
-                if each.work is not None or size == default:  # a size that the kernel does not have is left out
+                # a size that the kernel does not have is left out
+                if each.work is not None or size == default:
                     tried.append(each)
         costs += timed_in_turns(tried)
     return costs
@@ -86,11 +95,17 @@ class Tried:
 
 
 def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) -> Tried:
-    """Return the kernel 'family-size' with its error on rays with known J, and its work on others, of one phase."""
+    """Return the kernel 'family-size' with its error on rays with known J, and its work
+    on others, of one phase.
+    """
     name, phase, g = sized(family, size), reference.phase[0], float(reference.g[0])
     kernel, count = find_kernel(name), len(rays.x0)
     cost = KernelCost(kernel=name, family=family, size=size, phase=phase, g=g)
-    if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
+    if (
+        size is not None
+        and family in KERNELS
+        and next(iter(KERNELS[family].parameters), None) == "steps"
+    ):
         count //= max(1, size // _MOST_STEPS)
     try:
         J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
@@ -98,31 +113,47 @@ def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) 
     except InputError as reason:
         return Tried(replace(cost, refused=str(reason)))
     error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
-    cost = replace(cost, median=error.median, p99=error.p99, max=error.max, nonfinite=error.nan + error.infinite)
+    cost = replace(
+        cost,
+        median=error.median,
+        p99=error.p99,
+        max=error.max,
+        nonfinite=error.nan + error.infinite,
+    )
     return Tried(replace(cost, rays=count), work)
 
 
 def timed_in_turns(tried: Sequence[Tried], seconds: float = 0.3) -> list[KernelCost]:
-    """Return the costs of kernels with their times: of the wall clock, and of the device where it tells them."""
+    """Return the costs of kernels with their times: of the wall clock, and of the
+    device where it tells them.
+    """
     works = [each.work for each in tried if each.work is not None]
     for work in [*works, *works]:  # records, and replays once
         timed(work)
     pieces = [Piece(partial(_wall_and_device, work), seconds) for work in works]
     spent = iter(list(chain(*rounds)) for rounds in in_turns(pieces))
-    return [each.cost if each.work is None else _with_times(each.cost, next(spent)) for each in tried]
+    return [
+        each.cost if each.work is None else _with_times(each.cost, next(spent)) for each in tried
+    ]
 
 
 def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:
-    """Return the cheapest kernel, and its cost [ns a ray], for each phase function, statistic and error level.
+    """Return the cheapest kernel, and its cost [ns a ray], for each phase function,
+    statistic and error level.
 
-    A kernel reaches a level if its error stays at or below it; one that gave values that are not finite reaches none.
+    A kernel reaches a level if its error stays at or below it; one that gave values that are
+    not finite reaches none.
     """
     levels = []
-    for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
+    for phase, statistic, level in product(
+        dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS
+    ):
         good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
         best = min(good, key=_ns, default=None)
         cheapest, ns = (best.kernel, _ns(best)) if best else (None, None)
-        levels.append(ErrorLevel(phase=phase, statistic=statistic, level=level, cheapest=cheapest, ns=ns))
+        levels.append(
+            ErrorLevel(phase=phase, statistic=statistic, level=level, cheapest=cheapest, ns=ns)
+        )
     return levels
 
 
@@ -152,7 +183,9 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
 
 
 def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
-    """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
+    """Return work that evaluates a kernel on rays that lie on the device,
+    frozen after its first call.
+    """
     part = slice(0, rays)
     name = cases.phase[0]
     phase = named_phase(
@@ -160,7 +193,9 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
         g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
         values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,
     )
-    medium = Homogeneous((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
+    medium = Homogeneous(
+        (dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase
+    )
     light = Light(dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
     columns = (cases.foot, cases.height, cases.x0, cases.x1)
     foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)
@@ -180,12 +215,16 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
 
 
 def _wall_and_device(work: Callable[[], Any]) -> tuple[Spent, Spent]:
-    """Return what work takes by the wall clock, and what its compiled kernels alone do when it is done once more."""
+    """Return what work takes by the wall clock, and what its compiled kernels alone do
+    when it is done once more.
+    """
     wall = timed(work)[1]
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         timed(work)
-        ms = sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,)))
+        ms = sum(
+            entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,))
+        )
         dr.kernel_history_clear()
     return wall, Spent(1e-3 * ms)
 

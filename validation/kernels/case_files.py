@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of airlight integrals: one case a row, read from CSV or from arrays in memory, checked, and integrated.
+"""Tables of airlight integrals: one case a row, read from CSV or from arrays in memory,
+checked, and integrated.
 
 Two sets of columns are known, each in any order and beside others:
 
     tag, phase, g, foot, height, x0, x1, sigma_t, value                 the ray by foot and height, or t and h
     phase, g, ox, oy, oz, dx, dy, dz, lx, ly, lz, x0, x1, sigma_t, value      the ray by origin, direction and light
 
-`phase` is in the words of `analytic.phase.phase_from_words`, such as hg or mie:6. `tag`, `phase` (then isotropic), `g`
-(then 0) and `value` may be missing. An x1 of `inf` is a ray that never ends.
+`phase` is in the words of `analytic.phase.phase_from_words`, such as hg or mie:6. `tag`, `phase`
+(then isotropic), `g` (then 0) and `value` may be missing. An x1 of `inf` is a ray that never ends.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,9 @@ _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
 _FOOT = ("foot", "height")
 _SHORT = {"foot": "t", "height": "h"}  # as the certified file has them
 _VECTORS = {"origin": _RAY[:3], "direction": _RAY[3:6], "light": _RAY[6:]}
-_KNOWN = frozenset(("phase", "tag", "g", "x0", "x1", "sigma_t", "value", *_FOOT, *_SHORT.values(), *_RAY))
+_KNOWN = frozenset(
+    ("phase", "tag", "g", "x0", "x1", "sigma_t", "value", *_FOOT, *_SHORT.values(), *_RAY)
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class Cases:
     direction: Array | None  #: unit vectors, (n, 3), where the file gives rays
     light: Array | None  #: (n, 3) [m], where the file gives rays
     header: tuple[str, ...]  #: names of all columns of the file
-    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none of generated rays
+    #: the text of all columns, to write the table out again; none of generated rays
+    rows: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...] = ()  #: of the rows in their file; none from memory
 
     def place(self, row: int) -> str:
@@ -60,13 +64,16 @@ class Cases:
 def read_cases(path: str | Path) -> Cases:
     """Read a table of cases.
 
-    `path`: a CSV file with a header line; see the module's docstring for the columns. Raises InputError for a file that
-    cannot be read, a missing column, a word where a number belongs, a number out of its range or an unknown phase
-    function: the message names file, line (from 1, the header) and column.
+    `path`: a CSV file with a header line; see the module's docstring for the columns. Raises
+    InputError for a file that cannot be read, a missing column, a word where a number belongs, a
+    number out of its range or an unknown phase function: the message names file, line (from 1, the
+    header) and column.
     """
     (_, header), *lines = read_csv(Path(path)) or [(1, [])]
     if not lines:
-        raise InputError(f"{path} has {'a header only' if header else 'no lines'}; expected a header and cases")
+        raise InputError(
+            f"{path} has {'a header only' if header else 'no lines'}; expected a header and cases"
+        )
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
@@ -74,9 +81,9 @@ def read_cases(path: str | Path) -> Cases:
 def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
-    `columns`: by name the columns of this module, of any shapes that broadcast together; `origin`, `direction` and
-    `light`, (..., 3), may stand for the coordinates of rays. Raises InputError as `read_cases`, and for columns whose
-    shapes do not go together; messages count rows from 0.
+    `columns`: by name the columns of this module, of any shapes that broadcast together; `origin`,
+    `direction` and `light`, (..., 3), may stand for the coordinates of rays. Raises InputError as
+    `read_cases`, and for columns whose shapes do not go together; messages count rows from 0.
     """
     given: dict[str, Any] = {}
     for key, values in columns.items():
@@ -84,7 +91,9 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
         if key not in _VECTORS:
             given[key] = column
         elif column.ndim == 0 or column.shape[-1] != 3:
-            raise InputError(f"cases, column '{key}': got an array of shape {column.shape}, expected (..., 3)")
+            raise InputError(
+                f"cases, column '{key}': got an array of shape {column.shape}, expected (..., 3)"
+            )
         else:
             given |= {letter: column[..., number] for number, letter in enumerate(_VECTORS[key])}
     known = {key: values for key, values in given.items() if key in _KNOWN}
@@ -92,7 +101,9 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
         spread = np.broadcast_arrays(*known.values())
     except ValueError:
         shapes = ", ".join(f"{key} {values.shape}" for key, values in known.items())
-        raise InputError(f"cases: the columns have shapes that do not go together: {shapes}; give equal ones") from None
+        raise InputError(
+            f"cases: the columns have shapes that do not go together: {shapes}; give equal ones"
+        ) from None
     shape = spread[0].shape if spread else ()
     flat = {key: values.reshape(-1) for key, values in zip(known, spread)}
     if not all(len(values) for values in flat.values()):
@@ -105,15 +116,22 @@ def _checked(table: "_Table") -> Cases:
     header = tuple(table.columns)
     for name, short in _SHORT.items():
         if name in header and short in header:
-            raise InputError(f"{table.name}: the columns '{name}' and '{short}' are the same; leave one of them out")
+            raise InputError(
+                f"{table.name}: the columns '{name}' and '{short}' are the same; leave one of them "
+                "out"
+            )
     rays = table.named("foot") not in header and any(name in header for name in _RAY)
     table.require(*(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
-    columns = {name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))}
+    columns = {
+        name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))
+    }
     g = table.numbers("g") if "g" in header else np.zeros(table.count)
     words = table.cells("phase") if "phase" in header else ["isotropic"] * table.count
     phase = tuple(cell.strip().lower() for cell in words)
     for row, name in enumerate(phase):
-        reason = "'tabulated' has no place for its table here" if name == "tabulated" else _fault(name)
+        reason = (
+            "'tabulated' has no place for its table here" if name == "tabulated" else _fault(name)
+        )
         if reason:
             raise InputError(f"{table.where(row, 'phase')}: {reason}")
     table.check("g", np.abs(g) < 1, "a number between -1 and 1")
@@ -121,7 +139,9 @@ def _checked(table: "_Table") -> Cases:
     table.check("x1", columns["x1"] >= columns["x0"], "a number >= x0, or inf")
     origin = direction = light = None
     if rays:
-        origin, direction, light = (np.stack([columns[n] for n in _RAY[k : k + 3]], axis=1) for k in (0, 3, 6))
+        origin, direction, light = (
+            np.stack([columns[n] for n in _RAY[k : k + 3]], axis=1) for k in (0, 3, 6)
+        )
         length = np.sqrt(np.sum(direction**2, axis=1))
         table.check("dx", np.abs(length - 1) <= 1e-5, "a direction of length 1")
         foot, height = foot_and_height(origin, direction, light)
@@ -147,15 +167,25 @@ def _checked(table: "_Table") -> Cases:
     )
 
 
-def integrate_cases(cases: Cases, *, rtol: float = 1e-10, table: Sequence[float] | None = None) -> tuple[Array, Array]:
-    """Return J and its error estimate [1/m] for every case, (cases,), by `analytic.panels.airlight_segments`.
+def integrate_cases(
+    cases: Cases, *, rtol: float = 1e-10, table: Sequence[float] | None = None
+) -> tuple[Array, Array]:
+    """Return J and its error estimate [1/m] for every case, (cases,), by
+    `analytic.panels.airlight_segments`.
 
-    `rtol` is the relative error asked for [1], `table` has the values of the phase function 'tabulated'.
+    `rtol` is the relative error asked for [1], `table` has the values of the
+    phase function 'tabulated'.
     """
     value, error = np.empty(len(cases.phase)), np.empty(len(cases.phase))
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
-        columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
+        columns = (
+            cases.foot[rows],
+            cases.height[rows],
+            cases.x0[rows],
+            cases.x1[rows],
+            cases.sigma_t[rows],
+        )
         phase = phase_from_words(name, g=g, table=table)
         value[rows], error[rows] = airlight_segments(*columns, phase, rtol=rtol)
     return value, error
@@ -177,7 +207,8 @@ class _Table:
 
     name: str  #: path of the file, or what messages call the columns
     columns: Mapping[str, Any]  #: by name text or numbers, (rows,)
-    lines: tuple[int, ...] = ()  #: number of each row's line in the file; none for columns from memory
+    #: number of each row's line in the file; none for columns from memory
+    lines: tuple[int, ...] = ()
 
     @property
     def count(self) -> int:
@@ -196,7 +227,8 @@ class _Table:
         place = f"{self.name}, line 1" if self.lines else self.name
         rays = ", ".join(_RAY if self.lines else _VECTORS)
         raise InputError(
-            f"{place}: no column '{missing[0]}'; got {', '.join(self.columns) or 'none'}; expected x0, x1, sigma_t "
+            f"{place}: no column '{missing[0]}'; got {', '.join(self.columns) or 'none'}; expected "
+            "x0, x1, sigma_t "
             f"and either foot and height or {rays}"
         )
 
@@ -210,27 +242,36 @@ class _Table:
         return f"{self.name}, {place}, column '{self.named(name)}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
-        """Return the column `name` as numbers, (rows,), finite except for `x1` and where `infinite` allows it.
+        """Return the column `name` as numbers, (rows,), finite except for `x1` and
+        where `infinite` allows it.
 
         Raises InputError for a cell that is no number, or not finite, with its place.
         """
         try:
             values = np.array(self.columns[self.named(name)], dtype=np.float64)
         except (TypeError, ValueError):
-            row = next((row for row, cell in enumerate(self.cells(name)) if not _is_number(cell)), 0)
-            raise InputError(f"{self.where(row, name)}: '{self.cells(name)[row]}' is not a number; write one") from None
+            row = next(
+                (row for row, cell in enumerate(self.cells(name)) if not _is_number(cell)), 0
+            )
+            raise InputError(
+                f"{self.where(row, name)}: '{self.cells(name)[row]}' is not a number; write one"
+            ) from None
         fine = ~np.isnan(values) if infinite or name == "x1" else np.isfinite(values)
         self.check(name, fine, "a finite number")
         return values
 
     def check(self, name: str, fine: Bools, wanted: str) -> None:
-        """Refuse the column `name` where a row is not `fine`, (rows,); `wanted` says what it should be.
+        """Refuse the column `name` where a row is not `fine`, (rows,);
+        `wanted` says what it should be.
 
         Raises InputError with the first such cell.
         """
         if not fine.all():
             row = int(np.argmin(fine))
-            raise InputError(f"{self.where(row, name)}: {self.cells(name)[row]} is out of range; expected {wanted}")
+            raise InputError(
+                f"{self.where(row, name)}: {self.cells(name)[row]} is out of range; expected "
+                f"{wanted}"
+            )
 
 
 def _is_number(cell: str) -> bool:

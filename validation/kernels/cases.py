@@ -27,7 +27,8 @@ Kernel = Callable[..., Any]
 
 #: Largest number of a case in a precision: its square must be one too [m, 1/m].
 LARGEST = {"single": 1e18, "double": 1e150}
-#: The phase function of cases called 'tabulated': float32 numbers whose mean over the sphere is exactly 1.
+#: The phase function of cases called 'tabulated': float32 numbers whose mean over
+#: the sphere is exactly 1.
 TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
 
 #: Below these a precision has no normal numbers: such values are compared in absolute terms.
@@ -35,7 +36,9 @@ TINY = {"single": 1e-37, "double": 1e-300}
 
 
 def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Array:
-    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does; what the kernel refuses is raised."""
+    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does; what the
+    kernel refuses is raised.
+    """
     results, refused = evaluate_accepted(cases, function, precision, **options)
     for reason in refused.values():
         raise reason
@@ -45,7 +48,9 @@ def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: An
 def evaluate_accepted(
     cases: Cases, function: Kernel, precision: str, **options: Any
 ) -> tuple[Array, dict[str, Exception]]:
-    """Return J of every case, and what the kernel raises for the phase functions that it refuses, where J is NaN."""
+    """Return J of every case, and what the kernel raises for the phase functions that it
+    refuses, where J is NaN.
+    """
     names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
     refused: dict[str, Exception] = {}
     for name in dict.fromkeys(cases.phase):
@@ -68,8 +73,9 @@ def evaluate_rows(
 ) -> Array:
     """Return J of cases that share a phase function, (rows,) [1/m].
 
-    Where cases have rays, foot and height are computed from them in the precision, 'single' or 'double'. The `table`
-    has the values of the phase function 'tabulated', of mean 1; the light has an `intensity` [W/sr].
+    Where cases have rays, foot and height are computed from them in the precision, 'single' or
+    'double'. The `table` has the values of the phase function 'tabulated', of mean 1; the light has
+    an `intensity` [W/sr].
     """
     types = array_types(precision)
     name = cases.phase[rows[0]]
@@ -92,18 +98,24 @@ def evaluate_rows(
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
 
 
-def relative_error(results: Array, expected: Array, precision: str, allowance: Array | float = 0.0) -> Array:
-    """Return |results - expected| / |expected| [1] beyond an allowance [1/m], NaN where either is not finite."""
+def relative_error(
+    results: Array, expected: Array, precision: str, allowance: Array | float = 0.0
+) -> Array:
+    """Return |results - expected| / |expected| [1] beyond an allowance [1/m], NaN
+    where either is not finite.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
-        error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(np.abs(expected), TINY[precision])
+        error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(
+            np.abs(expected), TINY[precision]
+        )
     return np.where(np.isfinite(results) & np.isfinite(expected), error, np.nan)
 
 
 def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
     """Return J of every case by a kernel, (cases,) [1/m], in 'single' or 'double' precision.
 
-    Where cases have rays, foot and height are computed from them in the precision. A number that it cannot square and
-    an unknown kernel are refused.
+    Where cases have rays, foot and height are computed from them in the precision. A number that it
+    cannot square and an unknown kernel are refused.
     """
     function = find_kernel(kernel)
     for name in ("foot", "height", "x0", "x1", "sigma_t"):
@@ -112,7 +124,8 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
         if large.any():
             row = int(np.argmax(large))
             raise InputError(
-                f"{cases.place(row)}: {name} is {values[row]:g}; expected at most {LARGEST[precision]:g} in "
+                f"{cases.place(row)}: {name} is {values[row]:g}; expected at most "
+                f"{LARGEST[precision]:g} in "
                 f"{precision} precision: use other units"
             )
     return evaluate_cases(cases, function, precision)
@@ -127,14 +140,21 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
         if cases.height[row] < 1e-30 and cases.x0[row] <= cases.foot[row] <= cases.x1[row]:
             hint = "the light lies on the segment, and J, which grows like 1/height, is infinite: give a larger height"
         raise InputError(
-            f"{cases.place(row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are "
+            f"{cases.place(row)}: the result is {results[row]:g}, and {int(wrong.sum())} of "
+            f"{len(results)} rows are "
             f"not finite; {hint}"
         )
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
-    """Return quantiles of the relative error of results, (n,) [1/m], where the cases have values."""
-    quantiles: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
+    """Return quantiles of the relative error of results, (n,) [1/m],
+    where the cases have values.
+    """
+    quantiles: dict[str, Any] = {
+        "rows": len(results),
+        "compared": 0,
+        "nonfinite": int(np.sum(~np.isfinite(results))),
+    }
     if cases.value is None:
         return quantiles
     error = relative_error(results, cases.value, "single")
@@ -144,11 +164,19 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
     p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
     worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
     worst = cases.lines[worst] if cases.lines else worst
-    return quantiles | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst}
+    return quantiles | {
+        "compared": int(finite.sum()),
+        "p50": p50,
+        "p99": p99,
+        "max": largest,
+        "worst_row": worst,
+    }
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:
-    """Write the rows of a file with their results [1/m] in a column `result`, whole or not at all."""
+    """Write the rows of a file with their results [1/m] in a column
+    `result`, whole or not at all.
+    """
     kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")

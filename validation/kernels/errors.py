@@ -1,32 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Relative errors of kernels on rays with a known J: quantiles, values that are not finite or negative, the worst ray.
+r"""Relative errors of kernels on rays with a known J: quantiles, values that are not finite or
+negative, the worst ray.
 
-A value may lose accuracy near the smallest numbers of a precision and still be right. Many processors, and all GPUs,
-put 0 for a product below the smallest normal number t (2^-126 in float32, 2^-1022 in float64): they flush. Others round
-it with the few digits that are left. In either case a product is wrong by at most t, besides its relative rounding.
-Units and factors decide where this happens, so that a value far above t can depend on it: a light 2e5 m away, 60
-optical depths, J = 1.2e-33 1/m over 3e4 m is a sum of terms of 1e-38 1/m^2 each.
+A value may lose accuracy near the smallest numbers of a precision and still be right. Many
+processors, and all GPUs, put 0 for a product below the smallest normal number t (2^-126 in float32,
+2^-1022 in float64): they flush. Others round it with the few digits that are left. In either case a
+product is wrong by at most t, besides its relative rounding. Units and factors decide where this
+happens, so that a value far above t can depend on it: a light 2e5 m away, 60 optical depths, J =
+1.2e-33 1/m over 3e4 m is a sum of terms of 1e-38 1/m^2 each.
 
 A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, over a length L:
 
     J = int f dx ~ L sum_k w_k f_k,        f = exp(-sigma_t (x + r)) p / r^2   [1/m^2].
 
-* The exponential is wrong by at most t, so f by t p/r^2. Summed up that is t V, V the integral without extinction.
-* A product w_k f_k is smaller than its factors, so it is the one that is flushed: by at most t, and J by n t L.
+* The exponential is wrong by at most t, so f by t p/r^2. Summed up that is t V, V the
+  integral without extinction.
+* A product w_k f_k is smaller than its factors, so it is the one that is flushed: by
+  at most t, and J by n t L.
 * J itself is wrong by at most t.
 
 A value is therefore right, on every processor, where
 
     |J - J_true| <= bar J_true + a,        a = t (n L + V + 1),
 
-with n = 8 nodes, those of the longest rule in x and of one panel, and upper bounds in the place of L and V:
+with n = 8 nodes, those of the longest rule in x and of one panel, and upper bounds
+in the place of L and V:
 
-* L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by e^-87 = t, and what
-  is left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
-* V = int p/r^2 dx is at most the largest p times L/r^2, r the least distance to the light, and times pi/h, all angles.
+* L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by
+  e^-87 = t, and what is left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
+* V = int p/r^2 dx is at most the largest p times L/r^2, r the least distance to the light,
+  and times pi/h, all angles.
 
-The allowance a is in the units of J, and it is small: relative to V it is 1e-38 for the exponential, and n r^2 1e-38
-[1/m^2] for the terms, so that up to 30 optical depths and r = 1e6 m it is less than a millionth of J.
+The allowance a is in the units of J, and it is small: relative to V it is 1e-38 for the
+exponential, and n r^2 1e-38 [1/m^2] for the terms, so that up to 30 optical depths and r = 1e6 m it
+is less than a millionth of J.
 """
 
 from collections.abc import Collection, Mapping
@@ -48,7 +55,9 @@ _SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
 
 
 def groups(cases: Cases) -> dict[str, Bools]:
-    """Return which rows belong to 'all', to each tag and to each phase function (as 'phase NAME')."""
+    """Return which rows belong to 'all', to each tag and to each phase
+    function (as 'phase NAME').
+    """
     groups = {"all": np.ones(len(cases.phase), dtype=bool)}
     if cases.tag is not None:
         tags = np.asarray(cases.tag)
@@ -58,7 +67,9 @@ def groups(cases: Cases) -> dict[str, Bools]:
 
 
 def underflow_allowance(cases: Cases, precision: str) -> Array:
-    """Return how far each value may be off because a term of it is below the smallest normal number, (n,) [1/m]."""
+    """Return how far each value may be off because a term of it is below the smallest
+    normal number, (n,) [1/m].
+    """
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         beginning = np.maximum(cases.foot, cases.x0)
         end = np.minimum(cases.x1, beginning + _LARGEST_DEPTH / cases.sigma_t)
@@ -78,7 +89,11 @@ def _peak(name: str, g: float) -> float:
 
 
 def errors_by_group(
-    cases: Cases, values: Array, precision: str, rows: Mapping[str, Bools], refused: Collection[str] = ()
+    cases: Cases,
+    values: Array,
+    precision: str,
+    rows: Mapping[str, Bools],
+    refused: Collection[str] = (),
 ) -> dict[str, KernelErrors]:
     """Return the relative errors [1] of each group of rows, against the value of the cases.
 
@@ -87,10 +102,15 @@ def errors_by_group(
     assert cases.value is not None
     error = relative_error(values, cases.value, precision, underflow_allowance(cases, precision))
     accepted, known = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
-    return {name: _errors(cases, values, error, known, group & accepted, group) for name, group in rows.items()}
+    return {
+        name: _errors(cases, values, error, known, group & accepted, group)
+        for name, group in rows.items()
+    }
 
 
-def _errors(cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools) -> KernelErrors:
+def _errors(
+    cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools
+) -> KernelErrors:
     J, finite = values[tried], np.isfinite(error) & tried
     bad = tried & known & ~np.isfinite(values)
     median = p99 = largest = mean = worst = None

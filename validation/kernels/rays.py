@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rays that kernels are tried on: quasi-random, exact float32 numbers, with the reference from `analytic`.
+"""Rays that kernels are tried on: quasi-random, exact float32 numbers, with the
+reference from `analytic`.
 
 Two sets, each the same on every machine:
 
-* `hard_rays` covers every magnitude: optical depth 1e-6 to 60 (of the shortest way camera, segment, light), height over
-  distance 1e-7 to 1, scale 1e-6 to 1e6, |g| up to 0.95, light before and behind the camera, segments from 1e-3 to 1e3
-  distances and unbounded ones, all phase functions.
-* `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what is
-  dimmer than exp(-60) float32 flushes to zero on the way), angle to the light 1e-3 to 179.999 degrees, uniform, length
-  1e-3 to 100 distances, from the camera on. With extinction 1 the optical depth is the distance itself: J obeys
-  J(c lengths, sigma_t / c) = J / c.
+* `hard_rays` covers every magnitude: optical depth 1e-6 to 60 (of the shortest way camera, segment,
+  light), height over distance 1e-7 to 1, scale 1e-6 to 1e6, |g| up to 0.95, light before and behind
+  the camera, segments from 1e-3 to 1e3 distances and unbounded ones, all phase functions.
+* `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of
+  the light (what is dimmer than exp(-60) float32 flushes to zero on the way), angle to the light
+  1e-3 to 179.999 degrees, uniform, length 1e-3 to 100 distances, from the camera on. With
+  extinction 1 the optical depth is the distance itself: J obeys J(c lengths, sigma_t / c) = J / c.
 """
 
 from dataclasses import dataclass, replace
@@ -52,7 +53,9 @@ def hard_rays(count: int = 100_000) -> Cases:
     x1 = np.where(u[:, 6] < 0.1, np.inf, _rounded(x0 + length))
     thickness = _log(u[:, 7], 1e-6, 60.0)
     sigma_t = _rounded(thickness / (x0 + np.hypot(x0 - foot, height)))
-    phase = np.asarray(PHASE_NAMES)[np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)]
+    phase = np.asarray(PHASE_NAMES)[
+        np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)
+    ]
     g = np.where(phase == "hg", _G[np.minimum((u[:, 9] * len(_G)).astype(int), len(_G) - 1)], 0.0)
     tags = np.select(
         [
@@ -67,11 +70,17 @@ def hard_rays(count: int = 100_000) -> Cases:
         ["near_light", "infinite", "behind", "thick", "thin", "sliver", "beyond"],
         "generic",
     )
-    return with_reference(table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
+    return with_reference(
+        table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags)
+    )
 
 
-def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, reference: bool = True) -> Cases:
-    """Return the set W (see the module) for one phase function, with the extinction 1/m, and with the true J or not."""
+def wide_rays(
+    count: int, phase: str = "isotropic", g: float = 0.0, *, reference: bool = True
+) -> Cases:
+    """Return the set W (see the module) for one phase function, with the extinction 1/m,
+    and with the true J or not.
+    """
     u = _sobol(count, 3)
     distance = _log(u[:, 0], 1e-4, 60.0)
     angle = np.radians(1e-3 + (180.0 - 2e-3) * u[:, 1])
@@ -80,20 +89,53 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, reference
     names = np.full(count, phase)
     g_exact = np.full(count, float(np.float32(g)))
     zeros, ones = np.zeros(count), np.ones(count)
-    cases = table(names, g_exact, foot=foot, height=height, x0=zeros, x1=x1, sigma_t=ones, tags=np.full(count, "wide"))
+    cases = table(
+        names,
+        g_exact,
+        foot=foot,
+        height=height,
+        x0=zeros,
+        x1=x1,
+        sigma_t=ones,
+        tags=np.full(count, "wide"),
+    )
     return with_reference(cases) if reference else cases
 
 
-def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
-    """Return columns as cases without values: lengths [m], extinction [1/m], names of phase functions, and tags."""
+def table(
+    phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags
+) -> Cases:
+    """Return columns as cases without values: lengths [m], extinction [1/m], names of
+    phase functions, and tags.
+    """
     names, words = (tuple(str(cell) for cell in column) for column in (phase, tags))
-    return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
+    return Cases(
+        names,
+        np.asarray(g),
+        foot,
+        height,
+        x0,
+        x1,
+        sigma_t,
+        None,
+        words,
+        None,
+        None,
+        None,
+        COLUMNS,
+        (),
+    )
 
 
 def with_reference(cases: Cases) -> Cases:
     """Return cases with J to about 1e-12, from the cache where it was computed before."""
     inputs = RayInputs(cases)
-    return replace(cases, value=stored(inputs, lambda: integrate_cases(cases, rtol=1e-12, table=TABLE)[0], Array).value)
+    return replace(
+        cases,
+        value=stored(
+            inputs, lambda: integrate_cases(cases, rtol=1e-12, table=TABLE)[0], Array
+        ).value,
+    )
 
 
 def case_row(cases: Cases, k: int) -> str:

@@ -11,14 +11,16 @@ class KernelErrors:
 
     rays: int  #: that the kernel did not refuse
     refused: int
-    median: float | None  #: of the errors that are finite [1]; None where there is none, as the next three
+    #: of the errors that are finite [1]; None where there is none, as the next three
+    median: float | None
     p99: float | None
     max: float | None
     mean: float | None
     nan: int
     infinite: int  #: where the reference is finite
     negative: int
-    worst: str | None  #: ray of the largest error, or the first that is not finite, as a line of CSV
+    #: ray of the largest error, or the first that is not finite, as a line of CSV
+    worst: str | None
 
     @property
     def odd(self) -> int:

@@ -21,11 +21,13 @@ from airlight.validation.study.configuration import find_kernel
 CERTIFIED = ("airlight_integral.csv", "airlight_integral_rays.csv")
 GENERATED = "generated"
 PRECISIONS = ("single", "double")
-#: Limits that an exact kernel keeps: the maxima on every set of rays, the quantiles on the certified ones.
+#: Limits that an exact kernel keeps: the maxima on every set of rays, the
+#: quantiles on the certified ones.
 #:
-#: Tables, whose kinks no rule of fixed cost resolves, are left out, but not values that are NaN, infinite or negative.
-#: The quantiles describe the certified cases; how many generated rays are hard is a matter of taste. Products that a
-#: processor flushes to zero are no error: `validation.kernels.errors` derives how much they can be.
+#: Tables, whose kinks no rule of fixed cost resolves, are left out, but not values that are NaN,
+#: infinite or negative. The quantiles describe the certified cases; how many generated rays are
+#: hard is a matter of taste. Products that a processor flushes to zero are no error:
+#: `validation.kernels.errors` derives how much they can be.
 BAR = {
     "single_max": 3e-5,  # in float32, for |g| <= 0.9
     "single_max_sharp": 1e-4,  # in float32, for |g| up to 0.95
@@ -38,9 +40,13 @@ BAR = {
 def stability(
     names: Sequence[str] | None = None, *, count: int = 100_000, progress: Counted | None = None
 ) -> list[Stability]:
-    """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
+    """Study kernels, all of the registry by default, on the certified rays and
+    on so many generated ones.
+    """
     chosen = [find_kernel(name) for name in names or KERNELS]  # refuse a wrong name before any work
-    sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {GENERATED: hard_rays(count)}
+    sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {
+        GENERATED: hard_rays(count)
+    }
     results = []
     for number, kernel in enumerate(chosen):
         if progress is not None:
@@ -60,14 +66,24 @@ def kernel_stability(kernel: Kernel, sets: dict[str, Cases]) -> Stability:
             values[each], reasons = evaluate_accepted(cases, kernel, each)
             refused |= {phase: str(reason) for phase, reason in reasons.items()}
         rows = groups(cases)
-        errors = {each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS}
+        errors = {
+            each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS
+        }
         studied.append(Rays(name=label, columns=",".join(cases.header), **errors))
         if kernel.exact:
             broken += _broken(label, cases, values, refused)
-    return Stability(kernel=kernel.name, exact=kernel.exact, refused=refused, sets=tuple(studied), broken=tuple(broken))
+    return Stability(
+        kernel=kernel.name,
+        exact=kernel.exact,
+        refused=refused,
+        sets=tuple(studied),
+        broken=tuple(broken),
+    )
 
 
-def _broken(name: str, cases: Cases, values: dict[str, Array], refused: Collection[str] = ()) -> list[str]:
+def _broken(
+    name: str, cases: Cases, values: dict[str, Array], refused: Collection[str] = ()
+) -> list[str]:
     """Return the limits that a kernel that claims to be exact exceeds, in words."""
     sharp, smooth = np.abs(cases.g) > 0.9, np.asarray(cases.phase) != "tabulated"
     rows: dict[str, Bools] = {
@@ -76,7 +92,10 @@ def _broken(name: str, cases: Cases, values: dict[str, Array], refused: Collecti
         "g up to 0.9": smooth & ~sharp,
         "g above 0.9": sharp,
     }
-    single, double = (errors_by_group(cases, values[precision], precision, rows, refused) for precision in PRECISIONS)
+    single, double = (
+        errors_by_group(cases, values[precision], precision, rows, refused)
+        for precision in PRECISIONS
+    )
     limits = [
         ("float32 maximum, |g| up to 0.9", single["g up to 0.9"], "max", BAR["single_max"]),
         ("float32 maximum, |g| above 0.9", single["g above 0.9"], "max", BAR["single_max_sharp"]),
@@ -95,5 +114,7 @@ def _broken(name: str, cases: Cases, values: dict[str, Array], refused: Collecti
             faults.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
     for precision, errors in (("float32", single["all"]), ("float64", double["all"])):
         counts = {"NaN": errors.nan, "infinite": errors.infinite, "negative": errors.negative}
-        faults += [f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number]
+        faults += [
+            f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number
+        ]
     return faults

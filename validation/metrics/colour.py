@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""How different two images look: CIEDE2000 and Delta E ITP, at a stated exposure and luminance.
 
-Radiance has no colour until it is shown. Each image therefore goes through the same chain, as linear RGB with the
-primaries and the white of sRGB:
+Radiance has no colour until it is shown. Each image therefore goes through the same chain, as
+linear RGB with the primaries and the white of sRGB:
 
     shown = radiance 2^exposure                       1 is white
     CIEDE2000:   clip to [0, 1] -> CIE XYZ -> CIE L*a*b* (D65, its white) -> Delta E_00
     Delta E ITP: times the luminance of white [cd/m^2], clip to [0, peak] -> BT.2020 -> IC_TC_P (PQ) -> Delta E_ITP
 
-and the differences of two pixels follow from the last line of each. The clipping imitates a screen: CIEDE2000 was
-fitted to surface colours and is not defined above white, nor PQ below 0. It is not silent: pixels that it changed in
-either image are counted. A difference of 1 is about what a keen eye just sees, in both formulae.
+and the differences of two pixels follow from the last line of each. The clipping imitates a screen:
+CIEDE2000 was fitted to surface colours and is not defined above white, nor PQ below 0. It is not
+silent: pixels that it changed in either image are counted. A difference of 1 is about what a keen
+eye just sees, in both formulae.
 
-The exposure is in stops. It brings the 99th percentile of the reference to 0.9, as the pictures of a report
-do; it depends on the reference alone, so that all tests against one reference are judged at one exposure.
+The exposure is in stops. It brings the 99th percentile of the reference to 0.9, as the pictures of
+a report do; it depends on the reference alone, so that all tests against one reference are judged
+at one exposure.
 
-CIEDE2000: CIE 142-2001; Sharma, Wu and Dalal 2005 for its branches. Delta E ITP: ITU-R BT.2124-0, annex 1; PQ and
-IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through colour-science, whose import
-takes a second.
+CIEDE2000: CIE 142-2001; Sharma, Wu and Dalal 2005 for its branches. Delta E ITP: ITU-R BT.2124-0,
+annex 1; PQ and IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through
+colour-science, whose import takes a second.
 """
 
 from dataclasses import dataclass
@@ -36,15 +38,23 @@ PQ_PEAK = 10000.0  #: the brightest that PQ encodes [cd/m^2]
 
 @dataclass(frozen=True)
 class ColourDifference:
-    """Colour difference of two images (see the module); none is known if no pixel is finite in both."""
+    """Colour difference of two images (see the module); none is known if no
+    pixel is finite in both.
+    """
 
     exposure: float = column("exposure", "stops", "the radiance was multiplied by 2 to this power")
     white_luminance: float = column("white", "cd/m^2", "of the screen of Delta E ITP")
     peak_luminance: float = column("peak", "cd/m^2", "of the screen of Delta E ITP")
     pixels: int = column("pixels", "pixels", "asked for")
-    nonfinite: int = column("not finite", "pixels", "left out because either image is NaN or infinite there")
-    clipped: int = column("clipped", "pixels", "of which either image is outside [0, 1], which CIEDE2000 sees")
-    clipped_itp: int = column("clipped, ITP", "pixels", "of which either image is outside what Delta E ITP sees")
+    nonfinite: int = column(
+        "not finite", "pixels", "left out because either image is NaN or infinite there"
+    )
+    clipped: int = column(
+        "clipped", "pixels", "of which either image is outside [0, 1], which CIEDE2000 sees"
+    )
+    clipped_itp: int = column(
+        "clipped, ITP", "pixels", "of which either image is outside what Delta E ITP sees"
+    )
     ciede2000_mean: float | None = column("CIEDE2000", "1", "mean CIEDE2000")
     ciede2000_p99: float | None = column("CIEDE2000, p99", "1", "99 % quantile of CIEDE2000")
     ciede2000_max: float | None = column("CIEDE2000, largest", "1", "largest CIEDE2000")
@@ -53,11 +63,13 @@ class ColourDifference:
     itp_max: float | None = column("Delta E ITP, largest", "1", "largest Delta E ITP")
 
 
-def colour_difference(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> ColourDifference:
+def colour_difference(
+    reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None
+) -> ColourDifference:
     """Return how different two images look (see the module).
 
-    Radiances [W/(m^2 sr)] are (height, width), (height, width, 1) for grey or (height, width, 3). The mask, (height,
-    width) of truth values, says which pixels to compare.
+    Radiances [W/(m^2 sr)] are (height, width), (height, width, 1) for grey or (height, width, 3).
+    The mask, (height, width) of truth values, says which pixels to compare.
     """
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
@@ -82,7 +94,9 @@ def colour_difference(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike 
 
 
 def auto_exposure(reference: ArrayLike) -> float:
-    """Return the exposure [stops] that brings the 99th percentile of the finite radiance to 0.9; 0 for black."""
+    """Return the exposure [stops] that brings the 99th percentile of the finite
+    radiance to 0.9; 0 for black.
+    """
     values = np.asarray(reference, dtype=np.float64)
     values = values[np.isfinite(values)]
     bright = float(np.percentile(values, 99)) if values.size else 0.0
@@ -97,7 +111,9 @@ def ciede2000(reference: Array, test: Array) -> Array:
 
 
 def delta_e_itp(reference: Array, test: Array) -> Array:
-    """Return Delta E ITP of colours in IC_TC_P, (..., 3): 720 sqrt(dI^2 + (dT/2)^2 + dP^2), BT.2124 annex 1."""
+    """Return Delta E ITP of colours in IC_TC_P, (..., 3): 720 sqrt(dI^2 +
+    (dT/2)^2 + dP^2), BT.2124 annex 1.
+    """
     import colour
 
     return np.asarray(colour.delta_E(reference, test, method="ITP"))
@@ -117,8 +133,11 @@ def _ictcp(luminance: Array) -> Array:
 
     # Both spaces have the white D65, so no chromatic adaptation.
     wide = colour.matrix_RGB_to_RGB("sRGB", "ITU-R BT.2020", chromatic_adaptation_transform=None)
-    # The matrices are rounded to four digits, which can leave a colour of the gamut's edge below zero by 1e-4 of it.
-    return colour.RGB_to_ICtCp(np.maximum(luminance @ wide.T, 0), method="ITU-R BT.2100-2 PQ", L_p=PQ_PEAK)
+    # The matrices are rounded to four digits, which can leave a colour of the gamut's edge
+    # below zero by 1e-4 of it.
+    return colour.RGB_to_ICtCp(
+        np.maximum(luminance @ wide.T, 0), method="ITU-R BT.2100-2 PQ", L_p=PQ_PEAK
+    )
 
 
 def _summary(values: Array) -> tuple[float | None, float | None, float | None]:

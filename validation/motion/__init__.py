@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Renders of chance, and sequences of frames, against references without noise: noise, flicker, lag, ghosts.
+"""Renders of chance, and sequences of frames, against references without noise:
+noise, flicker, lag, ghosts.
 
 Read in this order:
 

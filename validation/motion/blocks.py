@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Regressions over many frames whose standard errors hold for pixels that are correlated in place and time.
+"""Regressions over many frames whose standard errors hold for pixels that are
+correlated in place and time.
 
-The pixels of a block, with all their frames, are left out in turn (a jackknife): no independence is assumed within a
-block. A regression needs only the matrix of the products of a block's columns, so frames are read one by one and only
-these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighbours in different ones.
+The pixels of a block, with all their frames, are left out in turn (a jackknife): no independence is
+assumed within a block. A regression needs only the matrix of the products of a block's columns, so
+frames are read one by one and only these matrices are kept. Blocks are collected in at most
+`GROUPS` groups, neighbours in different ones.
 """
 
 import numpy as np
@@ -14,7 +16,8 @@ from airlight.validation.statistics.samples import widened
 
 BLOCK = 8  #: side of a block [pixels]
 GROUPS = 100  #: their scatter gives a standard error to 7 %
-_SINGULAR = 1e-10  # of the product of its own terms, below which the determinant of a correlation says nothing
+# of the product of its own terms, below which the determinant of a correlation says nothing
+_SINGULAR = 1e-10
 
 
 def products(columns: Array, side: int = BLOCK) -> Array:
@@ -31,13 +34,18 @@ def products(columns: Array, side: int = BLOCK) -> Array:
         strip = columns[:, row * side : (row + 1) * side]
         padded[:, strip.shape[1] :] = 0
         padded[:, : strip.shape[1], :width] = strip
-        blocks = padded.reshape(count, side, across, side * channels).transpose(2, 0, 1, 3).reshape(across, count, -1)
+        blocks = (
+            padded.reshape(count, side, across, side * channels)
+            .transpose(2, 0, 1, 3)
+            .reshape(across, count, -1)
+        )
         sums[row * across : (row + 1) * across] = blocks @ blocks.transpose(0, 2, 1)
     return sums.reshape(-1, groups, count, count).sum(axis=0)
 
 
 def regression(sums: Array) -> tuple[Estimate, ...]:
-    """Return the coefficients of the last column on the others; unknown where the columns do not tell them apart.
+    """Return the coefficients of the last column on the others; unknown where the
+    columns do not tell them apart.
 
     Their errors are not known where one group alone tells them apart.
     """
@@ -53,9 +61,11 @@ def regression(sums: Array) -> tuple[Estimate, ...]:
 
 
 def relative_root(sums: Array, value: int, *, to: int, values: int = 0) -> Estimate:
-    """Return the root mean square of a column, counted by column `values`, over the mean of another, which is positive.
+    """Return the root mean square of a column, counted by column `values`, over the mean of
+    another, which is positive.
 
-    Its error is not known where one group holds all of that mean: without the group nothing is relative to it.
+    Its error is not known where one group holds all of that mean: without the group
+    nothing is relative to it.
     """
     several = _left_out(sums)
     square = several[:, value, value] / np.maximum(several[:, values, values], 1e-300)
@@ -74,7 +84,8 @@ def _left_out(sums: Array) -> Array:
 
 
 def held(sums: Array) -> Array:
-    """Return the groups that hold something, to be left out in turn; none where one of them holds all.
+    """Return the groups that hold something, to be left out in turn; none
+    where one of them holds all.
 
     The first column of a pixel that counts is not zero.
     """
@@ -83,11 +94,13 @@ def held(sums: Array) -> Array:
 
 
 def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
-    """Return numbers with the errors of the jackknife, from the numbers without each group, (groups, numbers).
+    """Return numbers with the errors of the jackknife, from the numbers without each
+    group, (groups, numbers).
 
-    Groups that change nothing, such as dark ones, are no samples. With deviations d of the numbers without a group from
-    their mean, pi/2 (sum |d|)^2 / sum d^2 groups count: all of them where d is normal, hardly more than one where a
-    single group decides. That less one, and at least one, are the degrees of freedom.
+    Groups that change nothing, such as dark ones, are no samples. With deviations d of the numbers
+    without a group from their mean, pi/2 (sum |d|)^2 / sum d^2 groups count: all of them where d is
+    normal, hardly more than one where a single group decides. That less one, and at least one, are
+    the degrees of freedom.
     """
     groups = len(left_out)
     if groups < 2:
@@ -95,8 +108,12 @@ def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
     apart = np.abs(left_out - left_out.mean(axis=0))
     square = (apart**2).sum(axis=0)
     counting = np.pi / 2 * apart.sum(axis=0) ** 2 / np.where(square > 0, square, 1.0)
-    errors = widened(np.sqrt(square * (groups - 1) / groups), np.clip(counting - 1, 1.0, groups - 1))
-    return tuple(Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True))
+    errors = widened(
+        np.sqrt(square * (groups - 1) / groups), np.clip(counting - 1, 1.0, groups - 1)
+    )
+    return tuple(
+        Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True)
+    )
 
 
 def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
@@ -104,7 +121,9 @@ def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
     count = len(products)
 
     def parts(total: Array, own: Array, runs: int) -> Array:
-        return np.stack([(total - own) / (runs * (runs - 1)), (own - total / runs) / (runs - 1)], axis=-1)
+        return np.stack(
+            [(total - own) / (runs * (runs - 1)), (own - total / runs) / (runs - 1)], axis=-1
+        )
 
     total, own = products.sum(), np.trace(products)
     found = parts(total, own, count)
@@ -120,4 +139,6 @@ def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
 def told_apart(matrix: Array) -> bool:
     """Return whether the products of columns tell their coefficients apart."""
     scale = np.sqrt(np.diag(matrix))
-    return bool((scale > 0).all()) and bool(np.linalg.det(matrix / np.outer(scale, scale)) > _SINGULAR)
+    return bool((scale > 0).all()) and bool(
+        np.linalg.det(matrix / np.outer(scale, scale)) > _SINGULAR
+    )

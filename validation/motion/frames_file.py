@@ -3,13 +3,15 @@
 
 ```json
 {"schema": "airlight-frames/1", "scene": "hall", "first": 1, "frames": 2, "fps": 60, "exposure": 0,
- "layer": "airlight", "pixel": "centre", "resets": [0], "changes": {"light.position": [[0.1, 2, 3.1], [0.1, 2.1, 3.1]]}}
+ "layer": "airlight", "pixel": "centre", "resets": [0], "changes": {"light.position": [[0.1, 2,
+ 3.1], [0.1, 2.1, 3.1]]}}
 ```
 
-`first`: number of the file that shows frame 0; `exposure`: stops, one number or a list: values are divided by
-2^stops; `resets`: frames with which a history begins; `jitter`: by frame how far right of and below the pixel centres
-its rays pass [pixels]; `changes`: a list by frame for each name of `--change`; `objects`: for each shape that moves a
-list by frame of matrices, 4 x 4, that take it from its place in the scene [m].
+`first`: number of the file that shows frame 0; `exposure`: stops, one number or a list: values are
+divided by 2^stops; `resets`: frames with which a history begins; `jitter`: by frame how far right
+of and below the pixel centres its rays pass [pixels]; `changes`: a list by frame for each name of
+`--change`; `objects`: for each shape that moves a list by frame of matrices, 4 x 4, that take it
+from its place in the scene [m].
 """
 
 import json
@@ -29,7 +31,8 @@ SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
 _number = partial(read_number, least=-1e30, most=1e30, whole=False)
-_FARTHEST = 1.0  # that rays are jittered [pixels]: what is more is in other units, of the film or of its half
+# that rays are jittered [pixels]: what is more is in other units, of the film or of its half
+_FARTHEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -53,35 +56,48 @@ class FramesRecord:
         return self.exposure[frame] if isinstance(self.exposure, tuple) else self.exposure
 
     def shown(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], tuple[float, ...]]:
-        """Return the state of a frame: changes and matrices of moving shapes by name, and the jitter of its pixels."""
+        """Return the state of a frame: changes and matrices of moving shapes by name, and
+        the jitter of its pixels.
+        """
         changes, moves = (
-            {name: values[frame] for name, values in each.items()} for each in (self.changes, self.objects)
+            {name: values[frame] for name, values in each.items()}
+            for each in (self.changes, self.objects)
         )
         return changes, moves, self.jitter[frame] if self.jitter else (0.0, 0.0)
 
     def text(self) -> str:
         """Return the file."""
-        return json.dumps({"schema": SCHEMA} | {k: v for k, v in asdict(self).items() if v is not None})
+        return json.dumps(
+            {"schema": SCHEMA} | {k: v for k, v in asdict(self).items() if v is not None}
+        )
 
 
 def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     """Read `frames.json`.
 
-    Raises InputError if it cannot be read, has a key that is not known or a value of another kind, or lists of other
-    lengths than there are frames.
+    Raises InputError if it cannot be read, has a key that is not known or a value of another kind,
+    or lists of other lengths than there are frames.
     """
     try:
         given = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example") from error
+        raise InputError(
+            f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example"
+        ) from error
     if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
         raise InputError(f'{path}: expected an object with "schema": "{SCHEMA}"')
     for name in given.keys() - _KINDS.keys():
-        raise InputError(f"{path}: got {name!r}, expected some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
+        raise InputError(
+            f"{path}: got {name!r}, expected some of {', '.join(_KINDS)}{nearest(name, _KINDS)}"
+        )
     if "frames" not in given:
         raise InputError(f'{path}: the number of frames is missing; expected such as "frames": 60')
-    read = {name: _KINDS[name](f"{path}: {name}", value) for name, value in given.items() if value is not None}
+    read = {
+        name: _KINDS[name](f"{path}: {name}", value)
+        for name, value in given.items()
+        if value is not None
+    }
     record = FramesRecord(**read)
     lists: dict[str, Any] = {**record.changes, **record.objects}
     lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
@@ -89,25 +105,32 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     for name, values in lists.items():
         if len(values) != record.frames:
             raise InputError(
-                f"{path}: {name} has {len(values)} values, expected one for each of {record.frames} frames"
+                f"{path}: {name} has {len(values)} values, expected one for each of "
+                f"{record.frames} frames"
             )
     for reset in record.resets:
         if not 0 <= reset < record.frames:
-            raise InputError(f"{path}: resets has {reset}, expected frames from 0 to {record.frames - 1}")
+            raise InputError(
+                f"{path}: resets has {reset}, expected frames from 0 to {record.frames - 1}"
+            )
     return record
 
 
-def frame_paths(pattern: str | os.PathLike[str], record: FramesRecord, about: str) -> tuple[Path, ...]:
-    """Return the file of each frame: in the pattern, the signs # stand for the digits of its number.
+def frame_paths(
+    pattern: str | os.PathLike[str], record: FramesRecord, about: str
+) -> tuple[Path, ...]:
+    """Return the file of each frame: in the pattern, the signs # stand for
+    the digits of its number.
 
-    `about`: the file that says which frames there are. Raises InputError for a pattern without #, and a frame without
-    a file.
+    `about`: the file that says which frames there are. Raises InputError for a pattern without #,
+    and a frame without a file.
     """
     text = str(pattern)
     start, digits = text.find(_MARK), text.count(_MARK)
     if not digits or _MARK * digits not in text:
         raise InputError(
-            f"frames: got {text}, expected the files of all frames with # for each digit, such as frames/####.exr"
+            f"frames: got {text}, expected the files of all frames with # for each digit, such as "
+            "frames/####.exr"
         )
     paths = []
     for frame in range(record.frames):
@@ -115,14 +138,17 @@ def frame_paths(pattern: str | os.PathLike[str], record: FramesRecord, about: st
         paths.append(Path(text[:start] + f"{number:0{digits}d}" + text[start + digits :]))
         if not paths[-1].is_file():
             raise InputError(
-                f"frame {frame} has no file: there is no {paths[-1]}; {about} wants {record.frames} frames from number "
+                f"frame {frame} has no file: there is no {paths[-1]}; {about} wants "
+                f"{record.frames} frames from number "
                 f"{record.first} on"
             )
     return tuple(paths)
 
 
 def _by_frame(read: Reader) -> Reader:
-    return lambda what, value: tuple(read(f"{what}[{n}]", each) for n, each in enumerate(read_list(what, value, 0)))
+    return lambda what, value: tuple(
+        read(f"{what}[{n}]", each) for n, each in enumerate(read_list(what, value, 0))
+    )
 
 
 def _stops(what: str, value: Any) -> float | tuple[float, ...]:
@@ -136,20 +162,29 @@ def _values(what: str, value: Any) -> tuple[float, ...]:
 def _offset(what: str, value: Any) -> tuple[float, ...]:
     found = _by_frame(_number)(what, value)
     if len(found) != 2 or max(map(abs, found)) > _FARTHEST:
-        raise InputError(f"{what}: got {value!r}, expected right and down [pixels], each at most {_FARTHEST:g}")
+        raise InputError(
+            f"{what}: got {value!r}, expected right and down [pixels], each at most {_FARTHEST:g}"
+        )
     return tuple(found)
 
 
 def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
     wanted = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
-    rows = [[_number(what, each) for each in read_list(what, row, 0)] for row in read_list(what, value, 0)]
+    rows = [
+        [_number(what, each) for each in read_list(what, row, 0)]
+        for row in read_list(what, value, 0)
+    ]
     if [len(row) for row in rows] != [4] * 4 or rows[3] != [0, 0, 0, 1]:
         raise InputError(f"{what}: got {value!r}, expected {wanted}")
     turn = np.array(rows)[:3, :3]
     # A scale by axis would make other shapes of spheres, a mirror would turn them inside out.
     scale = np.cbrt(np.linalg.det(turn))
-    if scale <= 0 or not np.allclose(turn @ turn.T, scale**2 * np.eye(3), atol=1e-5 * scale**2, rtol=0):
-        raise InputError(f"{what}: got axes that are not a rotation times a scale, expected {wanted}")
+    if scale <= 0 or not np.allclose(
+        turn @ turn.T, scale**2 * np.eye(3), atol=1e-5 * scale**2, rtol=0
+    ):
+        raise InputError(
+            f"{what}: got axes that are not a rotation times a scale, expected {wanted}"
+        )
     return tuple(map(tuple, rows))
 
 

@@ -5,21 +5,23 @@
 
     t_n = c m + g y_n,    y_n = a y_(n-1) + (1 - a) r_(n-d),    y = r where a history begins
 
-has an offset c, a gain g, a persistence a and a whole delay d. Light in a frame has the mean age d + a/(1 - a): the
-lag. The error after a step falls as exp(-n/tau), tau = -1/ln a. All frames are fitted at once: the regression of a
-frame on the one before is wrong where noise comes after the history. Offset and gain are fitted too: without them a
-bias looks like a lag.
+has an offset c, a gain g, a persistence a and a whole delay d. Light in a frame has the mean age
+d + a/(1 - a): the lag. The error after a step falls as exp(-n/tau), tau = -1/ln a. All frames are
+fitted at once: the regression of a frame on the one before is wrong where noise comes after the
+history. Offset and gain are fitted too: without them a bias looks like a lag.
 
-**Which lag there is, if any.** The impulse response is the best t_n = c m + sum of h_k r_(n-k), k from 0 to 15, h >= 0.
-`described` is the improvement of a lag over no filter, as a fraction of the improvement of the impulse response.
+**Which lag there is, if any.** The impulse response is the best t_n = c m + sum of h_k r_(n-k), k
+from 0 to 15, h >= 0. `described` is the improvement of a lag over no filter, as a fraction of the
+improvement of the impulse response.
 
-**Which delay.** It is whole, so it has no standard error: leaving out a block moves it by nothing or by a whole frame.
-The record tells by how much the second-best delay is worse, each with the persistence that suits it best:
-`delay_margin` is the fraction of the sum of squares of the second-best delay that the best one does not leave, with its
-error from blocks.
+**Which delay.** It is whole, so it has no standard error: leaving out a block moves it by nothing
+or by a whole frame. The record tells by how much the second-best delay is worse, each with the
+persistence that suits it best: `delay_margin` is the fraction of the sum of squares of the
+second-best delay that the best one does not leave, with its error from blocks.
 
-Squares count with 1/(r + 0.1 m)^2, r the mean of a value in time: otherwise a few bright pixels rule. Filters in time
-commute with means over pixels, so means over cells of 4 x 4 pixels are fitted.
+Squares count with 1/(r + 0.1 m)^2, r the mean of a value in time: otherwise a few bright pixels
+rule. Filters in time commute with means over pixels, so means over cells of 4 x 4 pixels are
+fitted.
 """
 
 import math
@@ -37,11 +39,13 @@ CELL = 4  #: side of a cell [pixels]
 TAPS = 16  #: of the impulse response [frames]
 DELAYS = range(-2, 5)  #: that are tried [frames]
 DARK = 0.1  #: of the mean: what is darker counts no more than this
-_LEAST, _MOST = -0.5, 0.9995  # persistence: below zero a filter that sharpens in time, which noise may look like
+# persistence: below zero a filter that sharpens in time, which noise may look like
+_LEAST, _MOST = -0.5, 0.9995
 _MOVES = 1e-12  # relative square of a change, below which it is rounding
 _SEARCHED = 20_000  # values that choose the delay
 _STARTS = (-0.3, 0.0, 0.3, 0.6, 0.8, 0.9, 0.95, 0.98)
-SURE = 4.0  #: errors from which on a number of a sequence is not zero: by chance in less than one of 10 000
+#: errors from which on a number of a sequence is not zero: by chance in less than one of 10 000
+SURE = 4.0
 
 
 @dataclass(frozen=True)
@@ -63,22 +67,33 @@ class Lag:
     gain: Estimate = UNKNOWN
     persistence: Estimate = UNKNOWN
     delay: int | None = None  #: whole [frames]
-    delay_margin: Estimate = UNKNOWN  #: fraction of what the second-best delay leaves that this one does not
-    described: float | None = None  #: fraction of what an impulse response explains; None where the lag may be zero
+    #: fraction of what the second-best delay leaves that this one does not
+    delay_margin: Estimate = UNKNOWN
+    #: fraction of what an impulse response explains; None where the lag may be zero
+    described: float | None = None
     response: tuple[Estimate, ...] = ()  #: of a flash, by frame after it
     lag: Estimate = UNKNOWN  #: mean age of the light that is shown [frames]
-    time_constant: Estimate = UNKNOWN  #: frames after which 1/e of a step is missing; unknown where nothing persists
+    #: frames after which 1/e of a step is missing; unknown where nothing persists
+    time_constant: Estimate = UNKNOWN
 
     @property
     def filter(self) -> tuple[float, float, float, int]:
-        """Offset, gain, persistence and delay; what is not known is that of frames without a filter."""
+        """Offset, gain, persistence and delay; what is not known is that of
+        frames without a filter.
+        """
         without = ((self.offset, 0.0), (self.gain, 1.0), (self.persistence, 0.0))
-        offset, gain, persistence = (usual if each.value is None else each.value for each, usual in without)
+        offset, gain, persistence = (
+            usual if each.value is None else each.value for each, usual in without
+        )
         return offset, gain, persistence, 0 if self.delay is None else self.delay
 
 
 def filtered_frames(
-    reference: Callable[[int], Array], frames: int, start: tuple[int, ...], persistence: float, delay: int
+    reference: Callable[[int], Array],
+    frames: int,
+    start: tuple[int, ...],
+    persistence: float,
+    delay: int,
 ) -> Iterator[Array]:
     """Yield the references through a filter, frame by frame."""
     shown = np.zeros(())
@@ -89,12 +104,16 @@ def filtered_frames(
 
 
 def fit_lag(cells: Cells) -> Lag:
-    """Return the filter that makes the frames from their references, with errors from blocks that are left out."""
+    """Return the filter that makes the frames from their references, with errors from
+    blocks that are left out.
+    """
     few = _few(cells)
     if not np.any(few.weight):
         return Lag()
     tried = [_best_persistence(few, delay) for delay in DELAYS]
-    left = np.array([_left(few, persistence, delay) for persistence, delay in zip(tried, DELAYS, strict=True)])
+    left = np.array(
+        [_left(few, persistence, delay) for persistence, delay in zip(tried, DELAYS, strict=True)]
+    )
     best, second = (int(place) for place in np.argsort(left.sum(axis=1))[:2])
     delay = DELAYS[best]
     found_persistence = _polished(cells, tried[best], delay)
@@ -119,7 +138,9 @@ def fit_lag(cells: Cells) -> Lag:
 
 
 def _margin(best: Array, second: Array) -> Estimate:
-    """Return the fraction of the squares of the second-best delay that the best one does not leave, (groups,) each."""
+    """Return the fraction of the squares of the second-best delay that the best one does
+    not leave, (groups,) each.
+    """
     groups = np.stack([best, second])
     groups = groups[:, groups.any(axis=0)]
     total = groups.sum(axis=1, keepdims=True)
@@ -143,15 +164,18 @@ def _times(error: float | None, slope: float) -> float | None:
 
 
 def _few(cells: Cells) -> Cells:
-    """Return some of the values of all frames that count, as a picture of one row, without the last frames.
+    """Return some of the values of all frames that count, as a picture of one row,
+    without the last frames.
 
     Delays below zero look ahead: all delays are judged by the same frames.
     """
     frames = len(cells.test)
-    counted = np.flatnonzero(cells.weight.any(axis=0))  # few are beside a lamp: of values by chance perhaps none
+    # few are beside a lamp: of values by chance perhaps none
+    counted = np.flatnonzero(cells.weight.any(axis=0))
     chosen = np.sort(np.random.default_rng(0).permutation(counted)[:_SEARCHED])
     reference, test, weight = (
-        each.reshape(frames, 1, -1, 1)[:, :, chosen] for each in (cells.reference, cells.test, cells.weight)
+        each.reshape(frames, 1, -1, 1)[:, :, chosen]
+        for each in (cells.reference, cells.test, cells.weight)
     )
     weight[max(frames + min(DELAYS), 1) :] = 0.0
     return Cells(reference, test, weight, cells.mean, cells.start)
@@ -173,11 +197,17 @@ def _columns(cells: Cells, persistence: float, delay: int) -> Iterator[Array]:
     """Yield of each frame the columns m, y, dy/da and t, each times the root of its weight."""
     shown: Array = np.zeros(())
     slope: Array = np.zeros(())
-    lights = filtered_frames(cells.reference.__getitem__, len(cells.test), cells.start, persistence, delay)
+    lights = filtered_frames(
+        cells.reference.__getitem__, len(cells.test), cells.start, persistence, delay
+    )
     for n, light in enumerate(lights):
         # From y_n = a y_(n-1) + (1 - a) r the derivative is y'_n = a y'_(n-1) + y_(n-1) - r.
         begins = n == cells.start[n]
-        slope = np.zeros_like(light) if begins else persistence * slope + (shown - light) / (1 - persistence)
+        slope = (
+            np.zeros_like(light)
+            if begins
+            else persistence * slope + (shown - light) / (1 - persistence)
+        )
         shown = light
         if cells.weight[n].any():
             values = np.stack([np.full_like(light, cells.mean), light, slope, cells.test[n]])
@@ -189,7 +219,9 @@ def _counted(cells: Cells) -> list[int]:
 
 
 def _sums(cells: Cells, persistence: float, delay: int) -> Array:
-    return np.asarray(sum(products(each, BLOCK // CELL) for each in _columns(cells, persistence, delay)))
+    return np.asarray(
+        sum(products(each, BLOCK // CELL) for each in _columns(cells, persistence, delay))
+    )
 
 
 def _linear(total: Array) -> Array:
@@ -225,7 +257,9 @@ def _polished(cells: Cells, persistence: float, delay: int) -> float:
 
 
 def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Estimate]:
-    """Return offset, gain and persistence; without a group they are one step of Gauss and Newton away."""
+    """Return offset, gain and persistence; without a group they are one step
+    of Gauss and Newton away.
+    """
     total = sums.sum(axis=0)
     linear = _linear(total)
     moves = total[2, 2] > _MOVES * total[1, 1]  # otherwise nothing says how much persists
@@ -233,7 +267,8 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
     found = np.array([*linear, persistence])[:unknowns]
     scale = np.array([1.0, 1.0, linear[1]])[:unknowns]
     groups = held(sums)
-    gradient = scale * (groups[:, :unknowns, 3] - groups[:, :unknowns, :2] @ linear)  # by group; their sum is zero
+    # by group; their sum is zero
+    gradient = scale * (groups[:, :unknowns, 3] - groups[:, :unknowns, :2] @ linear)
     matrix = (total - groups)[:, :unknowns, :unknowns] * np.outer(scale, scale)
     if all(told_apart(each) for each in matrix):
         left_out = found - np.linalg.solve(matrix, gradient[..., None])[..., 0]
@@ -244,29 +279,41 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
 
 
 def _impulse_response(cells: Cells, left: float) -> tuple[tuple[Estimate, ...], float | None]:
-    """Return the response to a flash, and the fraction that a filter with a given sum of squares explains of it.
+    """Return the response to a flash, and the fraction that a filter with a given sum
+    of squares explains of it.
 
-    Light from before a history began counts as that of its first frame, and what is older than all taps as the last.
+    Light from before a history began counts as that of its first frame, and what is older
+    than all taps as the last.
     """
     sums: Array = np.zeros(())
     for n in _counted(cells):
         ages = [cells.reference[max(n - age, cells.start[n])] for age in range(TAPS)]
-        columns = np.stack([np.full_like(ages[0], cells.mean), *ages, cells.test[n]]) * np.sqrt(cells.weight[n])
+        columns = np.stack([np.full_like(ages[0], cells.mean), *ages, cells.test[n]]) * np.sqrt(
+            cells.weight[n]
+        )
         sums = sums + products(columns, BLOCK // CELL)
     total = sums.sum(axis=0)
     found, least = _positive_response(total)
     still = total[np.ix_([0, 1, -1], [0, 1, -1])]
-    none = float(still[2, 2] - still[:2, 2] @ np.linalg.lstsq(still[:2, :2], still[:2, 2], rcond=None)[0])
-    described = min((none - left) / (none - least), 1.0) if none - least > _MOVES * total[-1, -1] else None
+    none = float(
+        still[2, 2] - still[:2, 2] @ np.linalg.lstsq(still[:2, :2], still[:2, 2], rcond=None)[0]
+    )
+    described = (
+        min((none - left) / (none - least), 1.0) if none - least > _MOVES * total[-1, -1] else None
+    )
     without = np.array([_positive_response(total - each)[0] for each in held(sums)])
     return estimates(found, without), described
 
 
 def _positive_response(total: Array) -> tuple[Array, float]:
-    """Return the taps, none below zero, that fit best by the products of columns, and the sum of squares they leave."""
+    """Return the taps, none below zero, that fit best by the products of columns, and the
+    sum of squares they leave.
+    """
     values, vectors = np.linalg.eigh(total[:-1, :-1])
     root = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
     wanted = (vectors.T @ total[:-1, -1]) / root
     least = np.r_[-np.inf, np.zeros(TAPS)]
     found = lsq_linear(root[:, None] * vectors.T, wanted, bounds=(least, np.inf)).x
-    return found[1:], float(total[-1, -1] - 2 * found @ total[:-1, -1] + found @ total[:-1, :-1] @ found)
+    return found[1:], float(
+        total[-1, -1] - 2 * found @ total[:-1, -1] + found @ total[:-1, :-1] @ found
+    )

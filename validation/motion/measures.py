@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every measure of a sequence of frames against the reference of each frame.
 
-With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r over all values that count:
+With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r
+over all values that count:
 
 - relative RMSE: the root mean square of e, over m;
-- relative bias: the mean of e over m. Its error is that of the mean of a series of frames that may depend on those
-  before them (`validation.statistics.samples.mean_of_series`); fewer than eight frames tell none;
-- flicker: the root mean square of e_n - e_(n-1), over m: it leaves out the change of the reference. Flicker beside the
-  lag: the same for t - c m - g y, the part that no lag explains (`validation.motion.lag`);
-- ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the fraction G of it that
-  is still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
+- relative bias: the mean of e over m. Its error is that of the mean of a series of frames that may
+  depend on those before them (`validation.statistics.samples.mean_of_series`); fewer than eight
+  frames tell none;
+- flicker: the root mean square of e_n - e_(n-1), over m: it leaves out the change of the reference.
+  Flicker beside the lag: the same for t - c m - g y, the part that no lag explains
+  (`validation.motion.lag`);
+- ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the
+  fraction G of it that is still there is a coefficient of e = c m + b r + G w. By age k, w is
+  max(r_(n-k) - r_n, 0);
 - pop: the largest root mean square of e_n - e_(n-1) of a frame, over the median of all frames.
 
-Pairs of frames across the beginning of a history do not count. A sequence that does not begin with one has frames that
-only start the filter. Values that are not finite are counted, and left out: there the frame is taken for its reference.
+Pairs of frames across the beginning of a history do not count. A sequence that does not begin with
+one has frames that only start the filter. Values that are not finite are counted, and left out:
+there the frame is taken for its reference.
 """
 
 from collections import deque
@@ -39,7 +44,9 @@ STARTING = 16  #: frames that only start the filter of a sequence without a firs
 
 @dataclass(frozen=True)
 class Sequence:
-    """Frames, references and which pixels count, by number from zero; histories begin at the frames `resets`."""
+    """Frames, references and which pixels count, by number from zero; histories
+    begin at the frames `resets`.
+    """
 
     frames: int
     frame: Callable[[int], Array]  #: (height, width, 3)
@@ -80,11 +87,14 @@ class Measures:
     pop_frame: int | None
     rmse_by_frame: tuple[float, ...]
     change_by_frame: tuple[float, ...]  #: of the reference
-    repeated: tuple[int, ...]  #: frames that are the one before, bit by bit, though the reference moved
+    #: frames that are the one before, bit by bit, though the reference moved
+    repeated: tuple[int, ...]
 
 
 def measure(sequence: Sequence) -> Measures | None:
-    """Return all measures of a sequence, which is read twice; None where nothing counts, or all is dark."""
+    """Return all measures of a sequence, which is read twice; None where
+    nothing counts, or all is dark.
+    """
     first = _first_pass(sequence)
     if not first.mean > 0:
         return None
@@ -95,9 +105,9 @@ def measure(sequence: Sequence) -> Measures | None:
 def mean_measures(runs: list[Measures]) -> Measures:
     """Return the means over runs of what has an error, with errors from their spread.
 
-    Runs that measure the same to the last digit are one run, of one seed. A number that one run does not tell is
-    unknown of their mean, and so is a delay in which runs differ. Values that are not finite are those of all runs; the
-    rest is that of the first.
+    Runs that measure the same to the last digit are one run, of one seed. A number that one run
+    does not tell is unknown of their mean, and so is a delay in which runs differ. Values that are
+    not finite are those of all runs; the rest is that of the first.
     """
     runs = [run for number, run in enumerate(runs) if run not in runs[:number]]
     if len(runs) == 1:
@@ -190,7 +200,8 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         if n == sequence.start[n]:
             window.clear()
         reference, frame = sequence.reference(n), sequence.frame(n)
-        window.append(reference.astype(np.float32))  # what ghosts are sums of: half of the memory and time
+        # what ghosts are sums of: half of the memory and time
+        window.append(reference.astype(np.float32))
         frame = np.where(np.isfinite(frame), frame, reference)
         before, left = left, frame - offset * mean - gain * light
         if not sequence.counts(n):
@@ -227,7 +238,8 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         lag=lag,
         ghost=regression(ghosts[:, [0, 1, 2, -1]][:, :, [0, 1, 2, -1]])[2],
         ghost_by_age=tuple(
-            regression(ghosts[:, [0, 1, 2 + age, -1]][:, :, [0, 1, 2 + age, -1]])[2] for age in range(1, AGES + 1)
+            regression(ghosts[:, [0, 1, 2 + age, -1]][:, :, [0, 1, 2 + age, -1]])[2]
+            for age in range(1, AGES + 1)
         ),
         pop=float(jumps.max() / median) if median > 0 else None,
         pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,

@@ -1,36 +1,43 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Independent renders of one frame against its reference: how much of the error is bias, and how much is noise.
+"""Independent renders of one frame against its reference: how much of the error is
+bias, and how much is noise.
 
-The reference has no noise: every random part is the renderer's. With e_i the error of run i of N, all relative to the
-mean of the reference, and G_ij the mean of e_i e_j over values,
+The reference has no noise: every random part is the renderer's. With e_i the error of run i of N,
+all relative to the mean of the reference, and G_ij the mean of e_i e_j over values,
 
-- the variance is V = (sum of G_ii - sum of G_ij / N)/(N - 1), the mean over values of the variance over runs;
-- the squared bias is b^2 = the mean of G_ij over pairs i != j. The naive mean of the squared mean error is b^2 + V/N.
-  By chance b^2 may be negative: it is printed as it is, and its root only from two errors on;
-- the relative bias B is the mean of the B_i = sum of e_i over sum of the reference, with Student's interval. A bias
-  that changes its sign over the image shows in b^2 alone.
+- the variance is V = (sum of G_ii - sum of G_ij / N)/(N - 1), the mean over values
+  of the variance over runs;
+- the squared bias is b^2 = the mean of G_ij over pairs i != j. The naive mean of the squared mean
+  error is b^2 + V/N. By chance b^2 may be negative: it is printed as it is, and its root only from
+  two errors on;
+- the relative bias B is the mean of the B_i = sum of e_i over sum of the reference, with Student's
+  interval. A bias that changes its sign over the image shows in b^2 alone.
 
-Errors of V and b^2 come from leaving out one run at a time. N runs averaged have the error sqrt(b^2 + V/N).
+Errors of V and b^2 come from leaving out one run at a time. N runs averaged have
+the error sqrt(b^2 + V/N).
 
-**Whether the runs are independent.** Runs of one seed are the same, bit by bit: each image counts once. Runs that share
-a part of their random numbers, or of their history, have noise that is correlated: of N independent ones the noise n_i
-has the correlation -1/(N - 1) between two runs, as the mean over runs is taken away. A pair that exceeds it by more
-than a tenth, and that by four errors from blocks of pixels, is no pair of independent runs: no bias and no average is
-reported then. Noise that all runs share alike is bias.
+**Whether the runs are independent.** Runs of one seed are the same, bit by bit: each image counts
+once. Runs that share a part of their random numbers, or of their history, have noise that is
+correlated: of N independent ones the noise n_i has the correlation -1/(N - 1) between two runs, as
+the mean over runs is taken away. A pair that exceeds it by more than a tenth, and that by four
+errors from blocks of pixels, is no pair of independent runs: no bias and no average is reported
+then. Noise that all runs share alike is bias.
 
-**Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that a few runs may have
-none: their mean is then too dark and their spread too small. For a sum of independent deviations x with skewness g =
-sum of x^3 over (sum of x^2)^(3/2), an interval of 95 % lies below the mean in 2.5 % + 0.084 g of all cases, by the
-first term of Edgeworth's series. |g| is at most the root of the largest fraction of a value in the sum of squares. From
-a fraction of 1 % on, where g may be 0.1 (where channels agree, 0.17), neither a bias against the largest deviation nor
-its absence is reported. A bias towards the largest deviation is reported, as there the interval is too wide. Where the
-variance exists the fraction falls with the runs.
+**Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that
+a few runs may have none: their mean is then too dark and their spread too small. For a sum of
+independent deviations x with skewness g = sum of x^3 over (sum of x^2)^(3/2), an interval of 95 %
+lies below the mean in 2.5 % + 0.084 g of all cases, by the first term of Edgeworth's series. |g| is
+at most the root of the largest fraction of a value in the sum of squares. From a fraction of 1 %
+on, where g may be 0.1 (where channels agree, 0.17), neither a bias against the largest deviation
+nor its absence is reported. A bias towards the largest deviation is reported, as there the interval
+is too wide. Where the variance exists the fraction falls with the runs.
 
-**Noise between pixels.** With n_i = (e_i - mean of e) sqrt(N/(N - 1)) the error spectrum is the periodogram of n_i over
-its mean square, in rings of the frequency: white noise is 1 everywhere, however unequal the pixels are (Celarek, Jakob,
-Wimmer and Lehtinen 2019). The low fraction is its mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5
-it is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over the value before, times
-2 sqrt(pi) s: 1 for white noise.
+**Noise between pixels.** With n_i = (e_i - mean of e) sqrt(N/(N - 1)) the error spectrum is the
+periodogram of n_i over its mean square, in rings of the frequency: white noise is 1 everywhere,
+however unequal the pixels are (Celarek, Jakob, Wimmer and Lehtinen 2019). The low fraction is its
+mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5 it is filtered. The blur gain
+is the root mean square of n after a Gaussian of deviation s over the value before, times 2 sqrt(pi)
+s: 1 for white noise.
 """
 
 import math
@@ -54,14 +61,21 @@ from airlight.validation.estimates.quadrature import known_to, known_words
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
 from airlight.validation.motion.lag import SURE
 from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
-from airlight.validation.statistics.samples import first_equal, mean_of_runs, student, student_quantile
+from airlight.validation.statistics.samples import (
+    first_equal,
+    mean_of_runs,
+    student,
+    student_quantile,
+)
 
 RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
 GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is reported
 _LOW = 0.125  # cycles a pixel
-_SHARED = 0.1  # correlation of two runs: ten that share as much are worth five, as 10/(1 + 9/10) is 5.3
-_DOUBTFUL = 0.01  # of the sum of squares: a single value from which on the interval may not hold, see the module
+# correlation of two runs: ten that share as much are worth five, as 10/(1 + 9/10) is 5.3
+_SHARED = 0.1
+# of the sum of squares: a single value from which on the interval may not hold, see the module
+_DOUBTFUL = 0.01
 _NO_NOISE = fact(0.0)
 _NAMED = 5  # files that a sentence names
 _POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
@@ -85,9 +99,12 @@ class Noise:
     blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
     blur_gain: tuple[float, ...] = ()
     seconds: float | None = None  #: of a run [s]
-    root_bias: float | None = None  #: the root of the squared bias, where it is above zero by two errors
-    efficiency: float | None = None  #: 1/(V T), which stays where samples and time are both doubled [1/s]
-    seconds_to: Mapping[float, float | None] = field(default_factory=dict)  #: by error, see `time_to`
+    #: the root of the squared bias, where it is above zero by two errors
+    root_bias: float | None = None
+    #: 1/(V T), which stays where samples and time are both doubled [1/s]
+    efficiency: float | None = None
+    #: by error, see `time_to`
+    seconds_to: Mapping[float, float | None] = field(default_factory=dict)
     correlated: tuple[tuple[int, int], ...] = ()  #: pairs of runs whose noise is
     verdict: str = ""  #: on bias and noise, in words
 
@@ -107,7 +124,8 @@ class Noise:
             return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
         if self.correlated:
             return (
-                "whether there is a bias cannot be told: runs are not independent, and averages of them have another "
+                "whether there is a bias cannot be told: runs are not independent, and averages of "
+                "them have another "
                 "error; expected renders with different seeds and no history"
             )
         if (
@@ -116,7 +134,8 @@ class Noise:
         ):
             kind = "brighter" if self.largest_deviation > 0 else "darker"
             return (
-                f"whether there is a bias cannot be told: one value has {100 * self.largest_fraction:.2g} % of the "
+                "whether there is a bias cannot be told: one value has "
+                f"{100 * self.largest_fraction:.2g} % of the "
                 f"variance of {self.runs} runs, so still {kind} ones may be missing; add runs"
             )
         if low <= 0 <= high and self.root_bias is None:
@@ -126,13 +145,17 @@ class Noise:
         return f"a bias of {(low + high) / 2:+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
 
     def time_to(self, error: float) -> float | None:
-        """Return the time until averaged runs have an error [s]; infinite where the bias is larger."""
+        """Return the time until averaged runs have an error [s]; infinite
+        where the bias is larger.
+        """
         if self.seconds is None or self.variance.value is None or self.correlated:
             return None
         if self.runs == 1:  # nothing to average
             return self.seconds if self.relative_rmse <= error else math.inf
         bias = 0.0 if self.root_bias is None else self.root_bias**2
-        return self.variance.value * self.seconds / (error**2 - bias) if error**2 > bias else math.inf
+        return (
+            self.variance.value * self.seconds / (error**2 - bias) if error**2 > bias else math.inf
+        )
 
     def after(self, runs: float) -> float:
         """Return the error of so many averaged runs; NaN where they are not independent."""
@@ -145,13 +168,16 @@ class Noise:
 def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
     """Return the noise of renders of a frame; all of the error of a single one is bias.
 
-    `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, finite; one of a renderer
-    without random numbers; `seconds`: what one takes. Several runs that are the same count once. Raises InputError for
-    a dark reference, and where all runs are the same.
+    `reference`: (height, width, channels), finite; `runs`: independent renders of that shape,
+    finite; one of a renderer without random numbers; `seconds`: what one takes. Several runs that
+    are the same count once. Raises InputError for a dark reference, and where all runs are the
+    same.
     """
     given, runs = runs, [runs[number] for number in sorted(set(first_equal(runs)))]
     if len(runs) == 1 < len(given):
-        raise InputError("runs: all are the same, bit by bit; expected renders with different seeds")
+        raise InputError(
+            "runs: all are the same, bit by bit; expected renders with different seeds"
+        )
     count, mean = len(runs), float(reference.mean())
     if not mean > 0:
         raise InputError("runs: the reference is dark: nothing is relative to it")
@@ -177,11 +203,15 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         root_bias=root_bias,
         efficiency=1 / (variance * seconds) if variance and seconds else None,
     )
-    return replace(known, seconds_to={goal: known.time_to(goal) for goal in GOALS}, verdict=known.words())
+    return replace(
+        known, seconds_to={goal: known.time_to(goal) for goal in GOALS}, verdict=known.words()
+    )
 
 
 def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
-    """Return the noise with what several runs tell, from their relative errors as they are and blurred."""
+    """Return the noise with what several runs tell, from their relative errors
+    as they are and blurred.
+    """
     count = len(errors)
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
@@ -215,8 +245,8 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
 def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
     """Return the pairs of runs that are no independent ones, see the module.
 
-    `noise`: deviations from the mean over the runs, (runs, height, width, channels); of two runs, each of which is the
-    other's negative, nothing can be said.
+    `noise`: deviations from the mean over the runs, (runs, height, width, channels); of two runs,
+    each of which is the other's negative, nothing can be said.
     """
     count = len(noise)
     if count < 3:
@@ -232,30 +262,41 @@ def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
         return np.asarray(sums[..., pairs[0], pairs[1]] / scale + 1 / (count - 1))
 
     lit = groups[np.trace(groups, axis1=1, axis2=2) > 0]
-    found = estimates(excess(total), excess(total - lit) if len(lit) > 1 else np.empty((0, len(pairs[0]))))
+    found = estimates(
+        excess(total), excess(total - lit) if len(lit) > 1 else np.empty((0, len(pairs[0])))
+    )
     shared = [each.exceeds(_SHARED, SURE) is Answer.YES for each in found]
     return tuple((int(i), int(j)) for i, j, same in zip(*pairs, shared, strict=True) if same)
 
 
 def _blurred(errors: Array, deviation: float) -> Array:
-    return np.array([gaussian_filter(each, (deviation, deviation, 0), mode="wrap") for each in errors])
+    return np.array(
+        [gaussian_filter(each, (deviation, deviation, 0), mode="wrap") for each in errors]
+    )
 
 
 def detectable(runs: int) -> float:
-    """Return the bias, in deviations of one run, that a test of Student at 5 % finds nine times of ten."""
+    """Return the bias, in deviations of one run, that a test of Student at 5 %
+    finds nine times of ten.
+    """
     limit = student_quantile(1 - _LEVEL / 2, runs - 1)
     root = math.sqrt(runs)
 
     def lacking(bias: float) -> float:
-        found = float(nct.sf(limit, runs - 1, bias * root))  # on its side: the other is rarer than 1e-6
+        # on its side: the other is rarer than 1e-6
+        found = float(nct.sf(limit, runs - 1, bias * root))
         return (1.0 if math.isnan(found) else found) - _POWER
 
     return float(brentq(lacking, 0.0, 10 * limit / root))
 
 
 def _spectrum(noise: Array) -> tuple[tuple[float, ...], float]:
-    """Return the error spectrum by ring, and its mean at low frequencies; NaN for rings without a frequency."""
-    power = np.mean(np.abs(np.fft.fft2(noise, axes=(1, 2))) ** 2, axis=(0, 3)) / (noise.shape[1] * noise.shape[2])
+    """Return the error spectrum by ring, and its mean at low frequencies; NaN for
+    rings without a frequency.
+    """
+    power = np.mean(np.abs(np.fft.fft2(noise, axes=(1, 2))) ** 2, axis=(0, 3)) / (
+        noise.shape[1] * noise.shape[2]
+    )
     power /= np.mean(noise**2)
     rows, columns = (np.fft.fftfreq(side) for side in noise.shape[1:3])
     frequency = np.hypot(rows[:, None], columns)
@@ -291,12 +332,16 @@ class NoiseComparison:
         noise, width, height = self.noise, *self.size
         averages = ["unknown: runs are not independent"]
         if not noise.correlated:
-            averages = [f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)]
+            averages = [
+                f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)
+            ]
         lines = [
-            f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.expected}, "
+            f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: "
+            f"{self.expected}, "
             f"pixel {self.pixel}, {known_words(self.known)}",
             f"bias             {noise.bias.percent()}, squared {noise.squared_bias.words()}",
-            f"noise            {noise.deviation.percent()} of a run, variance {noise.variance.words()}; relative RMSE "
+            f"noise            {noise.deviation.percent()} of a run, variance "
+            f"{noise.variance.words()}; relative RMSE "
             f"{100 * noise.relative_rmse:.4g} %",
             f"averaged         {', '.join(averages)}",
             "error spectrum   "
@@ -305,13 +350,20 @@ class NoiseComparison:
             "blurred          "
             + ", ".join(
                 f"{blur:g} px: {100 * error:.3g} % (gain {gain:.3g})"
-                for blur, error, gain in zip(BLURS, noise.blurred_rmse, noise.blur_gain, strict=True)
+                for blur, error, gain in zip(
+                    BLURS, noise.blurred_rmse, noise.blur_gain, strict=True
+                )
             ),
         ]
         if noise.seconds is not None:
-            times = ", ".join(f"{100 * goal:g} %: {time_words(seconds)}" for goal, seconds in noise.seconds_to.items())
+            times = ", ".join(
+                f"{100 * goal:g} %: {time_words(seconds)}"
+                for goal, seconds in noise.seconds_to.items()
+            )
             on = f" on {self.device}" if self.device else ""
-            lines.append(f"time             {1000 * noise.seconds:.4g} ms a run{on}; to an error of {times}")
+            lines.append(
+                f"time             {1000 * noise.seconds:.4g} ms a run{on}; to an error of {times}"
+            )
         lines += [f"note             {note}" for note in self.notes]
         lines += [f"failed           {reason}" for reason in self.failures]
         return [*lines, f"verdict          {noise.verdict}"]
@@ -329,21 +381,28 @@ def compare_runs(
 ) -> NoiseComparison:
     """Compare independent renders of a frame with the reference of its scene.
 
-    `pattern`: the EXR files, # for each digit of their numbers; the rest as of `validation.engine.judge.compare_scene`.
-    Where files do not say what a pixel is, the kind that fits their mean is taken.
+    `pattern`: the EXR files, # for each digit of their numbers; the rest as of
+    `validation.engine.judge.compare_scene`. Where files do not say what a pixel is, the kind that
+    fits their mean is taken.
     """
     paths = run_paths(pattern)
     images = [read_exr(path) for path in paths]
-    layers = [judged_layer(image, path, name=layer, holds=holds) for image, path in zip(images, paths, strict=True)]
+    layers = [
+        judged_layer(image, path, name=layer, holds=holds)
+        for image, path in zip(images, paths, strict=True)
+    ]
     first = layers[0]
     for path, each in zip(paths, layers, strict=True):
         if each.size != first.size:
             raise InputError(
-                f"{path} has {each.size[0]} x {each.size[1]} pixels, {paths[0]} {first.size[0]} x {first.size[1]}"
+                f"{path} has {each.size[0]} x {each.size[1]} pixels, {paths[0]} {first.size[0]} x "
+                f"{first.size[1]}"
             )
     loaded = scene_of_size(scene, first.size, paths[0])
     reference_of = references(loaded, progress)
-    runs, names, notes, failures = _distinct([each.values.astype(np.float64) for each in layers], paths)
+    runs, names, notes, failures = _distinct(
+        [each.values.astype(np.float64) for each in layers], paths
+    )
     finite = np.isfinite(runs).all(axis=0)
 
     mean = replace(first, values=np.where(finite, runs, np.nan).mean(axis=0))
@@ -354,11 +413,17 @@ def compare_runs(
     filled, nonfinite = list(np.where(finite, runs, reference)), int((~finite).sum())
     noise = measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3)
     if nonfinite:
-        wrong = ", ".join(name for name, run in zip(names, runs, strict=True) if not np.isfinite(run).all())
+        wrong = ", ".join(
+            name for name, run in zip(names, runs, strict=True) if not np.isfinite(run).all()
+        )
         failures.append(f"{nonfinite} values are NaN or infinite in some run: {wrong}")
     if noise.correlated:
         pairs = ", ".join(f"{names[i]} and {names[j]}" for i, j in noise.correlated[:_NAMED])
-        more = "" if len(noise.correlated) <= _NAMED else f" and {len(noise.correlated) - _NAMED} more pairs"
+        more = (
+            ""
+            if len(noise.correlated) <= _NAMED
+            else f" and {len(noise.correlated) - _NAMED} more pairs"
+        )
         notes.append(f"the noise of {pairs}{more} is correlated: they are no independent renders")
     if margin is not None and (noise.correlated or max(map(abs, noise.bias_ci)) > margin):
         failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
@@ -378,7 +443,9 @@ def compare_runs(
     )
 
 
-def _distinct(runs: list[Array], paths: Sequence[Path]) -> tuple[Array, list[str], list[str], list[str]]:
+def _distinct(
+    runs: list[Array], paths: Sequence[Path]
+) -> tuple[Array, list[str], list[str], list[str]]:
     """Return the runs that count, their files, notes on the others, and failures.
 
     A run without a finite value, and one that is the same as one before it, do not count.
@@ -389,30 +456,39 @@ def _distinct(runs: list[Array], paths: Sequence[Path]) -> tuple[Array, list[str
         failures.append(f"no value is finite in {', '.join(blank)}: left out")
     if len(blank) == len(runs):
         raise InputError(f"{paths[0].parent}: no run has a finite value: all are NaN or infinite")
-    named = [(run, path.name) for run, path in zip(runs, paths, strict=True) if np.isfinite(run).any()]
+    named = [
+        (run, path.name) for run, path in zip(runs, paths, strict=True) if np.isfinite(run).any()
+    ]
     firsts = first_equal([run for run, _ in named])
     counting = [named[number] for number in sorted(set(firsts))]
     same = [f"{named[n][1]} is {named[first][1]}" for n, first in enumerate(firsts) if first < n]
     if same:
         more = "" if len(same) <= _NAMED else f" and {len(same) - _NAMED} more"
         notes.append(
-            f"runs are the same, bit by bit, as with one seed used twice: {', '.join(same[:_NAMED])}{more}; each image "
+            "runs are the same, bit by bit, as with one seed used twice: "
+            f"{', '.join(same[:_NAMED])}{more}; each image "
             f"counts once: {len(counting)} of {len(named)}"
         )
     if len(counting) < 2:
         words = "all are the same, bit by bit" if same else "one of them alone has finite values"
-        raise InputError(f"{paths[0].parent}: {words}; expected two or more renders with different seeds")
+        raise InputError(
+            f"{paths[0].parent}: {words}; expected two or more renders with different seeds"
+        )
     return np.array([run for run, _ in counting]), [name for _, name in counting], notes, failures
 
 
 def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
-    """Return the files of a pattern in which # stands for a digit. Raises InputError for fewer than two."""
+    """Return the files of a pattern in which # stands for a digit. Raises
+    InputError for fewer than two.
+    """
     path = Path(pattern)
     paths = sorted(path.parent.glob(path.name.replace("#", "[0-9]")))
     if len(paths) < 2:
         raise InputError(
-            f"{pattern}: {len(paths)} files have such a name; expected two or more independent renders, # for each "
-            "digit of their numbers, such as runs/####.exr, or --frames for the frames of a scene that changes"
+            f"{pattern}: {len(paths)} files have such a name; expected two or more independent "
+            "renders, # for each "
+            "digit of their numbers, such as runs/####.exr, or --frames for the frames of a scene "
+            "that changes"
         )
     return paths
 

@@ -3,7 +3,8 @@
 
 Read in this order:
 
-- `claims.py`: a claim, its figure and the rule that makes its verdict; `claims.toml` has all claims and experiments
+- `claims.py`: a claim, its figure and the rule that makes its verdict; `claims.toml` has
+  all claims and experiments
 - `formulas.py`: printed formulas beside what they must be, what misprints cost, and droplets
 - `shadow_planes.py`: orders and shortcuts of shadow planes in images, and the stencil along a ray
 - `scattering.py`: multiple scattering, and the constant R of bounded media

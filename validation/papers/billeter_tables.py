@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010 measured again, after the light moved.
+"""Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010 measured
+again, after the light moved.
 
-Neither scene is available: `omni-box` stands for that of Fig. 6, `colonnade` for the Sponza atrium and `tangle` for the
-mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all have that of Fig. 7. The published hall has
-one map; ours has a lamp that shines in all directions, so its map has six faces in Fig. 7; in Table 1 a spot takes its
-place. The light volume is the paper's mesh; its height field walked without triangles stands beside it as `walk`. The
-paper's marcher evaluates the airlight where the visibility changes.
+Neither scene is available: `omni-box` stands for that of Fig. 6, `colonnade` for the Sponza atrium
+and `tangle` for the mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all
+have that of Fig. 7. The published hall has one map; ours has a lamp that shines in all directions,
+so its map has six faces in Fig. 7; in Table 1 a spot takes its place. The light volume is the
+paper's mesh; its height field walked without triangles stands beside it as `walk`. The paper's
+marcher evaluates the airlight where the visibility changes.
 
 Errors are against the quadrature, at one pixel in `stride` along both axes.
 """
@@ -68,11 +70,15 @@ def _images(size: tuple[int, int]) -> dict[str, Any]:
         for name, (where, method, values) in IMAGES.items():
             if where == scene_name:
                 renderer = partial(prepared, scene, configuration(method, "exact", values))
-                figures |= attempted((f"{name} fps", f"{name} error"), partial(_image, name, renderer, true, stride))
+                figures |= attempted(
+                    (f"{name} fps", f"{name} error"), partial(_image, name, renderer, true, stride)
+                )
     return figures
 
 
-def _image(name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int) -> dict[str, Any]:
+def _image(
+    name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int
+) -> dict[str, Any]:
     ready = renderer()
     error = error_metrics(true, sampled(frame_within(ready).airlight, stride)).relative_rmse
     return {f"{name} error": error, f"{name} fps": _rate(ready)}
@@ -83,7 +89,9 @@ def _rate(renderer: FrameRenderer) -> Figure:
 
 
 def sampled(image: NDArray[Any], stride: int) -> NDArray[Any]:
-    """Return one pixel in `stride` along both axes of an image, beginning at the middle of the first block."""
+    """Return one pixel in `stride` along both axes of an image, beginning at the
+    middle of the first block.
+    """
     return image[stride // 2 :: stride, stride // 2 :: stride]
 
 
@@ -103,12 +111,19 @@ def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
 
 
 def table_scene(name: str, size: tuple[int, int]) -> Any:
-    """Return the `mi.Scene` of a view: a built-in scene, the hall with a spot in place of its lamp."""
+    """Return the `mi.Scene` of a view: a built-in scene, the hall with a
+    spot in place of its lamp.
+    """
     if name != "colonnade":
         return load_scene(name, size).scene
     described = SCENES["colonnade"].build()
     lamp = described["lamp"]
-    cone = {"position": lamp["position"], "target": [-1.13, 0.97, 1.67], "cutoff": 56.7, "beam": 56.7}
+    cone = {
+        "position": lamp["position"],
+        "target": [-1.13, 0.97, 1.67],
+        "cutoff": 56.7,
+        "beam": 56.7,
+    }
     described["lamp"] = light("spot", lamp["intensity"]["value"], **cone)
     scene = mi.load_dict(described)
     resize(scene, size)
@@ -132,7 +147,9 @@ def frame_within(renderer: FrameRenderer) -> Frame:
     """Render a frame, unless frames take too long for timing."""
     frame, took = timed(lambda: render_frame(renderer))
     if took.seconds > _LONGEST:
-        raise TimeoutError(f"a frame takes {took.seconds:.0f} s, more than the limit of {_LONGEST:g} s")
+        raise TimeoutError(
+            f"a frame takes {took.seconds:.0f} s, more than the limit of {_LONGEST:g} s"
+        )
     return frame
 
 

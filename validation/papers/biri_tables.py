@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Table 2 and the times of section 6 of Biri, Arques, Michelin 2006 measured again, at the published sizes.
+"""Table 2 and the times of section 6 of Biri, Arques, Michelin 2006 measured
+again, at the published sizes.
 
-*As published* has everything that the paper has at once: its polynomial, its order of the planes, Gamma at vertices, a
-frame buffer of 8 bits, the cone of 32 planes about a spot. "A reasonable intensity for the light source" leaves nothing
-to clamp: the buffer is full at the radiance that all but one in a thousand pixels of the true frame stay below.
+*As published* has everything that the paper has at once: its polynomial, its order of the planes,
+Gamma at vertices, a frame buffer of 8 bits, the cone of 32 planes about a spot. "A reasonable
+intensity for the light source" leaves nothing to clamp: the buffer is full at the radiance that all
+but one in a thousand pixels of the true frame stay below.
 """
 
 from collections.abc import Mapping
@@ -21,14 +23,20 @@ from airlight.validation.scenes.loading import load_scene, resize
 from airlight.validation.study.configuration import configuration, prepared
 from airlight.validation.study.frame_times import moved_light
 
-_COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]
+# size of the frames that are compared: the default report keeps these references [pixels]
+_COMPARED = (320, 240)
 _SECONDS = 0.1  # for each timing [s]
 
 #: All that the paper has at once, beside its polynomial and the cone of a spot.
-AS_PUBLISHED: Mapping[str, Any] = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "media": "paper"}
+AS_PUBLISHED: Mapping[str, Any] = {
+    "order": "paper",
+    "evaluation": "vertex",
+    "buffer": "8bit",
+    "media": "paper",
+}
 
-#: By the name of its figures a scene that stands for one of the paper, its size [pixels], and the edges of the paper's
-#: cone over the spot, 0 where there is none.
+#: By the name of its figures a scene that stands for one of the paper, its size [pixels], and the
+#: edges of the paper's cone over the spot, 0 where there is none.
 ENTRIES: Mapping[str, tuple[str, tuple[int, int], int]] = {
     "sphere-spot 800": ("sphere-spot", (800, 600), 32),
     "sphere-spot 1024": ("sphere-spot", (1024, 768), 32),
@@ -42,7 +50,8 @@ ENTRIES: Mapping[str, tuple[str, tuple[int, int], int]] = {
 def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, Any]:
     """Return rates as published and by our exact form, and the largest median error.
 
-    All images have the published width and height times `scale`; each timing takes about so many `seconds`.
+    All images have the published width and height times `scale`; each timing takes
+    about so many `seconds`.
     """
     figures: dict[str, Any] = {}
     errors = []
@@ -54,7 +63,9 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         reference = reference_image(loaded)
         whole = reference.airlight + reference.surface
         white = float(np.quantile(whole.max(axis=-1), 0.999))
-        chosen = configuration("shadow-planes-2006", "taylor", {**AS_PUBLISHED, "cone": cone, "white": white})
+        chosen = configuration(
+            "shadow-planes-2006", "taylor", {**AS_PUBLISHED, "cone": cone, "white": white}
+        )
         frame = render_frame(prepared(read_scene(loaded), chosen))
         errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))
         forms = chosen, configuration("shadow-planes", "exact")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The claims of papers as data, and the rule that makes a verdict of what a paper says and what was measured.
+"""The claims of papers as data, and the rule that makes a verdict of what a paper
+says and what was measured.
 
-`claims.toml` has every claim: where it stands, its words, the experiment and the figure that measure it, and which way
-the paper says that the figure lies. Nobody types a verdict in:
+`claims.toml` has every claim: where it stands, its words, the experiment and the figure that
+measure it, and which way the paper says that the figure lies. Nobody types a verdict in:
 
 reproduced      the figure lies where the paper says
 not reproduced  it does not, and the claim is about mathematics or accuracy, which no machine changes
@@ -10,7 +11,8 @@ differs         it does not, and the figure depends on the machine or on a scene
 impossible      the figure cannot be measured here, or its interval reaches into both answers: the words say which
                 interval that is, a 95 % interval or the quartiles of repeated times
 
-A row without a direction is a number beside ours and has no verdict: rates of graphics cards of 2004 to 2016 are such.
+A row without a direction is a number beside ours and has no verdict: rates of graphics cards
+of 2004 to 2016 are such.
 """
 
 import importlib
@@ -24,7 +26,12 @@ from typing import Any, NamedTuple
 
 from airlight.validation.statistics.estimate import Answer
 
-VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
+VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = (
+    "reproduced",
+    "not reproduced",
+    "differs",
+    "impossible",
+)
 EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
@@ -39,12 +46,18 @@ class Figure(NamedTuple):
     value: float
     low: float
     high: float
-    interval: str = ""  #: what the ends are: `QUARTILES` of repetitions, `INTERVAL`; empty for a number without chance
+    #: what the ends are: `QUARTILES` of repetitions, `INTERVAL`; empty for a number without chance
+    interval: str = ""
 
     def over(self, other: "Figure") -> "Figure":
         """Return the quotient of two positive numbers; its ends are the widest that it can have."""
         names = dict.fromkeys(name for name in (self.interval, other.interval) if name)
-        return Figure(self.value / other.value, self.low / other.high, self.high / other.low, " over ".join(names))
+        return Figure(
+            self.value / other.value,
+            self.low / other.high,
+            self.high / other.low,
+            " over ".join(names),
+        )
 
 
 def quartiles(values: Sequence[float]) -> Figure:
@@ -64,13 +77,16 @@ class Claim:
     figure: str = ""  #: name of the number that the experiment gives, or 'a / b'
     direction: str = ""  #: of `DIRECTIONS`; none for a number without a verdict
     published: float | None = None  #: the number that the paper prints
-    limit: float | Sequence[float] | None = None  #: the number that its words are read as; two for 'within'
+    #: the number that its words are read as; two for 'within'
+    limit: float | Sequence[float] | None = None
     tolerance: float = 0.0  #: of 'equal' and 'unequal', relative; absolute where the number is 0
     unit: str = ""
     why: str = ""  #: why the words are read so, or why nothing can be measured
     ours: bool = False  #: the figure depends on the machine or on a scene of our own
-    verdict: str | None = None  #: of `VERDICTS`, once it is judged; None for a number without a direction
-    measured: float | None = None  #: the figure, None before and where there is none, with the ends of its interval
+    #: of `VERDICTS`, once it is judged; None for a number without a direction
+    verdict: str | None = None
+    #: the figure, None before and where there is none, with the ends of its interval
+    measured: float | None = None
     low: float | None = None
     high: float | None = None
     interval: str = ""  #: what these ends are, as of `Figure`
@@ -91,7 +107,9 @@ class Claim:
         return low, math.inf if self.direction == "at least" else self.goal + away
 
     def holds(self, low: float, high: float) -> Answer:
-        """Return whether a number between two ends lies where the paper says; unknown where some of them do."""
+        """Return whether a number between two ends lies where the paper says;
+        unknown where some of them do.
+        """
         least, most = self.bounds
         inside, outside = least <= low and high <= most, high < least or low > most
         if not (inside or outside):
@@ -111,9 +129,11 @@ class Claim:
 class Experiment:
     """A function that measures the figures of some claims."""
 
-    function: str  #: of a module beside this one, 'module:function'; called without arguments it gives the figures
+    #: of a module beside this one, 'module:function'; called without arguments it gives the figures
+    function: str
     seconds: float  #: that it takes on two threads, about
-    effort: str = EFFORTS[-1]  #: the least of `EFFORTS` whose reports have it; 'paper': only the command
+    #: the least of `EFFORTS` whose reports have it; 'paper': only the command
+    effort: str = EFFORTS[-1]
 
     def run(self) -> dict[str, Any]:
         """Return the `Figures`."""
@@ -139,7 +159,9 @@ def experiments() -> dict[str, Experiment]:
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """Return every claim, in the order of the file; a block with `rows` is as many claims that share its keys."""
+    """Return every claim, in the order of the file; a block with `rows` is as many
+    claims that share its keys.
+    """
     found = []
     for block in _data()["claims"]:
         shared = {key: value for key, value in block.items() if key != "rows"}
@@ -153,7 +175,9 @@ def taken(claim: Claim, figures: Figures) -> Figure | str:
     for part in parts:
         if isinstance(part, str):
             return part
-    figures_of = [Figure(*part) if isinstance(part, Sequence) else Figure(part, part, part) for part in parts]
+    figures_of = [
+        Figure(*part) if isinstance(part, Sequence) else Figure(part, part, part) for part in parts
+    ]
     figure = reduce(Figure.over, figures_of)
     if not all(map(math.isfinite, figure[:3])):
         return "the measured figure is not finite"
@@ -161,7 +185,9 @@ def taken(claim: Claim, figures: Figures) -> Figure | str:
 
 
 def verdict(claim: Claim, figure: Figure) -> str:
-    """Return the verdict on a claim. Where the interval reaches into both answers, nothing can be told."""
+    """Return the verdict on a claim. Where the interval reaches into both
+    answers, nothing can be told.
+    """
     answer = claim.holds(figure.low, figure.high)
     if answer is Answer.UNKNOWN:
         return IMPOSSIBLE
@@ -169,17 +195,26 @@ def verdict(claim: Claim, figure: Figure) -> str:
 
 
 def judged(claim: Claim, figures: Figures) -> Claim:
-    """Return a claim with what was measured; `why` says why there is no figure, or by which rule it is judged."""
+    """Return a claim with what was measured; `why` says why there is no figure, or by
+    which rule it is judged.
+    """
     figure = taken(claim, figures) if claim.experiment else claim.why
     if isinstance(figure, str):
-        return replace(claim, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
-    claim = replace(claim, measured=figure.value, low=figure.low, high=figure.high, interval=figure.interval)
+        return replace(
+            claim,
+            verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None,
+            why=figure,
+        )
+    claim = replace(
+        claim, measured=figure.value, low=figure.low, high=figure.high, interval=figure.interval
+    )
     if not claim.direction:
         return claim
     found = verdict(claim, figure)
     if found == IMPOSSIBLE:
-        ends = (
-            f"{figure.interval or 'the interval'} from {figure.low:.3g} to {figure.high:.3g}, both answers lie between"
+        interval = f"from {figure.low:.3g} to {figure.high:.3g}"
+        ends = f"{figure.interval or 'the interval'} {interval}, both answers lie between"
+        return replace(
+            claim, verdict=found, why=f"cannot be told: {ends}; {claim.rule}: {claim.why}"
         )
-        return replace(claim, verdict=found, why=f"cannot be told: {ends}; {claim.rule}: {claim.why}")
     return replace(claim, verdict=found, why=f"{claim.rule}: {claim.why}")

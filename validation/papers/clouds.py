@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figs 11 and 12 and section 9 of Bouthors, Neyret, Max, Bruneton, Crassin 2008 again, against light paths.
+"""Figs 11 and 12 and section 9 of Bouthors, Neyret, Max, Bruneton, Crassin 2008
+again, against light paths.
 
-* Fig. 12, results of the method: `stratocumulus` and `cumulus` by `cloud-collectors`, beside the reference.
+* Fig. 12, results of the method: `stratocumulus` and `cumulus` by
+  `cloud-collectors`, beside the reference.
 * Fig. 11a, a gap that depth maps take for cloud: `ring`, the parts of it that another part shades.
-* Fig. 11b, two collectors of equal importance: `two-lobes`. From each point one search starts on the left and one on
-  the right; where they end apart there are two collectors, and the method has one.
-* Section 9, frames a second at 800 x 600: frames go on with the collectors of the last one, and the light moves, so
-  that its maps are made again. Clouds are of the paper's kinds and sizes, noise is in a grid of 128^3 voxels, where the
-  paper's shader evaluates noise at each step and stores distances in 512^3.
+* Fig. 11b, two collectors of equal importance: `two-lobes`. From each point one search starts on
+  the left and one on the right; where they end apart there are two collectors, and the method has
+  one.
+* Section 9, frames a second at 800 x 600: frames go on with the collectors of the last one, and the
+  light moves, so that its maps are made again. Clouds are of the paper's kinds and sizes, noise is
+  in a grid of 128^3 voxels, where the paper's shader evaluates noise at each step and stores
+  distances in 512^3.
 """
 
 import math
@@ -20,7 +24,12 @@ import numpy as np
 
 from airlight.realtime.clouds.canonical.coordinates import SETS, order_layer
 from airlight.realtime.clouds.collector_search import Collector
-from airlight.realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
+from airlight.realtime.frame.renderer import (
+    frame_renderer,
+    render_frame,
+    run_cast_and_shade,
+    run_method,
+)
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 from airlight.realtime.scene.read_scene import Scene, read_scene
@@ -47,14 +56,19 @@ _MOST = 16  #: crossings of a ray towards the sun
 _ASIDE, _WIDTH = 250.0, 60.0  #: where searches start beside a point, and how wide [m]
 _APART = 1.0  #: distance of their ends from which on there are two [sigma]
 
-#: Three steps at most, one where the collector of the last frame still is one (within 0.05 of its spread).
+#: Three steps at most, one where the collector of the last frame still is one
+#: (within 0.05 of its spread).
 WARM: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
 
 
 def clouds_figures() -> dict[str, Any]:
-    """Return light over that of the reference in Figs 11 and 12, and what shaded surfaces of Fig. 11a lack [%]."""
+    """Return light over that of the reference in Figs 11 and 12, and what shaded
+    surfaces of Fig. 11a lack [%].
+    """
     every = np.ones(SIZE[::-1], dtype=bool)
-    figures: dict[str, Any] = {name: _ratio(*pair_of(shown(name, SIZE), SAMPLES), every) for name in RESULTS}
+    figures: dict[str, Any] = {
+        name: _ratio(*pair_of(shown(name, SIZE), SAMPLES), every) for name in RESULTS
+    }
     fewer = SAMPLES // _FEWER
     loaded = shown(GAP, SIZE)
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
@@ -65,12 +79,16 @@ def clouds_figures() -> dict[str, Any]:
     figures["gap, lost"] = Figure(value, least, most, INTERVAL)
     loaded = shown(LOBES, SIZE)
     two = _two_collectors(loaded)
-    figures["lobes, two"] = _ratio(*pair_of(loaded, fewer), two) if two.any() else "no pixel has two collectors"
+    figures["lobes, two"] = (
+        _ratio(*pair_of(loaded, fewer), two) if two.any() else "no pixel has two collectors"
+    )
     return figures
 
 
 def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> Figure:
-    """Return the light of an image over that of the reference in some pixels, with its 95 % interval."""
+    """Return the light of an image over that of the reference in some
+    pixels, with its 95 % interval.
+    """
     light, expected = image[where].sum(), reference[where].sum()
     # Errors of colours of one pixel come from the same paths; they are added, not their squares.
     half = student_quantile(0.5 + LEVEL / 2, math.inf) * np.sqrt((error[where].sum(-1) ** 2).sum())
@@ -79,8 +97,12 @@ def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> Figure
 
 
 def cloud_frames() -> dict[str, Any]:
-    """Return the frames a second of section 9: after the light moved, with the collectors of the last frame."""
-    timings = {name: _light_moved(read_scene(load_scene(name, (800, 600)).scene)) for name in FRAMES}
+    """Return the frames a second of section 9: after the light moved, with the
+    collectors of the last frame.
+    """
+    timings = {
+        name: _light_moved(read_scene(load_scene(name, (800, 600)).scene)) for name in FRAMES
+    }
     return {name: quartiles(timing.rate) for name, timing in timings.items()}
 
 
@@ -94,15 +116,17 @@ def _light_moved(scene: Scene) -> Timing:
 
     maps = time_repeated(lambda: renderer.prepare(scene), seconds=1.0)
     frame = time_repeated(work, seconds=1.0)
-    median, low, high = (own + more for own, more in zip(maps.quartiles, frame.quartiles, strict=True))
+    median, low, high = (
+        own + more for own, more in zip(maps.quartiles, frame.quartiles, strict=True)
+    )
     return Timing(median, low, high, min(maps.repetitions, frame.repetitions))
 
 
 def shown(name: str, size: tuple[int, int]) -> LoadedScene:
     """Return a scene of these figures.
 
-    Those of Fig. 11 are filled with droplets, whose tables are there already; over the ring the sun stands so high that
-    the upper part shades the lower.
+    Those of Fig. 11 are filled with droplets, whose tables are there already; over the ring the sun
+    stands so high that the upper part shades the lower.
     """
     if name in RESULTS:
         return load_scene(name, size)
@@ -115,10 +139,16 @@ def shown(name: str, size: tuple[int, int]) -> LoadedScene:
     return loaded
 
 
-def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None) -> tuple[Array, Array, Array]:
-    """Return a scene by the method, by light paths, so many a pixel, and their standard error [W/(m^2 sr)]."""
+def pair_of(
+    loaded: LoadedScene, samples: int, progress: Progress | None = None
+) -> tuple[Array, Array, Array]:
+    """Return a scene by the method, by light paths, so many a pixel, and their
+    standard error [W/(m^2 sr)].
+    """
     frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
-    traced = monte_carlo_reference(loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress).image
+    traced = monte_carlo_reference(
+        loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress
+    ).image
     method, paths, error = (
         np.array(layer, dtype=np.float64)
         for layer in (frame.airlight, traced.layers["airlight"], traced.layers["airlight_se"])
@@ -127,27 +157,39 @@ def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None)
 
 
 def _shaded(clouds: CloudScene) -> Bools:
-    """Return which pixel-centre rays meet a cloud at a point whose way to the sun leaves the cloud and enters again."""
+    """Return which pixel-centre rays meet a cloud at a point whose way to the sun leaves
+    the cloud and enters again.
+    """
     toward = -np.asarray(clouds.suns[0].direction, dtype=np.float64)
-    first = clouds.scene.ray_intersect(_rays(np.broadcast_to(clouds.origin, clouds.direction.shape), clouds.direction))
+    first = clouds.scene.ray_intersect(
+        _rays(np.broadcast_to(clouds.origin, clouds.direction.shape), clouds.direction)
+    )
     going = np.array(first.is_valid(), dtype=bool)
     step = 1e-4 * float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     origin = np.array(first.p, dtype=np.float64).T + step * clouds.direction
     enters = np.zeros_like(going)
     for _ in range(_MOST):
-        hit = clouds.scene.ray_intersect(_rays(origin, np.broadcast_to(toward, origin.shape)), going)
+        hit = clouds.scene.ray_intersect(
+            _rays(origin, np.broadcast_to(toward, origin.shape)), going
+        )
         going &= np.array(hit.is_valid(), dtype=bool)
         enters |= going & ((np.array(hit.n, dtype=np.float64).T @ toward) < 0)
-        origin = np.where(going[:, None], np.array(hit.p, dtype=np.float64).T + step * toward, origin)
+        origin = np.where(
+            going[:, None], np.array(hit.p, dtype=np.float64).T + step * toward, origin
+        )
     return enters
 
 
 def _rays(origin: Array, direction: Array) -> Any:
-    return mi.Ray3f(mi.Point3f(np.ascontiguousarray(origin.T)), mi.Vector3f(np.ascontiguousarray(direction.T)))
+    return mi.Ray3f(
+        mi.Point3f(np.ascontiguousarray(origin.T)), mi.Vector3f(np.ascontiguousarray(direction.T))
+    )
 
 
 def _two_collectors(loaded: LoadedScene) -> Bools:
-    """Return the pixels in which two searches end apart in some set of orders, both with light, (height, width)."""
+    """Return the pixels in which two searches end apart in some set of orders, both
+    with light, (height, width).
+    """
     sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-_ASIDE, _ASIDE)]
     found = []
     for (left, light_left, width), (right, light_right, _) in zip(*sides, strict=True):
@@ -157,8 +199,12 @@ def _two_collectors(loaded: LoadedScene) -> Bools:
 
 
 def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array]]:
-    """Return by set places, light and widths of the collectors that searches end with which start beside points."""
-    renderer = frame_renderer(scene, METHODS[_METHOD], extra_layers=True, start="previous", iterations=40)
+    """Return by set places, light and widths of the collectors that searches end with
+    which start beside points.
+    """
+    renderer = frame_renderer(
+        scene, METHODS[_METHOD], extra_layers=True, start="previous", iterations=40
+    )
     cache = first_frame(renderer)
     start = _each(cache.carried, lambda collector: _beside(collector, aside))
     cast, by_light = run_cast_and_shade(renderer)
@@ -184,6 +230,9 @@ def _each(carried: Any, change: Callable[[Collector], Collector]) -> Any:
 
 def _beside(collector: Collector, aside: float) -> Collector:
     zero = dr.zeros(type(collector.width), dr.width(collector.width))
-    made = Collector(type(collector.centre)(zero + aside, zero, zero), dr.select(collector.width > 0, zero + _WIDTH, 0))
+    made = Collector(
+        type(collector.centre)(zero + aside, zero, zero),
+        dr.select(collector.width > 0, zero + _WIDTH, 0),
+    )
     dr.eval(made)
     return made

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The functions that Bouthors 2008, section 5.2, fits to the light of slabs: those of T, which Fig. 8 draws.
+r"""The functions that Bouthors 2008, section 5.2, fits to the light of slabs: those
+of T, which Fig. 8 draws.
 
 With theta the scattering angle and the paper's functions in capitals, lengths in mean free paths,
 
     T = P(theta) A X mu_L log(d + D)/log(B + D) exp(-(d - B)^2/(2 C^2)),     B = B1(t, mu) - B2(t, mu_L),
 
-A, C, D of (t, mu), X of (t, mu_L). The paper prints no fitted value, so all are fitted here, one set of orders at a
-time, by least squares as the paper says.
+A, C, D of (t, mu), X of (t, mu_L). The paper prints no fitted value, so all are fitted here, one
+set of orders at a time, by least squares as the paper says.
 
-As printed, the logarithms depend on the unit of length, change sign at d + D = 1, and the quotient is singular at
-B + D = 1: D is kept above 1.01 and B + D above 1.05, in mean free paths.
+As printed, the logarithms depend on the unit of length, change sign at d + D = 1, and the quotient
+is singular at B + D = 1: D is kept above 1.01 and B + D above 1.05, in mean free paths.
 
-A, B1, C, D, X and B2 are tables, linear between entries in the logarithm of the thickness, in the angle of the
-direction and in the coordinate of the sun.
+A, B1, C, D, X and B2 are tables, linear between entries in the logarithm of the thickness, in the
+angle of the direction and in the coordinate of the sun.
 """
 
 from dataclasses import dataclass
@@ -33,7 +34,8 @@ _HORIZON = 5e-4  # cosine of the entry at mu = 0
 _LEAST_D, _LEAST_SUM = 1.01, 1.05
 _FLOOR = 0.02  # of the brightest of a thickness, below which errors count less
 _ROUNDS = 2  # of P and the other functions
-_EVALUATIONS = 12  # of a fit: it then ends within some thousandths, and the form misses T by 10 to 30 %
+# of a fit: it then ends within some thousandths, and the form misses T by 10 to 30 %
+_EVALUATIONS = 12
 _EXPONENTS = (-200, 50)  # of A X, and +-14 of D: without light nothing else bounds them
 _NARROWEST = 1e-3  # of the widths C, in thicknesses
 
@@ -47,10 +49,12 @@ class FittedRadiance:
     of_suns: Array  #: (thicknesses, suns, 2): log X, B2
 
     def __call__(self, t: float, d: float, mu: Array, mu_l: float) -> Array:
-        """Return T in the plane of the sun [1/sr]; the nearest entry stands in outside of the tables.
+        """Return T in the plane of the sun [1/sr]; the nearest entry stands
+        in outside of the tables.
 
-        `t`, `d`: thickness of the slab and depth of the point [mean free paths]; `mu`: cosines of the directions in
-        which light leaves the point with the normal of the lit face; `mu_l`: of the sun's zenith angle.
+        `t`, `d`: thickness of the slab and depth of the point [mean free paths]; `mu`: cosines of
+        the directions in which light leaves the point with the normal of the lit face; `mu_l`: of
+        the sun's zenith angle.
         """
         from scipy.interpolate import RegularGridInterpolator
 
@@ -78,7 +82,9 @@ class FittedRadiance:
 
 @dataclass(frozen=True)
 class _Samples:
-    """Points (thicknesses, depths, suns, directions, azimuths), and T of one set of orders there."""
+    """Points (thicknesses, depths, suns, directions, azimuths), and T of
+    one set of orders there.
+    """
 
     t: Array
     d: Array
@@ -89,7 +95,9 @@ class _Samples:
 
     @property
     def scale(self) -> Array:
-        """By which an error is divided: T itself, and a fraction of the brightest where T is dim."""
+        """By which an error is divided: T itself, and a fraction of the
+        brightest where T is dim.
+        """
         return self.T + _FLOOR * self.T.max(axis=(1, 2, 3, 4), keepdims=True) + 1e-30
 
 
@@ -99,7 +107,10 @@ def fit_radiance(look_up: Transport, types: ArrayTypes) -> tuple[FittedRadiance,
     `look_up`: the canonical transport; `types`: of its numbers.
     """
     last = len(SETS) - 1
-    return tuple(_fit_set(each, isotropic=number == last) for number, each in enumerate(_samples(look_up, types)))
+    return tuple(
+        _fit_set(each, isotropic=number == last)
+        for number, each in enumerate(_samples(look_up, types))
+    )
 
 
 def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
@@ -109,7 +120,9 @@ def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
     shape = (_THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS)
 
     def along(axis: int, values: Array) -> Array:
-        return np.broadcast_to(values.reshape([-1 if each == axis else 1 for each in range(5)]), shape)
+        return np.broadcast_to(
+            values.reshape([-1 if each == axis else 1 for each in range(5)]), shape
+        )
 
     t, mu_l = along(0, thicknesses), along(2, coordinates.suns(_SUNS))
     mu, phi = along(3, _directions(_DIRECTIONS)), along(4, azimuths)
@@ -126,7 +139,9 @@ def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
 
 
 def _directions(count: int) -> Array:
-    """Return mu = +-(1 - cos(pi v))/2 at even v from -1 to 1, fine at the horizon; the one in the middle is off 0."""
+    """Return mu = +-(1 - cos(pi v))/2 at even v from -1 to 1, fine at the horizon; the
+    one in the middle is off 0.
+    """
     places = np.linspace(-1.0, 1.0, count)
     values = np.sign(places) * (1 - np.cos(np.pi * places)) / 2
     values[count // 2] = _HORIZON
@@ -162,7 +177,10 @@ def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
     for _ in range(_ROUNDS):
         # All functions but P, from where they ended.
         values = np.interp(angles, at, p)
-        fits = [_fit_thickness(samples, number, values[number], start) for number, start in enumerate(starts)]
+        fits = [
+            _fit_thickness(samples, number, values[number], start)
+            for number, start in enumerate(starts)
+        ]
         starts = [fit.x for fit in fits]
         if isotropic:
             break
@@ -173,15 +191,22 @@ def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
         below = np.bincount(bins, (weight * model**2).ravel(), _ANGLES)
         hit = below > 0
         p *= np.interp(at, at[hit], np.maximum(above[hit] / below[hit], 1e-3))
-    return FittedRadiance(p, np.stack([fit.of_directions for fit in fits]), np.stack([fit.of_suns for fit in fits]))
+    return FittedRadiance(
+        p, np.stack([fit.of_directions for fit in fits]), np.stack([fit.of_suns for fit in fits])
+    )
 
 
 def _first_guess(samples: _Samples, number: int) -> Array:
-    """Return log A, B1, C, log (D - 1.01) by direction, then log X, B2 by sun, with which a fit begins."""
+    """Return log A, B1, C, log (D - 1.01) by direction, then log X, B2 by sun,
+    with which a fit begins.
+    """
     T, t = samples.T[number], float(samples.t[number].flat[0])
     typical = max(float(np.median(T[T > 0])) if (T > 0).any() else 1e-30, 1e-30)
-    # A bell far wider than the slab shows no slope in its width, and the evaluations of a fit would leave it so.
-    return np.append(np.tile([np.log(typical), t / 3, t / 2, 0.5], _DIRECTIONS), np.zeros(2 * _SUNS))
+    # A bell far wider than the slab shows no slope in its width, and the evaluations of
+    # a fit would leave it so.
+    return np.append(
+        np.tile([np.log(typical), t / 3, t / 2, 0.5], _DIRECTIONS), np.zeros(2 * _SUNS)
+    )
 
 
 @dataclass(frozen=True)
@@ -202,7 +227,10 @@ def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _F
     d, mu_l = samples.d[number, :, 0, 0, 0], samples.mu_l[number, 0, :, 0, 0]
 
     def tables(x: Array) -> tuple[Array, Array]:
-        of_directions, of_suns = x[: 4 * _DIRECTIONS].reshape(-1, 4).copy(), x[4 * _DIRECTIONS :].reshape(-1, 2)
+        of_directions, of_suns = (
+            x[: 4 * _DIRECTIONS].reshape(-1, 4).copy(),
+            x[4 * _DIRECTIONS :].reshape(-1, 2),
+        )
         of_directions[:, 2] = np.maximum(np.abs(of_directions[:, 2]), _NARROWEST * t)
         of_directions[:, 3] = _LEAST_D + np.exp(np.clip(of_directions[:, 3], -14, 14))
         return of_directions, of_suns
@@ -213,10 +241,16 @@ def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _F
         log_x, b2 = of_suns.T
         b = b1 - b2[:, None]
         ratio = np.log(d[:, None, None] + shift) / np.log(np.maximum(b + shift, _LEAST_SUM))
-        exponent = np.clip(log_a + log_x[:, None], *_EXPONENTS) - (d[:, None, None] - b) ** 2 / (2 * width**2)
+        exponent = np.clip(log_a + log_x[:, None], *_EXPONENTS) - (d[:, None, None] - b) ** 2 / (
+            2 * width**2
+        )
         return (np.exp(exponent) * ratio * mu_l[:, None])[..., None] * p
 
     fitted = least_squares(
-        lambda x: ((model(x) - T) / scale).ravel(), start, method="trf", max_nfev=_EVALUATIONS, x_scale="jac"
+        lambda x: ((model(x) - T) / scale).ravel(),
+        start,
+        method="trf",
+        max_nfev=_EVALUATIONS,
+        x_scale="jac",
     )
     return _Fit(fitted.x, *tables(fitted.x), model(fitted.x))

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Formulas as printed against their correct forms, and the droplets of Bouthors 2008: no image is needed.
+"""Formulas as printed against their correct forms, and the droplets of Bouthors
+2008: no image is needed.
 
-`realtime.kernels.taylor` holds the annex of Biri 2006 as transcribed, `analytic.series` derives it, and
-`analytic.droplets` is Mie's theory. Integrands are written here as the papers print them and integrated by QUADPACK.
+`realtime.kernels.taylor` holds the annex of Biri 2006 as transcribed, `analytic.series` derives it,
+and `analytic.droplets` is Mie's theory. Integrands are written here as the papers print them and
+integrated by QUADPACK.
 
-The effect of the misprints of the annex, ray by ray: both polynomials of degree 4 run on the set of rays
-`validation.kernels.rays.wide_rays` in float64, so that rounding plays no part. The paper does not claim its polynomial
-everywhere, so the fractions are those of moderate rays, which scenes are made of: optical depth 0.01 to 5 at the
-distance of the light, angle to the light 1 to 179 degrees, length 0.05 to 10 distances.
+The effect of the misprints of the annex, ray by ray: both polynomials of degree 4 run on the set of
+rays `validation.kernels.rays.wide_rays` in float64, so that rounding plays no part. The paper does
+not claim its polynomial everywhere, so the fractions are those of moderate rays, which scenes are
+made of: optical depth 0.01 to 5 at the distance of the light, angle to the light 1 to 179 degrees,
+length 0.05 to 10 distances.
 """
 
 import numpy as np
@@ -16,7 +19,12 @@ from scipy.integrate import quad
 from airlight.analytic.droplets import Modified, optics
 from airlight.analytic.phase import Hazy, phase_from_words
 from airlight.analytic.series import taylor_coefficients
-from airlight.realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor, taylor_printed
+from airlight.realtime.kernels.taylor import (
+    PRINTED_PHASES,
+    printed_coefficients,
+    taylor,
+    taylor_printed,
+)
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.kernels.case_files import Cases
 from airlight.validation.kernels.cases import evaluate_cases, relative_error
@@ -27,8 +35,16 @@ _HAZY = Hazy()
 
 
 def formulas() -> dict[str, float]:
-    """Return printed formulas over their correct values, and facts on light in the paper's cloud."""
-    return {"biri angle": _angular_form()} | _annex() | _within_ten_percent() | _cloud_equations() | _droplets()
+    """Return printed formulas over their correct values, and facts on
+    light in the paper's cloud.
+    """
+    return (
+        {"biri angle": _angular_form()}
+        | _annex()
+        | _within_ten_percent()
+        | _cloud_equations()
+        | _droplets()
+    )
 
 
 def _worst(ratios: Array) -> float:
@@ -37,12 +53,16 @@ def _worst(ratios: Array) -> float:
 
 
 def _compared(printed: Array, derived: Array) -> float:
-    """Return 1 and what printed values are off by where that is most, over the largest derived one."""
+    """Return 1 and what printed values are off by where that is most, over
+    the largest derived one.
+    """
     return _worst(1 + (printed - derived) / np.max(np.abs(derived)))
 
 
 def _angular_form() -> float:
-    """Return the integral over the angle of Biri 2006, 4.1, over that of eq. 1, the worst of random rays."""
+    """Return the integral over the angle of Biri 2006, 4.1, over that of eq. 1,
+    the worst of random rays.
+    """
     random = np.random.default_rng(20060130)
     # No ray passes the light closer than 0.2: QUADPACK would need to be told of the peak.
     foot, height = random.uniform(-2, 4, _RAYS), random.uniform(0.2, 2, _RAYS)
@@ -70,11 +90,17 @@ def _over_angle(foot: float, height: float, length: float, sigma: float) -> floa
         return np.exp(-sigma * height * path) * float(_HAZY(np.cos(theta + np.pi / 2)))
 
     ends = np.arctan((0 - foot) / height), np.arctan((length - foot) / height)
-    return np.exp(-sigma * foot) / height * quad(integrand, *ends, epsabs=0, epsrel=1e-12, limit=400)[0]
+    return (
+        np.exp(-sigma * foot)
+        / height
+        * quad(integrand, *ends, epsabs=0, epsrel=1e-12, limit=400)[0]
+    )
 
 
 def _annex() -> dict[str, float]:
-    """Return each printed coefficient over the derived one, and the means of the lobes that the annex expands."""
+    """Return each printed coefficient over the derived one, and the means of the
+    lobes that the annex expands.
+    """
     a = np.linspace(0.13, 2.97, 30)  # sigma_t h
     found = {}
     for name in PRINTED_PHASES:
@@ -82,7 +108,9 @@ def _annex() -> dict[str, float]:
         for number, (printed, true) in enumerate(zip(printed_coefficients(a, name), derived)):
             found[f"{name} c{number}"] = _compared(printed, true)
     for name, factor, power in (("hazy", 9, 8), ("murky", 50, 32)):
-        found[f"{name} mean"] = quad(lambda c, f=factor, n=power: 1 + f * ((1 + c) / 2) ** n, -1, 1)[0] / 2
+        found[f"{name} mean"] = (
+            quad(lambda c, f=factor, n=power: 1 + f * ((1 + c) / 2) ** n, -1, 1)[0] / 2
+        )
     return found
 
 
@@ -90,17 +118,24 @@ def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     cases, found = wide_rays(_WIDE_RAYS), {}
     for name, kernel in (("printed", taylor_printed), ("derived", taylor)):
-        error = relative_error(evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double")
+        error = relative_error(
+            evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double"
+        )
         found[f"within 10 %, {name}"] = float(np.mean(error[_moderate(cases)] <= 0.1))
     return found
 
 
 def _cloud_equations() -> dict[str, float]:
-    """Return eq. 1 and 2 of Bouthors 2008 over what they stand for, and what eq. 5 leaves of an isotropic field."""
+    """Return eq. 1 and 2 of Bouthors 2008 over what they stand for, and what eq. 5
+    leaves of an isotropic field.
+    """
     kappa, x0, x1, l0, l1 = 0.05, 3.0, 19.0, 11.0, 4.0
-    depth = quad(lambda x: kappa * np.exp(-kappa * (x + l0 + (l1 - l0) * (x - x0) / (x1 - x0))), x0, x1)[0]
+    depth = quad(
+        lambda x: kappa * np.exp(-kappa * (x + l0 + (l1 - l0) * (x - x0) / (x1 - x0))), x0, x1
+    )[0]
     opacity = quad(lambda x: np.exp(-kappa * x), x0, x1)[0]
-    # A constant field does not change along a path, so the right side of eq. 5, lost light and gained, must be 0.
+    # A constant field does not change along a path, so the right side of eq. 5, lost
+    # light and gained, must be 0.
     gained = quad(lambda cos: 1.0, -1, 1)[0] / 2
     return {
         "eq. 1": float((np.exp(-kappa * (x1 + l1)) - np.exp(-kappa * (x0 + l0))) / depth),
@@ -110,7 +145,9 @@ def _cloud_equations() -> dict[str, float]:
 
 
 def _droplets() -> dict[str, float]:
-    """Return results of Mie's theory for the paper's droplets at 0.55 um: fractions [%], mean free path [m], g [1]."""
+    """Return results of Mie's theory for the paper's droplets at 0.55 um: fractions [%],
+    mean free path [m], g [1].
+    """
     green = optics()
     return {
         "g": green.g,
@@ -124,7 +161,8 @@ def _droplets() -> dict[str, float]:
 
 
 def _moderate(cases: Cases) -> Bools:
-    distance = np.hypot(cases.foot, cases.height)  # and optical depth: the extinction of the set is 1
+    # and optical depth: the extinction of the set is 1
+    distance = np.hypot(cases.foot, cases.height)
     length = cases.x1 / distance
     fine = (distance >= 0.01) & (distance <= 5) & (length >= 0.05) & (length <= 10)
     return fine & (cases.height >= distance * np.sin(np.radians(1)))

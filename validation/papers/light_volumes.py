@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sections 4 to 6 of Billeter 2010: the mesh of a light volume, its adaptive tessellation, its depths, its map.
+"""Sections 4 to 6 of Billeter 2010: the mesh of a light volume, its adaptive
+tessellation, its depths, its map.
 
-*Plain Laplacian.* The paper finds edges by a Laplacian filter of the shadow map; ours takes the terms of the Laplacian
-of the inverse depth one by one, at the spacing of every level (`realtime.methods.published.billeter2010.
-tessellation`). Here the plain filter, of the depth at the texels alone, stands beside it: its threshold is chosen so
-that both meshes have as many triangles, and both are compared with the static mesh of the same map.
+*Plain Laplacian.* The paper finds edges by a Laplacian filter of the shadow map; ours takes the
+terms of the Laplacian of the inverse depth one by one, at the spacing of every level
+(`realtime.methods.published.billeter2010. tessellation`). Here the plain filter, of the depth at
+the texels alone, stands beside it: its threshold is chosen so that both meshes have as many
+triangles, and both are compared with the static mesh of the same map.
 
-*Depths.* With depth testing, what the mesh crosses behind the visible surface is not drawn, and the mesh must be pushed
-towards the light so that its own image of the surface stays in front. The paper clamps crossings to the depth of the
-surface instead. Both sums are taken from the same crossings.
+*Depths.* With depth testing, what the mesh crosses behind the visible surface is not drawn, and the
+mesh must be pushed towards the light so that its own image of the surface stays in front. The paper
+clamps crossings to the depth of the surface instead. Both sums are taken from the same crossings.
 
-*Triangles.* The sphere of `sphere-spot` with ever finer facets. Timed in turns: a frame of shadow planes after the
-light moved, and of light volumes what is not the rendering of the view or of the shadow map, that is the volume.
+*Triangles.* The sphere of `sphere-spot` with ever finer facets. Timed in turns: a frame of shadow
+planes after the light moved, and of light volumes what is not the rendering of the view or of the
+shadow map, that is the volume.
 """
 
 from collections.abc import Callable
@@ -33,9 +36,19 @@ from airlight.realtime.frame.renderer import (
     run_cast_and_shade,
     run_method,
 )
-from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
+from airlight.realtime.methods.published.billeter2010.mesh import (
+    THRESHOLD,
+    VolumeMesh,
+    adaptive_mesh,
+    volume_mesh,
+)
 from airlight.realtime.methods.published.billeter2010.raster import signed_crossings
-from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, quads, triangles
+from airlight.realtime.methods.published.billeter2010.tessellation import (
+    divide,
+    edges,
+    quads,
+    triangles,
+)
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
@@ -54,7 +67,8 @@ from airlight.validation.study.frame_times import moved_light
 
 MAP = 512  #: of the colonnade, six faces, and of the sphere [texels]
 SIZE = (160, 120)  #: of images [pixels]
-BIASES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  #: by which the mesh is pushed towards the light, of its depth [1]
+#: by which the mesh is pushed towards the light, of its depth [1]
+BIASES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
 _MAPS = (32, 128, 512)  # of Fig. 6 [texels]
 FACETS = {"few": 16, "many": 512}  #: of a ring of the sphere: 514 triangles, and half a million
@@ -65,11 +79,15 @@ _HALVINGS = 24  # of the interval of the threshold
 
 
 def maps() -> dict[str, float]:
-    """Return the errors of the mesh in `omni-box` by size of the map, and of the image of 128 texels to that of 512."""
+    """Return the errors of the mesh in `omni-box` by size of the map, and of the image of
+    128 texels to that of 512.
+    """
     loaded = load_scene("omni-box", SIZE).scene
     scene, true = read_scene(loaded), reference_image(loaded).airlight
     images = {size: render_frame(_renderer(scene, _MESH, size)).airlight for size in _MAPS}
-    errors = {str(size): known(error_metrics(true, image).relative_rmse) for size, image in images.items()}
+    errors = {
+        str(size): known(error_metrics(true, image).relative_rmse) for size, image in images.items()
+    }
     return errors | {"128 to 512": known(error_metrics(images[512], images[128]).relative_rmse)}
 
 
@@ -78,7 +96,9 @@ def _renderer(scene: Scene, method: str, size: int, **values: str) -> FrameRende
 
 
 def triangle_times() -> dict[str, Any]:
-    """Return the times of the volume and of a frame of shadow planes with few and with many triangles [ms]."""
+    """Return the times of the volume and of a frame of shadow planes with few and
+    with many triangles [ms].
+    """
     times: dict[str, Any] = {}
     for name, facets in FACETS.items():
         scene = _sphere(facets)
@@ -110,11 +130,12 @@ def _sphere(facets: int) -> Scene:
 
 
 def tessellation() -> dict[str, Any]:
-    """Return facts on the mesh of the colonnade, and the errors of two filters and two treatments of depths.
+    """Return facts on the mesh of the colonnade, and the errors of two filters and
+    two treatments of depths.
 
-    `flat` and `jump` are the median sides of the quads without and with a jump of the map [texels]. `our error` and
-    `plain error` compare the airlight with that of the static mesh; `bias ...` and `best bias` are the relative RMSE of
-    the sum with depth testing to the clamped sum.
+    `flat` and `jump` are the median sides of the quads without and with a jump of the map [texels].
+    `our error` and `plain error` compare the airlight with that of the static mesh; `bias ...` and
+    `best bias` are the relative RMSE of the sum with depth testing to the clamped sum.
     """
     scene = read_scene(load_scene("colonnade", SIZE).scene)
     light = scene.lights[0]
@@ -139,7 +160,9 @@ def corner_heights(shadow_map: ShadowMap) -> Array:
 
 
 def quad_levels(divided: list[Any]) -> Index:
-    """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face."""
+    """Return the level of the quad in which each texel lies, (faces, size,
+    size); 0 is a whole face.
+    """
     size = 2 ** len(divided)
     level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
     for number, numbers, _ in quads(divided):
@@ -153,15 +176,18 @@ def quad_levels(divided: list[Any]) -> Index:
 
 def _jumps(heights: Array) -> Bools:
     """Return the texels whose corners differ by more than a tenth."""
-    corners = np.stack([heights[:, a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)])
+    corners = np.stack(
+        [heights[:, a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)]
+    )
     return np.ptp(corners, axis=0) > 0.1 * corners.max(axis=0)
 
 
 def plain_edges(heights: Array, wanted: int) -> list[Any]:
-    """Return the nodes of each level that hold a texel beyond the threshold of the plain Laplacian of the depth.
+    """Return the nodes of each level that hold a texel beyond the threshold of the
+    plain Laplacian of the depth.
 
-    The `heights` are inverse depths, (faces, N + 1, N + 1) [1/m]. The threshold is found by bisection, so that the mesh
-    has about as many triangles as are `wanted`.
+    The `heights` are inverse depths, (faces, N + 1, N + 1) [1/m]. The threshold is found by
+    bisection, so that the mesh has about as many triangles as are `wanted`.
     """
     response = laplacian(heights)
     low, high = -20.0, float(np.log(response.max() + 1))
@@ -175,9 +201,11 @@ def plain_edges(heights: Array, wanted: int) -> list[Any]:
 
 
 def laplacian(heights: Array) -> Array:
-    """Return |sum of the four neighbours - 4 times the corner| of the depth, (faces, N + 1, N + 1), edges repeated.
+    """Return |sum of the four neighbours - 4 times the corner| of the depth, (faces, N +
+    1, N + 1), edges repeated.
 
-    Where the inverse depths at the corners, `heights` [1/m], are 0, the depth is that of the farthest other corner.
+    Where the inverse depths at the corners, `heights` [1/m], are 0, the depth is that of
+    the farthest other corner.
     """
     depth = 1 / np.maximum(heights, heights[heights > 0].min())
     wide = np.pad(depth, ((0, 0), (1, 1), (1, 1)), mode="edge")
@@ -190,19 +218,28 @@ def _marked(corners: Bools) -> list[Any]:
     marked = corners[:, :-1, :-1] | corners[:, 1:, :-1] | corners[:, :-1, 1:] | corners[:, 1:, 1:]
     levels = []
     while marked.shape[1] > 1:
-        marked = marked[:, ::2, ::2] | marked[:, 1::2, ::2] | marked[:, ::2, 1::2] | marked[:, 1::2, 1::2]
+        marked = (
+            marked[:, ::2, ::2]
+            | marked[:, 1::2, ::2]
+            | marked[:, ::2, 1::2]
+            | marked[:, 1::2, 1::2]
+        )
         levels.append(marked)
     return levels[::-1]
 
 
-def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, ours: Any) -> dict[str, float]:
+def _filter_errors(
+    renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, ours: Any
+) -> dict[str, float]:
     """Return the error of the airlight of both filters, with as many triangles."""
     light = renderer.scene.lights[0]
     cast, by_light = run_cast_and_shade(renderer)
     dr.eval(cast, by_light)
 
     def airlight(mesh: VolumeMesh) -> Array:
-        return image_frame(renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, by_light))).airlight
+        return image_frame(
+            renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, by_light))
+        ).airlight
 
     def adaptive(divided: list[Any]) -> VolumeMesh:
         return adaptive_mesh(shadow_map, light, heights, triangles(divided))
@@ -216,7 +253,9 @@ def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Arra
 
 
 def _biased() -> list[float]:
-    """Return for each bias the relative RMSE of the sum with depth testing to the sum with clamped depths."""
+    """Return for each bias the relative RMSE of the sum with depth testing to the
+    sum with clamped depths.
+    """
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
     scene = read_scene(loaded)
     light = scene.lights[0]
@@ -229,13 +268,16 @@ def _biased() -> list[float]:
 
 
 def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -> Array:
-    """Return the airlight integral of the first light from the crossings of a mesh, (height, width) [1/m].
+    """Return the airlight integral of the first light from the crossings of a
+    mesh, (height, width) [1/m].
 
-    `loaded`: the `mi.Scene`; `depth`: of the visible surface in each pixel, row by row [m]; `clamp`: whether a crossing
-    behind it counts as one at the surface, otherwise it does not count.
+    `loaded`: the `mi.Scene`; `depth`: of the visible surface in each pixel, row by row [m];
+    `clamp`: whether a crossing behind it counts as one at the surface, otherwise it does not count.
     """
     camera, reference = read_scene(loaded).camera, read_reference(loaded)
-    foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
+    foot, height = foot_and_height(
+        reference.origin, reference.direction, reference.lights[0].position
+    )
     sigma = float(reference.medium.sigma_t[0])
     total = np.zeros(len(depth))
     for batch in signed_crossings(mesh, camera):
@@ -248,8 +290,12 @@ def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -
 
 
 def _pushed(mesh: VolumeMesh, light: Light, bias: float) -> VolumeMesh:
-    """Return a mesh pushed towards the light by a fraction of its depth: vertices are (light s + k, s)."""
+    """Return a mesh pushed towards the light by a fraction of its depth:
+    vertices are (light s + k, s).
+    """
     place = np.array(light.position, dtype=np.float64).ravel()
     s = mesh.vertices[:, 3:]
     nearer = s / (1 - bias)
-    return VolumeMesh(np.hstack([mesh.vertices[:, :3] + place * (nearer - s), nearer]), mesh.triangles)
+    return VolumeMesh(
+        np.hstack([mesh.vertices[:, :3] + place * (nearer - s), nearer]), mesh.triangles
+    )

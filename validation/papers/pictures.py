@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pictures of Biri 2006 and Billeter 2010 again, in our own scenes.
 
-Fig. 1 of Biri 2006 is a triptych: a hall lit classically, with single scattering, and with volumetric shadows. Fig. 1
-of Billeter 2010 is a cathedral with two lights, which is not ours to ship: `colonnade` has two lamps in its place. Fig.
-8b there is a tessellation: here one face of the colonnade's map, by our filter and by the plain Laplacian.
+Fig. 1 of Biri 2006 is a triptych: a hall lit classically, with single scattering, and with
+volumetric shadows. Fig. 1 of Billeter 2010 is a cathedral with two lights, which is not ours to
+ship: `colonnade` has two lamps in its place. Fig. 8b there is a tessellation: here one face of the
+colonnade's map, by our filter and by the plain Laplacian.
 """
 
 from dataclasses import replace
@@ -28,7 +29,9 @@ _FACE = 1  # of the six, the one that sees the columns
 
 
 def triptych(size: tuple[int, int]) -> dict[str, Array]:
-    """Return the three images of Fig. 1 of Biri 2006 in `hall`, all light, each (height, width, 3) [W/(m^2 sr)]."""
+    """Return the three images of Fig. 1 of Biri 2006 in `hall`, all light, each
+    (height, width, 3) [W/(m^2 sr)].
+    """
     scene = read_scene(load_scene("hall", size).scene)
     clear = replace(scene, medium=thicker_medium(scene.medium, 0.0))
     return {
@@ -39,7 +42,9 @@ def triptych(size: tuple[int, int]) -> dict[str, Array]:
 
 
 def two_lights_image(size: tuple[int, int]) -> Array:
-    """Return the hall with two lamps by light volumes with maps of 1024 texels, all light [W/(m^2 sr)]."""
+    """Return the hall with two lamps by light volumes with maps of 1024
+    texels, all light [W/(m^2 sr)].
+    """
     described = SCENES["colonnade"].build()
     described["lamp-2"] = point_light((-0.73, 3.31, 6.23), (97.0, 103.0, 111.0))
     scene = mi.load_dict(described)
@@ -48,12 +53,17 @@ def two_lights_image(size: tuple[int, int]) -> Array:
 
 
 def tessellations(size: int) -> dict[str, Array]:
-    """Return by filter the side of the quads of one face of the colonnade's map, (size, size) [texels]."""
+    """Return by filter the side of the quads of one face of the colonnade's
+    map, (size, size) [texels].
+    """
     scene = read_scene(load_scene("colonnade", (64, 48)).scene)
     heights = corner_heights(cast_shadow_map(scene.geometry, scene.lights[0], size))
     ours = divide(edges(heights, THRESHOLD))
     plain = divide(plain_edges(heights, len(triangles(ours))))
-    return {name: size / 2.0 ** quad_levels(divided)[_FACE] for name, divided in (("ours", ours), ("plain", plain))}
+    return {
+        name: size / 2.0 ** quad_levels(divided)[_FACE]
+        for name, divided in (("ours", ours), ("plain", plain))
+    }
 
 
 def _all_light(scene: Scene, method: str, **values: int) -> Array:

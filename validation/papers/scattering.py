@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Approximations of the light in Biri 2006 and Billeter 2010: multiple scattering, and the constant R of bounded media.
+"""Approximations of the light in Biri 2006 and Billeter 2010: multiple scattering, and the
+constant R of bounded media.
 
-*Ambient fog.* Biri adds a constant ambient light in the medium, albedo A (1 - exp(-sigma_t x)), in place of multiple
-scattering. The right value, for the medium alone, is `volpath` with long paths less `volpath` with one scattering, of
-the same seeds. The constant A that fits best is a least-squares fit over the pixels and channels of an image. The
-residual is computed from two images M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1 M2)), so that the
-noise of the paths does not count.
+*Ambient fog.* Biri adds a constant ambient light in the medium, albedo A (1 - exp(-sigma_t x)), in
+place of multiple scattering. The right value, for the medium alone, is `volpath` with long paths
+less `volpath` with one scattering, of the same seeds. The constant A that fits best is a
+least-squares fit over the pixels and channels of an image. The residual is computed from two images
+M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1 M2)), so that the noise of the paths
+does not count.
 
-*The constant R* (section 4.2). The camera looks at a sphere of one medium in vacuum, which a lamp outside the sphere
-lights from above. R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a
-sphere. A path from far away has a mean length of 0.75 radii within the sphere (the mean of half a chord over the
-volume): R is 60 % too long, and the airlight too dark by about exp(-0.45 sigma_t radius).
+*The constant R* (section 4.2). The camera looks at a sphere of one medium in vacuum, which a lamp
+outside the sphere lights from above. R, the mean distance between a point of the boundary and a
+point of the medium, is 1.2 radii in a sphere. A path from far away has a mean length of 0.75 radii
+within the sphere (the mean of half a chord over the volume): R is 60 % too long, and the airlight
+too dark by about exp(-0.45 sigma_t radius).
 """
 
 from itertools import product
@@ -36,7 +39,8 @@ from airlight.validation.study.configuration import configuration, prepared
 _SCENES = ("open-fog", "two-pens", "colonnade")
 _SIZE = (32, 24)  # of the images of multiple scattering [pixels]
 _BATCHES, _SAMPLES, _DEPTH = 8, 8, 64
-_THIN = 0.00173  # extinction of `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
+# extinction of `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
+_THIN = 0.00173
 
 SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to the centre
 OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
@@ -45,14 +49,19 @@ _RADIUS = 0.97  # [m]
 
 
 def multiple_scattering() -> dict[str, Any]:
-    """Return the multiple scattering that a constant misses, worst of three scenes, and its fraction in thin fog."""
+    """Return the multiple scattering that a constant misses, worst of three scenes, and
+    its fraction in thin fog.
+    """
     described = SCENES["open-fog"].build()
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
     thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
     low, high = thin.interval
-    return {"left over": max(map(_left_over, _SCENES)), "thin": Figure(thin.value, low, high, INTERVAL)}
+    return {
+        "left over": max(map(_left_over, _SCENES)),
+        "thin": Figure(thin.value, low, high, INTERVAL),
+    }
 
 
 def _left_over(name: str) -> float:
@@ -63,12 +72,16 @@ def _left_over(name: str) -> float:
 
 
 def fitted_constant(fog: Array, multiple: Array) -> float:
-    """Return the factor of an image of ambient fog that brings it closest to one of multiple scattering."""
+    """Return the factor of an image of ambient fog that brings it closest to
+    one of multiple scattering.
+    """
     return float(np.sum(fog * multiple) / np.sum(fog * fog))
 
 
 def left_over(first: Array, second: Array, model: Array) -> float:
-    """Return the relative RMSE of a model to the mean of two images with independent noise, without it; 0 at least."""
+    """Return the relative RMSE of a model to the mean of two images with independent
+    noise, without it; 0 at least.
+    """
     squares = float(np.mean((first - model) * (second - model)) / np.mean(first * second))
     return max(0.0, squares) ** 0.5
 
@@ -87,18 +100,21 @@ def _multiple(scene: Any, seed: int) -> Array:
 def _ambient(scene: Scene) -> Array:
     """Return the ambient fog of constant 1, (pixels, 3), as the method draws it."""
     lit, unlit = (
-        render_frame(prepared(scene, configuration("shadow-planes-2006", "exact", values))).airlight.astype(np.float64)
+        render_frame(
+            prepared(scene, configuration("shadow-planes-2006", "exact", values))
+        ).airlight.astype(np.float64)
         for values in ({"ambient": 1.0}, {})
     )
     return (lit - unlit).reshape(-1, 3)
 
 
 def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
-    """Return the largest bias of the constant R, and what the polynomial and the printed equation have of its error.
+    """Return the largest bias of the constant R, and what the polynomial and the printed
+    equation have of its error.
 
-    The errors are those of `SIZES` and `OPTICAL_DEPTHS` over the pixels that see the medium, in float64: with the
-    constant R against `media=exact`, of the same by the polynomial of degree 4, and of the equation as printed, summed
-    over nodes.
+    The errors are those of `SIZES` and `OPTICAL_DEPTHS` over the pixels that see the medium, in
+    float64: with the constant R against `media=exact`, of the same by the polynomial of degree 4,
+    and of the equation as printed, summed over nodes.
     """
     biases, ratios = [], []
     for size, depth in product(SIZES, OPTICAL_DEPTHS):
@@ -133,4 +149,6 @@ def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) 
 
 
 def _airlight(scene: Scene, media: str, kernel: str = "exact") -> Array:
-    return render_frame(prepared(scene, configuration("shadow-planes-2006", kernel, {"media": media}))).airlight
+    return render_frame(
+        prepared(scene, configuration("shadow-planes-2006", kernel, {"media": media}))
+    ).airlight

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow planes of Biri 2006: the errors of their order and other shortcuts in images, and the stencil along a ray.
+"""Shadow planes of Biri 2006: the errors of their order and other shortcuts in images, and
+the stencil along a ray.
 
-Errors are relative RMSE and relative bias of the airlight against the quadrature. Whether an error is noticeable is
-judged on an 8-bit display: the number of its 255 steps within which 99 % of pixels are right; `white` is 255.
+Errors are relative RMSE and relative bias of the airlight against the quadrature. Whether an error
+is noticeable is judged on an 8-bit display: the number of its 255 steps within which 99 % of pixels
+are right; `white` is 255.
 
-The stencil of sections 5 and 5.1.5 needs no image. Along a ray a shadow is an interval [a, b]. Its plane at a faces the
-camera, its plane at b faces away. Planes are drawn from the surface towards the camera: one that faces the camera adds
-Gamma(a) where the stencil is 1, one that faces away subtracts Gamma(b) where it is 0. In section 5, stage 5, planes
-that face the camera then increment the stencil; in 5.1.5 they decrement it. Any increasing function serves as Gamma; x
-does.
+The stencil of sections 5 and 5.1.5 needs no image. Along a ray a shadow is an interval [a, b]. Its
+plane at a faces the camera, its plane at b faces away. Planes are drawn from the surface towards
+the camera: one that faces the camera adds Gamma(a) where the stencil is 1, one that faces away
+subtracts Gamma(b) where it is 0. In section 5, stage 5, planes that face the camera then increment
+the stencil; in 5.1.5 they decrement it. Any increasing function serves as Gamma; x does.
 """
 
 from typing import Any
@@ -34,7 +36,9 @@ _RAYS = 4000  # of the stencil
 
 
 def orders() -> dict[str, float]:
-    """Return the errors without shadows, without an order of the planes, and in the paper's order."""
+    """Return the errors without shadows, without an order of the planes,
+    and in the paper's order.
+    """
     paper, others = [], {}
     for name in SCENES:
         scene, true = _opened(name)
@@ -54,9 +58,9 @@ def orders() -> dict[str, float]:
 def shortcuts() -> dict[str, float]:
     """Return the errors of the polynomial, of Gamma at the vertices and of an 8-bit buffer.
 
-    `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and `dim, bias`: of an
-    8-bit buffer in `clutter`, over the pixels whose reference is below white, which is a quarter of the brightest
-    airlight of 99 % of the pixels, and four times as much.
+    `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and
+    `dim, bias`: of an 8-bit buffer in `clutter`, over the pixels whose reference is below white,
+    which is a quarter of the brightest airlight of 99 % of the pixels, and four times as much.
     """
     scene, true = _opened("clutter")
     brightest = float(np.percentile(true.max(axis=2), 99))
@@ -70,10 +74,11 @@ def shortcuts() -> dict[str, float]:
 
 
 def _steps() -> float:
-    """Return by how many of 255 steps of a display the paper's polynomial is off in 99 % of the pixels near a lamp.
+    """Return by how many of 255 steps of a display the paper's polynomial is off in 99 %
+    of the pixels near a lamp.
 
-    The lamp stands in front of the camera, before which the whole fog is lit; near is within 10 degrees of the lamp.
-    White is the brightest radiance of 99 % of the picture.
+    The lamp stands in front of the camera, before which the whole fog is lit; near is within 10
+    degrees of the lamp. White is the brightest radiance of 99 % of the picture.
     """
     scene = mi.load_dict(_lamp_in_fog(_CLOSE))
     resize(scene, SIZE)
@@ -96,7 +101,9 @@ def _lamp_in_fog(depth: float) -> dict[str, Any]:
 
 def _close_to_lamp(scene: Any) -> Bools:
     reference = read_reference(scene)
-    foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
+    foot, height = foot_and_height(
+        reference.origin, reference.direction, reference.lights[0].position
+    )
     return (np.arctan2(height, foot) < np.radians(10)).reshape(reference.height, reference.width)
 
 
@@ -106,7 +113,9 @@ def _opened(name: str) -> tuple[Scene, Array]:
     return read_scene(loaded), reference_image(loaded).airlight
 
 
-def _rendered(scene: Scene, method: str = "shadow-planes-2006", kernel: str = "exact", **values: Any) -> Array:
+def _rendered(
+    scene: Scene, method: str = "shadow-planes-2006", kernel: str = "exact", **values: Any
+) -> Array:
     frame = render_frame(prepared(scene, configuration(method, kernel, values)))
     return np.asarray(frame.airlight, dtype=np.float64)
 
@@ -116,7 +125,8 @@ def _error(scene: Scene, true: Array, **how: Any) -> Metrics:
 
 
 def stencil() -> dict[str, float]:
-    """Return the fraction of random rays with up to five overlapping shadows whose lit length comes out right.
+    """Return the fraction of random rays with up to five overlapping shadows whose
+    lit length comes out right.
 
     They are `section 5.1.5` and `stage 5`, by the rules that these print.
     """
@@ -136,9 +146,13 @@ def _shadows(random: np.random.Generator) -> list[tuple[float, float]]:
 
 
 def drawn(shadows: list[tuple[float, float]], step: int) -> float:
-    """Return the sum that is drawn; `step` is what planes that face the camera add to the stencil, others take it."""
+    """Return the sum that is drawn; `step` is what planes that face the camera add to the
+    stencil, others take it.
+    """
     level = sum(a < 1 < b for a, b in shadows)
-    planes = sorted([(a, True) for a, _ in shadows] + [(b, False) for _, b in shadows], reverse=True)
+    planes = sorted(
+        [(a, True) for a, _ in shadows] + [(b, False) for _, b in shadows], reverse=True
+    )
     total = 1.0 if level == 0 else 0.0
     for x, front in planes:
         if x >= 1:

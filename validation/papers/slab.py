@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sections 2, 3 and 5 of Bouthors, Neyret, Max, Bruneton, Crassin 2008 again, on a slab: what the slab alone decides.
+"""Sections 2, 3 and 5 of Bouthors, Neyret, Max, Bruneton, Crassin 2008 again, on a slab:
+what the slab alone decides.
 
-Clouds are of droplets with r_e = 6 um, gamma = 2, 4e8 in a cubic metre, at 0.55 um; lengths in metres become optical by
-their extinction, lowered by what is cut out of the peak where the phase function is the modified one. For Fig. 8, light
-by direction, three ways to T stand side by side: the computation with more streams than the grid had, the grid that
-frames look up, and the paper's functions, fitted to the grid (`fitted_transport.py`).
+Clouds are of droplets with r_e = 6 um, gamma = 2, 4e8 in a cubic metre, at 0.55 um; lengths in
+metres become optical by their extinction, lowered by what is cut out of the peak where the phase
+function is the modified one. For Fig. 8, light by direction, three ways to T stand side by side:
+the computation with more streams than the grid had, the grid that frames look up, and the paper's
+functions, fitted to the grid (`fitted_transport.py`).
 """
 
 import math
@@ -18,7 +20,11 @@ import numpy as np
 from airlight.analytic.droplets import Modified, optics
 from airlight.realtime.clouds.canonical.coordinates import SETS, set_name
 from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
-from airlight.realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
+from airlight.realtime.clouds.canonical.transport_grid import (
+    Transport,
+    canonical_transport,
+    on_device,
+)
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from airlight.realtime.numerics.array_types import ArrayTypes, array_types
 from airlight.validation.arrays import Array
@@ -42,13 +48,18 @@ _APPEARS = 1.0  # fraction from which on orders appear [%]
 
 SUN = 25.0  #: of Fig. 8 [degrees]
 #: Thickness and depths of Fig. 8 [m].
-PANELS: tuple[tuple[float, tuple[float, ...]], ...] = ((100.0, (0.0, 100.0)), (1000.0, (0.0, 100.0, 1000.0)))
+PANELS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    (100.0, (0.0, 100.0)),
+    (1000.0, (0.0, 100.0, 1000.0)),
+)
 _ANGLES = 36  # zenith angles of the view
 _DIM = 1e-6  # of the light of all sets, below which a set is not compared
 
 
 def slab_figures() -> dict[str, Any]:
-    """Return reflectances over those of the droplets, fractions of orders [%] and how radiance changes by azimuth."""
+    """Return reflectances over those of the droplets, fractions of orders [%] and how
+    radiance changes by azimuth.
+    """
     green = optics()
     cut = float(Modified(green).removed)
     full, modified = (droplet_phase(*_DROPLETS, modified=cut_off) for cut_off in (False, True))
@@ -64,8 +75,12 @@ def slab_figures() -> dict[str, Any]:
             "printed g": (tau, HenyeyGreensteinPhase(_PRINTED_G)),
         }
         whole = _reflectance(tau, full)
-        figures |= {f"{thickness:g} m, {name}": _reflectance(*slabs[name]) / whole for name in asked}
-    fractions = {(t, sun): _fractions(t * lowered, sun, modified) for t in THICKNESSES for sun in _SUNS}
+        figures |= {
+            f"{thickness:g} m, {name}": _reflectance(*slabs[name]) / whole for name in asked
+        }
+    fractions = {
+        (t, sun): _fractions(t * lowered, sun, modified) for t in THICKNESSES for sun in _SUNS
+    }
     overhead = [fractions[t, 0.0][0] for t in THICKNESSES]
     return figures | {
         "isotropic from": crossing(THICKNESSES, [100 - each for each in overhead], _APPEARS),
@@ -77,7 +92,10 @@ def slab_figures() -> dict[str, Any]:
 def crossing(places: tuple[float, ...], values: list[float], level: float) -> float:
     """Return where rising values reach a level, by a power law between the two places around it."""
     after = next(number for number, value in enumerate(values) if value >= level)
-    (x0, x1), (y0, y1) = np.log(places[after - 1 : after + 1]), np.log(values[after - 1 : after + 1])
+    (x0, x1), (y0, y1) = (
+        np.log(places[after - 1 : after + 1]),
+        np.log(values[after - 1 : after + 1]),
+    )
     return float(np.exp(x0 + (math.log(level) - y0) / (y1 - y0) * (x1 - x0)))
 
 
@@ -91,16 +109,26 @@ def _slab(tau: float, mu0: float, phase: SlabPhase) -> SlabOrders:
 
 
 def _fractions(tau: float, sun: float, phase: SlabPhase) -> tuple[float, float]:
-    """Return the fraction of orders 1 to 30 in the light that is reflected, and transmitted after scattering [%]."""
-    (few, _), total = order_sets(_slab(tau, math.cos(math.radians(sun)), phase), [(1, 30), (31, math.inf)])
-    return 100 * float(few[UP, 0, 0] / total[UP, 0, 0]), 100 * float(few[DOWN, 0, -1] / total[DOWN, 0, -1])
+    """Return the fraction of orders 1 to 30 in the light that is reflected, and
+    transmitted after scattering [%].
+    """
+    (few, _), total = order_sets(
+        _slab(tau, math.cos(math.radians(sun)), phase), [(1, 30), (31, math.inf)]
+    )
+    return 100 * float(few[UP, 0, 0] / total[UP, 0, 0]), 100 * float(
+        few[DOWN, 0, -1] / total[DOWN, 0, -1]
+    )
 
 
 def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
-    """Return by set how far radiance changes with the azimuth, at the point of Fig. 3, where it changes most."""
+    """Return by set how far radiance changes with the azimuth, at the point of Fig.
+    3, where it changes most.
+    """
     thickness, depth, sun = _FIGURE_3
     slab = DirectionalMoments(phase, 1.0, np.array([-0.9, -0.6, -0.3, 0.3, 0.6, 0.9]))
-    modes = slab(thickness * lowered, [math.cos(math.radians(sun))], [depth * lowered])[:, :, 0, 0, 0]
+    modes = slab(thickness * lowered, [math.cos(math.radians(sun))], [depth * lowered])[
+        :, :, 0, 0, 0
+    ]
     phi = np.linspace(0, np.pi, 37)
     m = np.arange(modes.shape[1])[:, None]
     radiance = np.einsum("smv,mp->svp", modes, np.cos(m * phi) * np.where(m > 0, 2.0, 1.0))
@@ -109,7 +137,9 @@ def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
 
 
 def transport_figures() -> dict[str, Any]:
-    """Return by how much the paper's functions are off in half of the directions, the median over the curves [%]."""
+    """Return by how much the paper's functions are off in half of the directions, the
+    median over the curves [%].
+    """
     medians = []
     for curve in transport_curves():
         shown = curve.exact > _DIM * curve.whole
@@ -120,7 +150,9 @@ def transport_figures() -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class TransportCurve:
-    """T of Fig. 8 of some orders by the zenith angle of the view, in the plane of the sun [1/sr]."""
+    """T of Fig. 8 of some orders by the zenith angle of the view, in the
+    plane of the sun [1/sr].
+    """
 
     thickness: float  #: [m]
     depth: float  #: [m]
@@ -140,7 +172,14 @@ def transport_curves() -> list[TransportCurve]:
     lowered = (1 - Modified(optics()).removed) * optics().extinction
     angles = (np.arange(_ANGLES) + 0.5) * np.pi / _ANGLES
     slab = DirectionalMoments(
-        pair.deterministic, 1.0, np.cos(angles), streams=48, modes=47, nodes=5, negligible=1e-5, single=False
+        pair.deterministic,
+        1.0,
+        np.cos(angles),
+        streams=48,
+        modes=47,
+        nodes=5,
+        negligible=1e-5,
+        single=False,
     )
     curves = []
     for thickness, depths in PANELS:
@@ -165,7 +204,9 @@ def transport_curves() -> list[TransportCurve]:
     return curves
 
 
-def _looked_up(look_up: Transport, types: ArrayTypes, orders: int, t: float, d: float, angles: Array) -> Array:
+def _looked_up(
+    look_up: Transport, types: ArrayTypes, orders: int, t: float, d: float, angles: Array
+) -> Array:
     numbers = np.broadcast_arrays(t, d, np.cos(angles), 1.0, 0.0, math.cos(math.radians(SUN)))
     T, *_ = look_up(orders, *(types.scalar(np.array(each)) for each in numbers))
     dr.eval(T)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures 4.7, 4.8, 4.19 and 5.8 of Ali 2016 measured again, in `fence`, with `soft-shafts`.
 
-The source prints no equation, no scene and no table of errors; the method is reconstructed from captions. It gives:
+The source prints no equation, no scene and no table of errors; the method is reconstructed
+from captions. It gives:
 
-* Fig. 5.8: R1 150 samples along each ray, R2 32, R3 32 and a Gaussian, R4 32 and the bilateral filter;
+* Fig. 5.8: R1 150 samples along each ray, R2 32, R3 32 and a Gaussian, R4 32
+  and the bilateral filter;
 * Fig. 4.8: 3 light samples with hd = 3, hr = 0.5;
 * Fig. 4.19: 4, 8, 16, 32 taps.
 
@@ -13,10 +15,11 @@ occluders. Both lights of this fraction are sums over the same sixteen points of
 sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors is that of a jackknife over
 vertical strips of the image.
 
-*At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the steps) they take as long
-as R4. *Edges* is the median, over the hundredth of the penumbra where the reference is steepest, of the gradient over
-that of the reference. *Flicker* is the root mean square of the second difference of frames in time, of a light that
-moves in equal steps, over that of the exact sum over the points for the same frames, in the penumbra of the first.
+*At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the
+steps) they take as long as R4. *Edges* is the median, over the hundredth of the penumbra where the
+reference is steepest, of the gradient over that of the reference. *Flicker* is the root mean square
+of the second difference of frames in time, of a light that moves in equal steps, over that of the
+exact sum over the points for the same frames, in the penumbra of the first.
 """
 
 from collections.abc import Mapping
@@ -43,10 +46,12 @@ POINTS = 64
 _FEW = 16  # points of the penumbra, the same with and without occluders
 STEPS, MANY = 32, 150
 TAPS = (4, 8, 16, 32)
-_FRAMES, _TRAVEL = 5, 0.02  # of the flicker: frames, and how far the light goes from one to the next [m]
+# of the flicker: frames, and how far the light goes from one to the next [m]
+_FRAMES, _TRAVEL = 5, 0.02
 _STRIPS = 16  # of the jackknife
 
-#: Names and values of parameters, beside the defaults: 5 points on a ring, uniform steps, hd = 5, hr = 0.5.
+#: Names and values of parameters, beside the defaults: 5 points on a ring, uniform
+#: steps, hd = 5, hr = 0.5.
 RENDERINGS: Mapping[str, dict[str, Any]] = {
     "R1": {"steps": MANY, "filter": "none"},
     "R2": {"steps": STEPS, "filter": "none"},
@@ -70,7 +75,9 @@ class Reference:
     penumbra: Bools  #: (height, width)
 
     def error(self, image: Array, left_out: int | None = None) -> float:
-        """Return the relative RMSE of an image in the penumbra, if wanted without one of the strips."""
+        """Return the relative RMSE of an image in the penumbra, if wanted
+        without one of the strips.
+        """
         where = self.penumbra
         if left_out is not None:
             where = where & (np.arange(where.shape[1]) * _STRIPS // where.shape[1] != left_out)
@@ -81,11 +88,15 @@ class Reference:
         """Return the error of an image over that of another, with its 95 % interval."""
         whole = self.error(above) / self.error(below)
         rest = [self.error(above, strip) / self.error(below, strip) for strip in range(_STRIPS)]
-        half = student_quantile(0.5 + LEVEL / 2, _STRIPS - 1) * float(np.sqrt((_STRIPS - 1) * np.var(rest)))
+        half = student_quantile(0.5 + LEVEL / 2, _STRIPS - 1) * float(
+            np.sqrt((_STRIPS - 1) * np.var(rest))
+        )
         return Figure(whole, whole - half, whole + half, INTERVAL)
 
     def edges(self, image: Array) -> float:
-        """Return the median gradient of an image over the reference's, at the steepest hundredth of the penumbra."""
+        """Return the median gradient of an image over the reference's, at the steepest
+        hundredth of the penumbra.
+        """
         shown, true = (np.hypot(*np.gradient(picture[..., 1])) for picture in (image, self.image))
         steep = self.penumbra & (true > np.quantile(true[self.penumbra], 0.99))
         return float(np.median(shown[steep] / true[steep]))
@@ -123,9 +134,14 @@ def shafts_scene(size: tuple[int, int]) -> tuple[Scene, Reference]:
 
 
 def penumbra(scene: Scene) -> Bools:
-    """Return where the visible surface gets a part of the light, with and without occluders from the same points."""
+    """Return where the visible surface gets a part of the light, with and without
+    occluders from the same points.
+    """
     surface = render_frame(prepared(scene, _exact(_FEW))).surface
-    lit = prepared(scene, Configuration("soft-shafts", None, (("points", _FEW), ("pattern", "sobol"), ("map", 4))))
+    lit = prepared(
+        scene,
+        Configuration("soft-shafts", None, (("points", _FEW), ("pattern", "sobol"), ("map", 4))),
+    )
     _, by_light = run_cast_and_shade(lit)  # the lit surface before shadows, of each point
     lanes = np.array(sum(by_light[0]), dtype=np.float64).T
     unshadowed = np.empty_like(lanes)
@@ -151,10 +167,14 @@ def rendered(scene: Scene, values: Mapping[str, Any]) -> Array:
     return np.asarray(frame.airlight + frame.surface, dtype=np.float64)
 
 
-def timings(scene: Scene, chosen: Mapping[str, Mapping[str, Any]], seconds: float) -> dict[str, Timing]:
+def timings(
+    scene: Scene, chosen: Mapping[str, Mapping[str, Any]], seconds: float
+) -> dict[str, Timing]:
     """Return the times of renderings after the light moved, measured in turns, by name."""
     works = [moved_light(prepared(scene, _configuration(values))) for values in chosen.values()]
-    return dict(zip(chosen, time_in_turns(works, seconds=seconds * len(works), least=3), strict=True))
+    return dict(
+        zip(chosen, time_in_turns(works, seconds=seconds * len(works), least=3), strict=True)
+    )
 
 
 def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, dict[str, Any]]:
@@ -162,11 +182,15 @@ def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, dict[str, Any]]:
     ms = {name: timing.median_ms for name, timing in times.items()}
     a_step = max((ms["R1"] - ms["R2"]) / (MANY - STEPS), 1e-6)
     more = {name: round(max(ms["R4"] - ms[name], 0.0) / a_step) for name in ("R2", "R3")}
-    return {f"{name}, equal time": RENDERINGS[name] | {"steps": STEPS + more[name]} for name in more}
+    return {
+        f"{name}, equal time": RENDERINGS[name] | {"steps": STEPS + more[name]} for name in more
+    }
 
 
 def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
-    """Return the flicker of R2, R4 and the shared points over that of the exact sum over the points."""
+    """Return the flicker of R2, R4 and the shared points over that of the
+    exact sum over the points.
+    """
     (light,) = scene.area_lights
     across = light.across / np.linalg.norm(light.across)
     path = [
@@ -177,9 +201,18 @@ def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
     def second_difference(chosen: Configuration) -> float:
         renderer = prepared(scene, chosen)
         images = [render_frame(replace(renderer, scene=now)) for now in path]
-        frames = np.array([(each.airlight + each.surface)[reference.penumbra] for each in images], dtype=np.float64)
+        frames = np.array(
+            [(each.airlight + each.surface)[reference.penumbra] for each in images],
+            dtype=np.float64,
+        )
         return float(np.sqrt(np.mean(np.diff(frames, 2, axis=0) ** 2)))
 
     smooth = second_difference(_exact())
-    chosen = {"R2": RENDERINGS["R2"], "R4": RENDERINGS["R4"], "shared points": VARIANTS["shared points"]}
-    return {name: second_difference(_configuration(values)) / smooth for name, values in chosen.items()}
+    chosen = {
+        "R2": RENDERINGS["R2"],
+        "R4": RENDERINGS["R4"],
+        "shared points": VARIANTS["shared points"],
+    }
+    return {
+        name: second_difference(_configuration(values)) / smooth for name, values in chosen.items()
+    }

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of a scene: numbers that say what it holds, and cost little. Sweeps keep them beside errors and times.
+"""Properties of a scene: numbers that say what it holds, and cost little. Sweeps keep them
+beside errors and times.
 
-None depends on the unit of length. A fraction of light is that of 6144 points on a grid of camera rays.
+None depends on the unit of length. A fraction of light is that of 6144 points
+on a grid of camera rays.
 """
 
 from collections.abc import Mapping
@@ -39,14 +41,18 @@ PROPERTIES: Mapping[str, str] = {
 
 
 def scene_properties(scene: Scene) -> dict[str, float]:
-    """Return the properties of a scene by name, as `realtime.scene.read_scene.read_scene` returned it."""
+    """Return the properties of a scene by name, as
+    `realtime.scene.read_scene.read_scene` returned it.
+    """
     lights, (origin, ends, depth) = light_places(scene), _seen(scene)
     fraction = (np.arange(_STEPS) + 0.5) / _STEPS
     points = origin + fraction[:, None] * (ends - origin)[..., None, :]
     kinds = [light.kind for light in lights]
     lamps = {light.name for light in scene.area_lights}
     balls = [(*_ball(each), _extinction(each.medium)) for each in scene.medium.bounded_media]
-    meshes = [shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps]
+    meshes = [
+        shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps
+    ]
     found = {
         "lights": len(lights),
         **{f"{kind}s": kinds.count(kind) for kind in ("point", "spot", "directional", "area")},

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far rays of a scene go, which points its lights reach, and optical depths, for properties and random scenes."""
+"""How far rays of a scene go, which points its lights reach, and optical depths, for
+properties and random scenes.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,13 +44,22 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
             places.append(LightPlace("directional", -_host(light.axis)))
         elif light.cone is not None:
             places.append(
-                LightPlace("spot", _host(light.position), axis=_host(light.axis), cos_cutoff=float(light.cone.cos[0]))
+                LightPlace(
+                    "spot",
+                    _host(light.position),
+                    axis=_host(light.axis),
+                    cos_cutoff=float(light.cone.cos[0]),
+                )
             )
         else:
             places.append(LightPlace("point", _host(light.position)))
     for wide in scene.area_lights:
         flat = wide.normal if wide.kind in ("rectangle", "disk") else None
-        radius = float(np.linalg.norm(wide.across + wide.up)) if wide.kind == "rectangle" else wide.radius
+        radius = (
+            float(np.linalg.norm(wide.across + wide.up))
+            if wide.kind == "rectangle"
+            else wide.radius
+        )
         places.append(LightPlace("area", wide.middle, radius, flat))
     return tuple(places)
 
@@ -79,7 +90,9 @@ def lit_points(geometry: Any, light: LightPlace, points: Array) -> Bools:
     if light.axis is not None:
         lit &= -(unit @ light.axis) > light.cos_cutoff
     if geometry.shapes():
-        longest = np.where(np.isfinite(distance), distance * (1 - _BEFORE) - light.radius, np.finfo(np.float32).max)
+        longest = np.where(
+            np.isfinite(distance), distance * (1 - _BEFORE) - light.radius, np.finfo(np.float32).max
+        )
         start = points + unit * np.where(np.isfinite(distance), distance * _BEFORE, 0.0)[..., None]
         blocked = geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
         lit &= ~np.array(blocked, dtype=bool).reshape(lit.shape)
@@ -91,7 +104,8 @@ def optical_depths(
 ) -> Array:
     """Return the optical depths of segments by channel, (..., 3); start and end (..., 3) [m].
 
-    `balls`: centre, radius [m] and extinction, RGB [1/m], of media with bounds; `around`: the extinction between them.
+    `balls`: centre, radius [m] and extinction, RGB [1/m], of media with bounds; `around`: the
+    extinction between them.
     """
     way = end - start
     outside = length = np.linalg.norm(way, axis=-1)
@@ -104,7 +118,9 @@ def optical_depths(
 
 
 def _chord(centre: Array, radius: float, start: Array, way: Array, length: Array) -> Array:
-    """Return how much of segments lies in a ball, (...,) [m]: from `start` along `way`, (..., 3), of a length."""
+    """Return how much of segments lies in a ball, (...,) [m]: from `start` along
+    `way`, (..., 3), of a length.
+    """
     square = np.maximum(length**2, 1e-30)
     from_centre = start - centre
     middle = -np.sum(from_centre * way, axis=-1) / square

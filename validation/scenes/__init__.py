@@ -15,7 +15,8 @@ Read in this order:
 - `random`: scenes drawn from a seed;
 - `numbers.py`: refuses numbers of which no finite image can come;
 - `bodies.py`: refuses bounds of media that are no bodies beside one another;
-- `changes.py`: camera, lights and media of a scene changed by name, isotropic media given a mean cosine;
+- `changes.py`: camera, lights and media of a scene changed by name, isotropic
+  media given a mean cosine;
 - `files`: scene files as people write them, made into what both readers take;
 - `loading.py`: a scene by its name or from a Mitsuba XML file, and what it is in keys of results;
 - `animation.py`: the scenes of the frames of an animation.

@@ -3,14 +3,15 @@
 
 The frames make one turn, so that the last one leads on to the first:
 
-* `light`: every light circles about a vertical axis, and the axis of a spot turns with it. Vertical is the axis of
-  coordinates nearest to the camera's up.
+* `light`: every light circles about a vertical axis, and the axis of a spot turns with it. Vertical
+  is the axis of coordinates nearest to the camera's up.
 * `objects`: every object turns about the vertical through its own middle.
-* `medium`: the extinction is multiplied by 1 + sin(turn) / 2, between half and one and a half times its value.
+* `medium`: the extinction is multiplied by 1 + sin(turn) / 2, between half and one
+  and a half times its value.
 * `colour`: the intensities of red, green and blue rotate among the channels; their sum stays.
 
-The frame renderer recomputes only what moves (`moved_parts`, `realtime.frame.incremental`) and reuses the kernels of
-the first frame.
+The frame renderer recomputes only what moves (`moved_parts`, `realtime.frame.incremental`) and
+reuses the kernels of the first frame.
 """
 
 from collections.abc import Callable, Iterator
@@ -45,12 +46,16 @@ def parse_moves(text: str) -> tuple[str, ...]:
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:
         if move not in MOVES:
-            raise InputError(f"--animate: got {move!r}, expected some of {', '.join(MOVES)}, separated by commas")
+            raise InputError(
+                f"--animate: got {move!r}, expected some of {', '.join(MOVES)}, separated by commas"
+            )
     return moves
 
 
 def moved_parts(animation: Animation) -> dict[str, bool]:
-    """Return the differences between a frame and the last, as keywords of `realtime.frame.incremental.next_frame`."""
+    """Return the differences between a frame and the last, as keywords of
+    `realtime.frame.incremental.next_frame`.
+    """
     return {
         "camera_moved": False,
         "geometry_moved": "objects" in animation.moves,
@@ -61,8 +66,8 @@ def moved_parts(animation: Animation) -> dict[str, bool]:
 def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
     """Yield the scene of every frame, one turn in all; the first is the scene as it was read.
 
-    A yielded scene is valid only until the next one is asked for: all of them share one Mitsuba scene, in which the
-    objects move.
+    A yielded scene is valid only until the next one is asked for: all of them share one Mitsuba
+    scene, in which the objects move.
     """
     if frames < 1:
         raise InputError(f"frames: got {frames}, expected at least 1")
@@ -90,11 +95,16 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
             changes[f"{prefix}.{'intensity' if light.w else 'irradiance'}"] = light.intensity
     if homogeneous is not None and "medium" in moves:
         changes["medium.sigma_t"] = [float(own[0]) for own in homogeneous.sigma_t]
-    return {name: tuple(np.array(value, dtype=np.float64).ravel().tolist()) for name, value in changes.items()}
+    return {
+        name: tuple(np.array(value, dtype=np.float64).ravel().tolist())
+        for name, value in changes.items()
+    }
 
 
 def frame_objects(scene: Scene, animation: Animation, frames: int) -> dict[str, tuple[Any, ...]]:
-    """Return by shape the matrices, (4, 4) [m], that take it from its place in the scene to that in each frame."""
+    """Return by shape the matrices, (4, 4) [m], that take it from its place in the
+    scene to that in each frame.
+    """
     objects = _objects(scene, animation)
     matrices: dict[str, tuple[Any, ...]] = {}
     for name, about in {} if objects is None else objects.middles.items():
@@ -112,7 +122,9 @@ def _objects(scene: Scene, animation: Animation) -> Objects | None:
     closed = closed_shapes(read_occluders(scene.geometry, scene.area_lights))
     names = animation.objects or tuple(name for name in closed if name not in lamps)
     if not names:
-        raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")
+        raise InputError(
+            "--animate objects: the scene has no closed mesh that could turn; animate the light"
+        )
     return read_objects(scene, names)
 
 
@@ -158,11 +170,17 @@ def middle(scene: Scene) -> Array:
 
     Without shapes it is the point on the camera's axis that is closest to the first light.
     """
-    light = np.array(scene.lights[0].position).ravel() if scene.lights else scene.area_lights[0].middle
+    light = (
+        np.array(scene.lights[0].position).ravel() if scene.lights else scene.area_lights[0].middle
+    )
     if scene.geometry.shapes():
         box = scene.geometry.bbox()
-        return 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())
+        return 0.5 * (
+            np.array(box.min, dtype=np.float64).ravel()
+            + np.array(box.max, dtype=np.float64).ravel()
+        )
     origin, forward = (
-        np.array(vector, dtype=np.float64).ravel() for vector in (scene.camera.origin, scene.camera.forward)
+        np.array(vector, dtype=np.float64).ravel()
+        for vector in (scene.camera.origin, scene.camera.forward)
     )
     return origin + forward * (forward @ (light - origin)) / (forward @ forward)

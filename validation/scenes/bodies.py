@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether what bounds media are bodies beside one another, checked once, where a scene of a user is loaded.
+"""Whether what bounds media are bodies beside one another, checked once, where a
+scene of a user is loaded.
 
-A mesh bounds a body if every edge is met by two triangles, once each way, no triangle passes through another, and
-around every point its triangles wind once (inside) or not at all (outside). Methods and reference count on that.
+A mesh bounds a body if every edge is met by two triangles, once each way, no triangle passes
+through another, and around every point its triangles wind once (inside) or not at all (outside).
+Methods and reference count on that.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,25 +31,33 @@ from airlight.reference.scene.shapes import distance_to_triangles
 from airlight.validation.arrays import Array, Index
 
 Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
-_SIDE = 1e-6  # of the length of an edge, and of the weights of a corner: what lies nearer to an end only touches it
+# of the length of an edge, and of the weights of a corner: what lies nearer
+# to an end only touches it
+_SIDE = 1e-6
 
 
 def check_bodies(scene: Any) -> None:
-    """Refuse an `mi.Scene` in which the bounds of media are no disjoint bodies, with the name of an edge.
+    """Refuse an `mi.Scene` in which the bounds of media are no disjoint bodies,
+    with the name of an edge.
 
-    Raises InputError for bounds that are no spheres or closed meshes, cross themselves or one another, are inside out,
-    or lie within one another.
+    Raises InputError for bounds that are no spheres or closed meshes, cross themselves or one
+    another, are inside out, or lie within one another.
     """
     shapes = [shape for shape in scene.shapes() if _bounds_medium(shape)]
     read = [read_bounds(shape) for shape in shapes]
     if any(bounds is None for bounds, _ in read):
-        meshes = {shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None}
-        _check_crossings(meshes, scene_of([shape for shape, (_, mesh) in zip(shapes, read) if mesh is not None]))
+        meshes = {
+            shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None
+        }
+        _check_crossings(
+            meshes, scene_of([shape for shape, (_, mesh) in zip(shapes, read) if mesh is not None])
+        )
         _check_nesting(list(meshes.values()))
     for first, second in combinations(range(len(read)), 2):
         if _overlap(read[first], read[second]):
             raise InputError(
-                f"the media of shapes '{shapes[first].id()}' and '{shapes[second].id()}' overlap or one holds the "
+                f"the media of shapes '{shapes[first].id()}' and '{shapes[second].id()}' overlap "
+                "or one holds the "
                 "other; expected disjoint bounds"
             )
 
@@ -80,7 +90,9 @@ def _overlap(first: Body, second: Body) -> bool:
 
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:
-    """Return the radius of the largest sphere in two convex meshes: the largest t under n . x + t <= offset."""
+    """Return the radius of the largest sphere in two convex meshes: the largest t
+    under n . x + t <= offset.
+    """
     from scipy.optimize import linprog
 
     planes = np.concatenate([first.normals, second.normals])
@@ -110,24 +122,30 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
         if around.pop(own, 0) != (0 if outwards else 1):
             flaw = "has a part within another" if outwards else "is inside out"
             raise InputError(
-                f"shape '{mesh.name}' bounds a medium and {flaw}, at {mesh.edge_words(tail, head)}; expected faces "
+                f"shape '{mesh.name}' bounds a medium and {flaw}, at "
+                f"{mesh.edge_words(tail, head)}; expected faces "
                 "that run counter-clockwise seen from outside, and parts beside one another"
             )
         nesting = [other for other, winding in around.items() if winding]
         if nesting:
             raise InputError(
-                f"the medium of shape '{mesh.name}' lies within that of shape '{meshes[nesting[0]].name}', at "
+                f"the medium of shape '{mesh.name}' lies within that of shape "
+                f"'{meshes[nesting[0]].name}', at "
                 f"{mesh.edge_words(tail, head)}; expected media beside one another, none nested"
             )
 
 
 def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
-    """Return of each connected part of a mesh one triangle, the corners of all, and whether these face outwards."""
+    """Return of each connected part of a mesh one triangle, the corners of all, and
+    whether these face outwards.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    graph = coo_array((np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2)
+    graph = coo_array(
+        (np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2
+    )
     _, component = connected_components(graph, directed=False)
     own = component[mesh.faces[:, 0]]
     parts = []
@@ -143,8 +161,8 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
 def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
     """Refuse meshes of which an edge passes through a triangle that it does not touch.
 
-    `meshes`: by the numbers of their shapes, those of the Mitsuba scene `boundary`. Mitsuba finds the triangles, in
-    float32; the crossing is computed again in float64.
+    `meshes`: by the numbers of their shapes, those of the Mitsuba scene `boundary`. Mitsuba finds
+    the triangles, in float32; the crossing is computed again in float64.
     """
     for mesh in meshes.values():
         tail, head = _edges(mesh)
@@ -154,7 +172,10 @@ def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
             against, pairs = meshes[number], np.flatnonzero(met == number)
             at = _piercing(against.corners[triangle[pairs]], begin[edge[pairs]], end[edge[pairs]])
             if against is mesh:
-                shared = mesh.faces[triangle[pairs]][:, :, None] == np.stack([tail, head], 1)[edge[pairs]][:, None]
+                shared = (
+                    mesh.faces[triangle[pairs]][:, :, None]
+                    == np.stack([tail, head], 1)[edge[pairs]][:, None]
+                )
                 at &= ~shared.any(axis=(1, 2))
             if not at.any():
                 continue
@@ -162,11 +183,13 @@ def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
             words = mesh.edge_words(tail[edge[first]], head[edge[first]])
             if against is mesh:
                 raise InputError(
-                    f"shape '{mesh.name}' bounds a medium and crosses itself: {words} passes through triangle "
+                    f"shape '{mesh.name}' bounds a medium and crosses itself: {words} passes "
+                    "through triangle "
                     f"{triangle[first]}; expected a mesh without crossings"
                 )
             raise InputError(
-                f"the media of shapes '{mesh.name}' and '{against.name}' overlap: {words} of the first passes "
+                f"the media of shapes '{mesh.name}' and '{against.name}' overlap: {words} of the "
+                "first passes "
                 f"through triangle {triangle[first]} of the other; expected disjoint bounds"
             )
 
@@ -183,7 +206,8 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
     unit = (end - begin) / length[:, None]
     shapes, triangles, edges = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
     left, past = np.arange(len(begin)), np.zeros(len(begin))
-    # Triangles at the corners of an edge may hide what lies behind them: the edge is cast on from there to its end.
+    # Triangles at the corners of an edge may hide what lies behind them: the edge is cast
+    # on from there to its end.
     while len(left):
         start = begin[left] + unit[left] * past[left, None]
         ray = mi.Ray3f(
@@ -206,12 +230,16 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
 
 
 def _piercing(corners: Array, begin: Array, end: Array):
-    """Return which segments pass through the inside of triangles, by Moeller and Trumbore's weights in float64."""
+    """Return which segments pass through the inside of triangles, by Moeller and
+    Trumbore's weights in float64.
+    """
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     along, offset = end - begin, begin - corners[:, 0]
     across = np.cross(along, second)
     determinant = np.einsum("ij,ij->i", first, across)
-    inverse = np.divide(1.0, determinant, out=np.full_like(determinant, np.inf), where=determinant != 0)
+    inverse = np.divide(
+        1.0, determinant, out=np.full_like(determinant, np.inf), where=determinant != 0
+    )
     with np.errstate(invalid="ignore"):
         u = np.einsum("ij,ij->i", offset, across) * inverse
         turned = np.cross(offset, first)

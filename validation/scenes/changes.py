@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes of a scene by name: its camera, lights and media, as `--change NAME=VALUE` and the live view make them.
+"""Changes of a scene by name: its camera, lights and media, as `--change NAME=VALUE` and
+the live view make them.
 
 A change goes into Mitsuba's own scene, so the methods and the reference read the same. The names:
 
@@ -16,8 +17,8 @@ A change goes into Mitsuba's own scene, so the methods and the reference read th
 | `medium.albedo` | single-scattering albedo: RGB |
 | `medium.g` | mean cosine of an isotropic or a Henyey-Greenstein phase function |
 
-One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one
-around the camera, then those with bounds in the order of their shapes.
+One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are
+media: first the one around the camera, then those with bounds in the order of their shapes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -65,36 +66,58 @@ def changeable(scene) -> dict[str, Changeable]:
 def parse_changes(words: Sequence[str]) -> dict[str, Values]:
     """Return values by name from words of the form 'NAME=VALUE' or 'NAME=X,Y,Z'."""
     wanted = "NAME=NUMBER or NAME=X,Y,Z, for example medium.sigma_t=0.1"
-    return named_values("--change", words, lambda text: tuple(float(number) for number in text.split(",")), wanted)
+    return named_values(
+        "--change", words, lambda text: tuple(float(number) for number in text.split(",")), wanted
+    )
 
 
 def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:
     """Return the words that `parse_changes` reads, to the last digit."""
-    return [f"{name}={','.join(_word(value) for value in values)}" for name, values in changes.items()]
+    return [
+        f"{name}={','.join(_word(value) for value in values)}" for name, values in changes.items()
+    ]
 
 
 def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     """Change an `mi.Scene` in place: values by name, see the module.
 
-    A name that the scene does not have and a value that it cannot have are refused, and the scene is as it was.
+    A name that the scene does not have and a value that it cannot have are refused,
+    and the scene is as it was.
     """
     known = changeable(scene)
     wanted = {name: _checked(name, values, known) for name, values in changes.items()}
-    camera = {name.partition(".")[2]: values for name, values in wanted.items() if name.startswith("camera.")}
+    camera = {
+        name.partition(".")[2]: values
+        for name, values in wanted.items()
+        if name.startswith("camera.")
+    }
     if camera:
-        _change_camera(scene.sensors()[0], {name: known[f"camera.{name}"].value for name in _AIM} | camera, camera)
-    for kind, parts, change in (("light", scene.emitters(), _change_light), ("medium", _media(scene), _change_medium)):
+        _change_camera(
+            scene.sensors()[0],
+            {name: known[f"camera.{name}"].value for name in _AIM} | camera,
+            camera,
+        )
+    for kind, parts, change in (
+        ("light", scene.emitters(), _change_light),
+        ("medium", _media(scene), _change_medium),
+    ):
         for number, part in enumerate(parts, 1):
             prefix = _numbered(kind, number) + "."
-            own = {name.removeprefix(prefix): values for name, values in wanted.items() if name.startswith(prefix)}
+            own = {
+                name.removeprefix(prefix): values
+                for name, values in wanted.items()
+                if name.startswith(prefix)
+            }
             if own:
                 change(part, own)
 
 
 def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> None:
-    """Move shapes of an `mi.Scene` in place, by their ids: from where they are, by matrices of shape (4, 4) [m].
+    """Move shapes of an `mi.Scene` in place, by their ids: from where they are, by
+    matrices of shape (4, 4) [m].
 
-    Raises InputError for a shape that the scene does not have, or whose place Mitsuba does not let change.
+    Raises InputError for a shape that the scene does not have, or whose place
+    Mitsuba does not let change.
     """
     if not matrices:
         return
@@ -103,28 +126,41 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
     for name, rows in matrices.items():
         if name not in shapes:
             known = (
-                f"expected some of {', '.join(shapes)}{nearest(name, shapes)}" if shapes else "the scene has no shapes"
+                f"expected some of {', '.join(shapes)}{nearest(name, shapes)}"
+                if shapes
+                else "the scene has no shapes"
             )
             raise InputError(f"objects: got {name!r}, {known}")
         matrix = np.array(rows, dtype=np.float64)
-        place, vertices, normals = (f"{name}.{each}" for each in ("to_world", "vertex_positions", "vertex_normals"))
+        place, vertices, normals = (
+            f"{name}.{each}" for each in ("to_world", "vertex_positions", "vertex_normals")
+        )
         if vertices in parameters:
             points = np.reshape(parameters[vertices], (-1, 3)) @ matrix[:3, :3].T + matrix[:3, 3]
             parameters[vertices] = type(parameters[vertices])(points.ravel())
             if normals in parameters and len(parameters[normals]):
                 # Unit length for any scale: the matrix is a rotation times a number.
-                turned = np.reshape(parameters[normals], (-1, 3)) @ matrix[:3, :3].T / np.cbrt(np.linalg.det(matrix))
+                turned = (
+                    np.reshape(parameters[normals], (-1, 3))
+                    @ matrix[:3, :3].T
+                    / np.cbrt(np.linalg.det(matrix))
+                )
                 parameters[normals] = type(parameters[normals])(turned.ravel())
         elif place in parameters:
             moved = matrix @ matrix_of(parameters[place])
             parameters[place] = type(parameters[place])(moved)
         else:
-            raise InputError(f"objects: shape '{name}' cannot be moved; expected a mesh, rectangle, disk or sphere")
+            raise InputError(
+                f"objects: shape '{name}' cannot be moved; expected a mesh, rectangle, disk or "
+                "sphere"
+            )
     parameters.update()
 
 
 def shift_film(scene, right: float, down: float) -> None:
-    """Let the rays of an `mi.Scene` pass right of and below the centres of its pixels [pixels], in place."""
+    """Let the rays of an `mi.Scene` pass right of and below the centres of its
+    pixels [pixels], in place.
+    """
     parameters = mi.traverse(scene.sensors()[0])
     for axis, size, shift in zip("xy", parameters["film.size"], (right, down), strict=True):
         parameters[f"principal_point_offset_{axis}"] = shift / int(size)
@@ -136,40 +172,60 @@ def _numbered(kind: str, number: int) -> str:
 
 
 def _word(value: float) -> str:
-    """Return the shortest decimals that are this number in single precision, if it is one, or in double."""
+    """Return the shortest decimals that are this number in single precision, if
+    it is one, or in double.
+    """
     single = np.float32(value)
-    return np.format_float_positional(single if float(single) == value else np.float64(value), trim="-")
+    return np.format_float_positional(
+        single if float(single) == value else np.float64(value), trim="-"
+    )
 
 
 def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]) -> Values:
     if name not in known:
-        raise InputError(f"--change: got {name!r}, expected one of {', '.join(known)}{nearest(name, known)}")
+        raise InputError(
+            f"--change: got {name!r}, expected one of {', '.join(known)}{nearest(name, known)}"
+        )
     item = known[name]
     if len(values) not in item.sizes:
         sizes = " or ".join(str(size) for size in item.sizes)
         raise InputError(
-            f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them and a point "
+            f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them and a "
+            "point "
             "in each, such as 0.5"
         )
     numbers = np.array(values, dtype=np.float64)
     if not np.all((numbers >= item.least) & (numbers <= item.most)):
         given = ",".join(f"{value:g}" for value in values)
         unit = f" [{item.unit}]" if item.unit else ""
-        raise InputError(f"{name}: got {given}, expected finite numbers from {item.least:g} to {item.most:g}{unit}")
+        raise InputError(
+            f"{name}: got {given}, expected finite numbers from {item.least:g} to "
+            f"{item.most:g}{unit}"
+        )
     if item.direction and not np.any(numbers):
-        raise InputError(f"{name}: got {','.join('0' for _ in values)}, expected a direction: not all of it 0")
+        raise InputError(
+            f"{name}: got {','.join('0' for _ in values)}, expected a direction: not all of it 0"
+        )
     return tuple(float(value) for value in values)
 
 
 def _point(name: str, value: Array, *, direction: bool = False) -> Changeable:
-    return Changeable(name, _values(value), (3,), -LARGEST_LENGTH, LARGEST_LENGTH, "" if direction else "m", direction)
+    return Changeable(
+        name,
+        _values(value),
+        (3,),
+        -LARGEST_LENGTH,
+        LARGEST_LENGTH,
+        "" if direction else "m",
+        direction,
+    )
 
 
 def _values(value: Any) -> Values:
     return tuple(float(number) for number in np.array(value, dtype=np.float64).ravel())
 
 
-# The camera -----------------------------------------------------------------------------------------------------------
+# The camera ---------------------------------------------------------------------------------------
 
 _AIM = ("origin", "target", "up")
 
@@ -195,17 +251,20 @@ def _change_camera(sensor, aim: Mapping[str, Values], changed: Mapping[str, Valu
 
 
 def _looking(like, origin: Values, target: Values, up: Values):
-    """Return the transform of a camera that looks from a point at another, of the type of another transform."""
+    """Return the transform of a camera that looks from a point at another, of the
+    type of another transform.
+    """
     forward = np.subtract(target, origin)
     left = np.cross(up, forward)
     if not np.linalg.norm(left) > 1e-9 * np.linalg.norm(up) * np.linalg.norm(forward):
         raise InputError(
-            "camera: got a target at the origin, or straight up from it; expected another camera.target or camera.up"
+            "camera: got a target at the origin, or straight up from it; expected another "
+            "camera.target or camera.up"
         )
     return type(like)().look_at(origin=list(origin), target=list(target), up=list(up))
 
 
-# Lights ---------------------------------------------------------------------------------------------------------------
+# Lights -------------------------------------------------------------------------------------------
 
 
 def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
@@ -216,11 +275,20 @@ def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
     if kind == "SpotLight":
         yield _point(f"{prefix}.position", matrix_of(emitter.world_transform())[:3, 3])
     if kind in ("SpotLight", "DirectionalEmitter"):
-        yield _point(f"{prefix}.direction", matrix_of(emitter.world_transform())[:3, 2], direction=True)
+        yield _point(
+            f"{prefix}.direction", matrix_of(emitter.world_transform())[:3, 2], direction=True
+        )
     for name, unit in _LIGHTS.items():
         if f"{name}.value" in parameters:
             value = _values(parameters[f"{name}.value"])
-            yield Changeable(f"{prefix}.{name}", value, (1, 3) if len(value) == 3 else (1,), 0, LARGEST_LIGHT, unit)
+            yield Changeable(
+                f"{prefix}.{name}",
+                value,
+                (1, 3) if len(value) == 3 else (1,),
+                0,
+                LARGEST_LIGHT,
+                unit,
+            )
 
 
 def _change_light(emitter, changed: Mapping[str, Values]) -> None:
@@ -248,15 +316,21 @@ def _shining(emitter, like, changed: Mapping[str, Values]):
     return type(like)(matrix)
 
 
-# Media ----------------------------------------------------------------------------------------------------------------
+# Media --------------------------------------------------------------------------------------------
 
 
 def _media(scene) -> list[Any]:
-    """Return the media of a scene: the one around the camera, and those that shapes bound, each once."""
+    """Return the media of a scene: the one around the camera, and those that
+    shapes bound, each once.
+    """
     media: list[Any] = []
     around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
     for medium in around + [shape.interior_medium() for shape in scene.shapes()]:
-        if medium is not None and (medium.is_homogeneous() or _is_height_fog(medium)) and medium not in media:
+        if (
+            medium is not None
+            and (medium.is_homogeneous() or _is_height_fog(medium))
+            and medium not in media
+        ):
             media.append(medium)
     return media
 
@@ -264,9 +338,13 @@ def _media(scene) -> list[Any]:
 def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
     parameters = mi.traverse(medium)
     if _is_height_fog(medium):
-        yield from _of_layers(prefix, {name: _values(parameters[f"sigma_t.{name}"]) for name in NUMBERS})
+        yield from _of_layers(
+            prefix, {name: _values(parameters[f"sigma_t.{name}"]) for name in NUMBERS}
+        )
     else:
-        sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(parameters["scale"])
+        sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(
+            parameters["scale"]
+        )
         sizes = (1, 3) if len(sigma_t) == 3 else (1,)
         yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
     albedo = _values(parameters["albedo.value.value"])
@@ -286,7 +364,14 @@ def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeabl
         part, layer = name.split("_")
         if layer == "0" or numbers[f"sigma_{layer}"] > (0.0,):
             least = {"sigma": 0.0, "z": -LARGEST_LENGTH, "H": 1e-6}[part]
-            yield Changeable(f"{prefix}.{name}", value, (1,), least, LARGEST_LENGTH, "1/m" if part == "sigma" else "m")
+            yield Changeable(
+                f"{prefix}.{name}",
+                value,
+                (1,),
+                least,
+                LARGEST_LENGTH,
+                "1/m" if part == "sigma" else "m",
+            )
 
 
 def _change_medium(medium, changed: Mapping[str, Values]) -> None:
@@ -302,7 +387,9 @@ def _change_medium(medium, changed: Mapping[str, Values]) -> None:
     if "g" in changed and "phase_function.g" in parameters:
         parameters["phase_function.g"] = changed["g"][0]
     elif changed.get("g", (0.0,)) != (0.0,):
-        raise InputError(f"medium '{medium.id()}' is isotropic here; expected its g when the scene is loaded")
+        raise InputError(
+            f"medium '{medium.id()}' is isotropic here; expected its g when the scene is loaded"
+        )
     try:
         parameters.update()
     except (ValueError, RuntimeError) as error:  # of height fog, whose density has no bound then
@@ -314,9 +401,15 @@ def _is_isotropic(medium) -> bool:
 
 
 def isotropic_media(scene) -> dict[str, str]:
-    """Return the ids of the isotropic media of a Mitsuba scene by the names of their mean cosines."""
+    """Return the ids of the isotropic media of a Mitsuba scene by the
+    names of their mean cosines.
+    """
     numbered = enumerate(_media(scene), 1)
-    return {f"{_numbered('medium', number)}.g": medium.id() for number, medium in numbered if _is_isotropic(medium)}
+    return {
+        f"{_numbered('medium', number)}.g": medium.id()
+        for number, medium in numbered
+        if _is_isotropic(medium)
+    }
 
 
 def _set_colour(parameters, key: str, values: Values) -> None:
@@ -324,7 +417,7 @@ def _set_colour(parameters, key: str, values: Values) -> None:
     parameters[key] = kind(*values) if len(values) == 3 else kind(values[0])
 
 
-# Isotropic media given a mean cosine ----------------------------------------------------------------------------------
+# Isotropic media given a mean cosine --------------------------------------------------------------
 
 
 def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
@@ -341,21 +434,27 @@ def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
 
 
 def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:
-    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions, mean cosines by the ids of the media.
+    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions, mean cosines
+    by the ids of the media.
 
-    Mitsuba changes the numbers of a phase function that it has built, not its kind: its description is changed before.
-    A medium that has no description of its own, as part of a shape that was built before, is refused.
+    Mitsuba changes the numbers of a phase function that it has built, not its kind: its description
+    is changed before. A medium that has no description of its own, as part of a shape that was
+    built before, is refused.
     """
     for name, g in lobes.items():
         phase = _isotropic_phase(state, name)
         if phase is None:
-            raise InputError(f"medium '{name}': its g cannot be changed: give it a phase function of type 'hg'")
+            raise InputError(
+                f"medium '{name}': its g cannot be changed: give it a phase function of type 'hg'"
+            )
         phase.set_plugin_name("hg")
         phase["g"] = g
 
 
 def _isotropic_phase(state: Any, name: str) -> Any:
-    """Return the properties of the phase function of a medium, None where there are none to change."""
+    """Return the properties of the phase function of a medium, None where
+    there are none to change.
+    """
     nodes = [node.props for node in state.nodes]
     for medium in nodes:
         if medium.plugin_name() != "homogeneous" or medium.id() != name:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Surfaces of clouds by formulas, as closed triangle meshes: around a centre, and between two heights.
+"""Surfaces of clouds by formulas, as closed triangle meshes: around a centre,
+and between two heights.
 
 Both have one radius or one height a direction or place, so that they cross themselves nowhere.
 """
@@ -17,7 +18,9 @@ _BASE = 713.0  # height of the base of the cumulus [m]
 
 def cumulus() -> Mesh:
     """Return lobes heaped on a flat base, with bumps: 5120 triangles."""
-    return star_shaped(_cumulus_distance, np.array([29.0, -13.0, _BASE + 113.0]), 1013.0, icosphere(4))
+    return star_shaped(
+        _cumulus_distance, np.array([29.0, -13.0, _BASE + 113.0]), 1013.0, icosphere(4)
+    )
 
 
 def _cumulus_distance(points: Array) -> Array:
@@ -38,15 +41,23 @@ def _cumulus_distance(points: Array) -> Array:
     )
     radii = 89.0 + 83.0 * (1 - fraction) + 47.0 * ((0.754878 * number + 0.13) % 1.0)
     union = lobes(centres, radii, 13.7)(points) + 11.3 - 39.0 * bumps(points, 47.0)
-    base = _BASE + 9.7 * np.sin(points[:, 0] / 131.0 + 0.9) * np.sin(points[:, 1] / 113.0) - points[:, 2]
+    base = (
+        _BASE
+        + 9.7 * np.sin(points[:, 0] / 131.0 + 0.9) * np.sin(points[:, 1] / 113.0)
+        - points[:, 2]
+    )
     return np.maximum(union, base)
 
 
 def stratocumulus() -> Mesh:
-    """Return a layer of 5.4 km by 3.8 km, cells and bumps on top and nearly flat below: 129 596 triangles."""
+    """Return a layer of 5.4 km by 3.8 km, cells and bumps on top and nearly flat
+    below: 129 596 triangles.
+    """
     base, halves = 611.0, (2713.0, 1879.0)  # height of the base, half the sides [m]
     x, y = (np.linspace(-half, half, count) for half, count in zip(halves, (216, 150), strict=True))
-    plane = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((216, 150))], axis=-1).reshape(-1, 3)
+    plane = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((216, 150))], axis=-1).reshape(
+        -1, 3
+    )
     rim = np.minimum(*((half - np.abs(plane[:, axis])) / 431.0 for axis, half in enumerate(halves)))
     rim = np.clip(rim, 0.0, 1.0)
     full = rim * rim * (3 - 2 * rim)
@@ -57,17 +68,22 @@ def stratocumulus() -> Mesh:
 
 
 def two_lobes() -> Mesh:
-    """Return two balls side by side, both around the point from which the triangles are drawn: 5120 triangles."""
+    """Return two balls side by side, both around the point from which the triangles
+    are drawn: 5120 triangles.
+    """
     centres = np.array([[-251.0, 3.0, 967.0], [257.0, -5.0, 971.0], [7.0, 11.0, 853.0]])
     union = lobes(centres, np.array([269.0, 271.0, 149.0]), 17.3)
     return star_shaped(union, np.array([3.0, 2.0, 893.0]), 811.0, icosphere(4))
 
 
-def star_shaped(function: Callable[[Array], Array], centre: Array, reach: float, sphere: Mesh) -> Mesh:
-    """Return the outermost surface around a centre, (3,), where a function changes its sign, by one radius a direction.
+def star_shaped(
+    function: Callable[[Array], Array], centre: Array, reach: float, sphere: Mesh
+) -> Mesh:
+    """Return the outermost surface around a centre, (3,), where a function changes its sign,
+    by one radius a direction.
 
-    The function takes points, (n, 3) [m], and is negative at the centre and positive at the radius `reach` [m]. The
-    sphere gives the directions, unit vectors, and the triangles between them.
+    The function takes points, (n, 3) [m], and is negative at the centre and positive at the radius
+    `reach` [m]. The sphere gives the directions, unit vectors, and the triangles between them.
     """
     directions, faces = sphere
     radius = np.full(len(directions), reach)
@@ -85,20 +101,33 @@ def star_shaped(function: Callable[[Array], Array], centre: Array, reach: float,
 
 
 def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
-    """Return the closed surface between two heights, (n, m) [m], over a rectangle, upright at its border.
+    """Return the closed surface between two heights, (n, m) [m], over a
+    rectangle, upright at its border.
 
-    The lines x, (n,), and y, (m,) [m], ascend, and the top is above the bottom everywhere: 4 (n - 1) (m - 1) + 4 (n + m
+    The lines x, (n,), and y, (m,) [m], ascend, and the top is above the bottom everywhere: 4
+    (n - 1) (m - 1) + 4 (n + m
     - 2) triangles.
     """
     n, m = len(x), len(y)
     plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    sheets = [np.concatenate([plane, height[..., None]], axis=-1).reshape(-1, 3) for height in (bottom, top)]
-    i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij"))
+    sheets = [
+        np.concatenate([plane, height[..., None]], axis=-1).reshape(-1, 3)
+        for height in (bottom, top)
+    ]
+    i, j = (
+        index.reshape(-1)
+        for index in np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
+    )
     a, b, c, d = i * m + j, (i + 1) * m + j, (i + 1) * m + j + 1, i * m + j + 1
     above = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     # Counter-clockwise as seen from above.
     border = np.concatenate(
-        [np.arange(n) * m, (n - 1) * m + np.arange(1, m), np.arange(n - 2, -1, -1) * m + m - 1, np.arange(m - 2, 0, -1)]
+        [
+            np.arange(n) * m,
+            (n - 1) * m + np.arange(1, m),
+            np.arange(n - 2, -1, -1) * m + m - 1,
+            np.arange(m - 2, 0, -1),
+        ]
     )
     following, size = np.roll(border, -1), n * m
     sides = [
@@ -109,22 +138,28 @@ def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
 
 
 def lobes(centres: Array, radii: Array, blend: float) -> Callable[[Array], Array]:
-    """Return about the signed distance [m] from a union of spheres, centres (k, 3) and radii (k,) [m].
+    """Return about the signed distance [m] from a union of spheres, centres
+    (k, 3) and radii (k,) [m].
 
-    With d_i the distance from sphere i it is -blend log(sum exp(-d_i/blend)): seams as wide as `blend` [m] are filled.
+    With d_i the distance from sphere i it is -blend log(sum exp(-d_i/blend)): seams as wide
+    as `blend` [m] are filled.
     """
 
     def distance(points: Array) -> Array:
         total = np.zeros(len(points))
         for centre, radius in zip(centres, radii, strict=True):
-            total += np.exp(np.minimum((radius - np.linalg.norm(points - centre, axis=1)) / blend, 600.0))
+            total += np.exp(
+                np.minimum((radius - np.linalg.norm(points - centre, axis=1)) / blend, 600.0)
+            )
         return -blend * np.log(np.maximum(total, 1e-300))
 
     return distance
 
 
 def bumps(points: Array, size: float) -> Array:
-    """Return billows over points, (n, 3) [m]: round bumps of about a `size` [m] with sharp valleys, 0 to 1."""
+    """Return billows over points, (n, 3) [m]: round bumps of about a `size` [m]
+    with sharp valleys, 0 to 1.
+    """
     turned = points @ _TURN.T / size
     waves = np.sin(turned + 1.7 * np.sin(0.61 * turned[:, [1, 2, 0]] + (0.37, 1.91, 4.13)))
     return np.sqrt(np.abs(waves).prod(axis=1) ** (2 / 3) + 1e-3)

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The height fog of engines as layers: what their parameters mean in metres, and what of it is not physical.
+"""The height fog of engines as layers: what their parameters mean in metres, and
+what of it is not physical.
 
-**Unreal.** With k = FogHeightFalloff/1000 and D = FogDensity/1000 per cm the density is D 2^(-k (z - z_0)). Its line
-integral, D (1 - 2^-F)/F with F = k times the rise, lacks 1/ln 2, and the transmittance is 2^-integral, which puts in
-one ln 2 more: the extinction is (ln 2)^2 D, that is 0.048045 FogDensity per metre, and H = 1/(k ln 2), 14.427 m over
-FogHeightFalloff. The volumetric fog (and the path tracer) has 1/2 for (ln 2)^2: 0.05 FogDensity ExtinctionScale per
-metre, 4.07 % denser.
+**Unreal.** With k = FogHeightFalloff/1000 and D = FogDensity/1000 per cm the density is D 2^(-k
+(z - z_0)). Its line integral, D (1 - 2^-F)/F with F = k times the rise, lacks 1/ln 2, and the
+transmittance is 2^-integral, which puts in one ln 2 more: the extinction is (ln 2)^2 D, that is
+0.048045 FogDensity per metre, and H = 1/(k ln 2), 14.427 m over FogHeightFalloff. The volumetric
+fog (and the path tracer) has 1/2 for (ln 2)^2: 0.05 FogDensity ExtinctionScale per metre, 4.07 %
+denser.
 
-**Unity HDRP.** The extinction is 1/meanFreePath up to baseHeight and falls to a thousandth at maximumHeight:
-H = (maximumHeight - baseHeight)/ln 1000, the difference being 0.01 m at least.
+**Unity HDRP.** The extinction is 1/meanFreePath up to baseHeight and falls to a thousandth at
+maximumHeight: H = (maximumHeight - baseHeight)/ln 1000, the difference being 0.01 m at least.
 
-**PlayCanvas.** By its pages: `density` at `heightBase`, falling by exp(-heightFalloff (z - heightBase)).
+**PlayCanvas.** By its pages: `density` at `heightBase`, falling by
+exp(-heightFalloff (z - heightBase)).
 
-Read in shader text of Unreal as copied in public repositories (4.22 and later), in HDRP's Fog.cs and
-VolumeRendering.hlsl, and in PlayCanvas' pages.
+Read in shader text of Unreal as copied in public repositories (4.22 and later), in HDRP's Fog.cs
+and VolumeRendering.hlsl, and in PlayCanvas' pages.
 """
 
 import math
@@ -28,28 +31,42 @@ _LEAST_DIFFERENCE = 0.01  # between HDRP's heights [m]
 Layer = tuple[float, float, float]  # extinction [1/m], base [m], scale height [m]
 
 
-ENGINES = tomllib.loads(Path(__file__).with_name("engine_fog.toml").read_text(encoding="utf-8"))  #: see the file
+#: see the file
+ENGINES = tomllib.loads(Path(__file__).with_name("engine_fog.toml").read_text(encoding="utf-8"))
 
 
 def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...], bool]:
-    """Return the layers that an engine's parameters stand for, and whether they are constant below their bases."""
+    """Return the layers that an engine's parameters stand for, and whether they are
+    constant below their bases.
+    """
     if engine not in ENGINES:
         raise ValueError(f"heightfog has engine = {engine}; expected one of {', '.join(ENGINES)}")
-    values = {name: given.get(name, default) for name, default in ENGINES[engine]["parameters"].items()}
+    values = {
+        name: given.get(name, default) for name, default in ENGINES[engine]["parameters"].items()
+    }
     missing = [name for name, value in values.items() if value == "needed"]
     if missing:
-        raise ValueError(f"heightfog of engine {engine} has no {missing[0]}; expected {', '.join(values)}")
+        raise ValueError(
+            f"heightfog of engine {engine} has no {missing[0]}; expected {', '.join(values)}"
+        )
     number = {name: float(value) for name, value in values.items()}
     if engine == "hdrp":
         if not number["meanFreePath"] > 0:
-            raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; expected a length above 0 m")
+            raise ValueError(
+                f"heightfog has meanFreePath = {number['meanFreePath']:g}; expected a length above "
+                "0 m"
+            )
         rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
-        return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), _is_clamped(engine)
+        return (
+            (1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),
+        ), _is_clamped(engine)
     if engine == "playcanvas":
-        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), _is_clamped(
-            engine
-        )
-    factor = _UNREAL * (0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2)
+        return (
+            (number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),
+        ), _is_clamped(engine)
+    factor = _UNREAL * (
+        0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2
+    )
     base, layers = number["FogHeight"], []
     for prefix, offset in (("", 0.0), ("Second", number["SecondFogHeightOffset"])):
         if number[f"{prefix}FogDensity"]:
@@ -58,7 +75,9 @@ def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...
     return tuple(layers), _is_clamped(engine)
 
 
-def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, constant: float) -> dict[str, float] | str:
+def parameters_of(
+    engine: str, layers: Sequence[Layer], *, clamped: bool, constant: float
+) -> dict[str, float] | str:
     """Return an engine's parameters for layers, or in words why it has none."""
     if not layers:
         return "it has no fog without a layer"
@@ -70,15 +89,26 @@ def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, consta
         return "it has one layer"
     sigma_t, base, scale = layers[0]
     if engine == "hdrp":
-        return {"meanFreePath": 1 / sigma_t, "baseHeight": base, "maximumHeight": base + scale * math.log(1000.0)}
+        return {
+            "meanFreePath": 1 / sigma_t,
+            "baseHeight": base,
+            "maximumHeight": base + scale * math.log(1000.0),
+        }
     if engine == "playcanvas":
         return {"density": sigma_t, "heightBase": base, "heightFalloff": 1 / scale}
     factor = _UNREAL * (0.5 if engine == "unreal-volumetric" else LN2**2)
-    found = {"FogDensity": sigma_t / factor, "FogHeightFalloff": 10 / (scale * LN2), "FogHeight": base}
+    found = {
+        "FogDensity": sigma_t / factor,
+        "FogHeightFalloff": 10 / (scale * LN2),
+        "FogHeight": base,
+    }
     if len(layers) == 2:
         sigma_t, other, scale = layers[1]
         found["SecondFogDensity"] = sigma_t / factor
-        found |= {"SecondFogHeightFalloff": 10 / (scale * LN2), "SecondFogHeightOffset": other - base}
+        found |= {
+            "SecondFogHeightFalloff": 10 / (scale * LN2),
+            "SecondFogHeightOffset": other - base,
+        }
     return found
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`heightfog`, a volume of Mitsuba whose density depends on height alone: layers of engines' exponential height fog.
+"""`heightfog`, a volume of Mitsuba whose density depends on height alone: layers of
+engines' exponential height fog.
 
     <medium type="heterogeneous" id="fog">
         <volume type="heightfog" name="sigma_t">
@@ -13,14 +14,16 @@ The extinction at a height z is, times the medium's `scale`,
 
     sigma_0 + sigma_1 exp(-(z - z_1)/H_1) + sigma_2 exp(-(z - z_2)/H_2)     [1/m],
 
-with max(z - z_i, 0) for z - z_i if `clamped` is true. Numbers that are not given are 0. `to_world` takes the unit cube
-to a box: its third axis is up, its lower and upper end are the floor and the cap of the fog, beyond which there is
-nothing. The fog has no sides: Mitsuba gets a box that is a thousand times as wide as it is high at least.
+with max(z - z_i, 0) for z - z_i if `clamped` is true. Numbers that are not given are 0. `to_world`
+takes the unit cube to a box: its third axis is up, its lower and upper end are the floor and the
+cap of the fog, beyond which there is nothing. The fog has no sides: Mitsuba gets a box that is a
+thousand times as wide as it is high at least.
 
-In place of these numbers it takes an engine's parameters, with `<string name="engine" value="unreal"/>`
-(`validation.scenes.engine_fog`).
+In place of these numbers it takes an engine's parameters, with `<string name="engine"
+value="unreal"/>` (`validation.scenes.engine_fog`).
 
-Mitsuba knows the volume once a scene was loaded, or `register_height_fog` was called for its variant.
+Mitsuba knows the volume once a scene was loaded, or `register_height_fog`
+was called for its variant.
 """
 
 import math
@@ -62,7 +65,9 @@ def _register(variant: str) -> None:
 
         def parameters_changed(self, keys=()):
             given = {name: float(value[0]) for name, value in self._numbers.items()}
-            self._largest = _ABOVE * _checked_largest(given, self._clamped, float(self._ends["floor"][0]))
+            self._largest = _ABOVE * _checked_largest(
+                given, self._clamped, float(self._ends["floor"][0])
+            )
             self._layers = [i for i in "12" if given[f"sigma_{i}"] > 0]
 
         def eval_1(self, it, active=True):
@@ -71,7 +76,9 @@ def _register(variant: str) -> None:
             for i in self._layers:
                 above = z - self._numbers[f"z_{i}"]
                 above = dr.maximum(above, 0) if self._clamped else above
-                total = total + self._numbers[f"sigma_{i}"] * dr.exp(-above / self._numbers[f"H_{i}"])
+                total = total + self._numbers[f"sigma_{i}"] * dr.exp(
+                    -above / self._numbers[f"H_{i}"]
+                )
             return dr.select((z >= self._ends["floor"]) & (z <= self._ends["cap"]), total, 0)
 
         def eval(self, it, active=True):
@@ -87,7 +94,9 @@ def _register(variant: str) -> None:
             callback.put("clamped", mi.Float(self._clamped), mi.ParamFlags.NonDifferentiable)
 
         def to_string(self):
-            numbers = ", ".join(f"{name} = {value[0]!r}" for name, value in (self._numbers | self._ends).items())
+            numbers = ", ".join(
+                f"{name} = {value[0]!r}" for name, value in (self._numbers | self._ends).items()
+            )
             up = [float(each[0]) for each in self._up]
             return f"HeightFog[{numbers}, clamped = {self._clamped}, up = {up}]"
 
@@ -95,13 +104,17 @@ def _register(variant: str) -> None:
 
 
 def _given(props: Any) -> tuple[dict[str, float], bool]:
-    """Return the numbers of the layers, and whether they are clamped, from numbers or from an engine's parameters."""
+    """Return the numbers of the layers, and whether they are clamped, from numbers or
+    from an engine's parameters.
+    """
     if "engine" not in props:
         given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
         return given, bool(props.get("clamped", False))
     engine = str(props["engine"])
     names = ENGINES[engine]["parameters"] if engine in ENGINES else ()
-    layers, clamped = layers_of(engine, {name: float(props[name]) for name in names if name in props})
+    layers, clamped = layers_of(
+        engine, {name: float(props[name]) for name in names if name in props}
+    )
     given = dict.fromkeys(NUMBERS, 0.0)
     for i, layer in enumerate(layers, 1):
         given |= dict(zip((f"sigma_{i}", f"z_{i}", f"H_{i}"), layer, strict=True))
@@ -112,18 +125,22 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
     """Return floor, cap, the unit vector up, and the transform of the box that Mitsuba gets."""
     if "to_world" not in props:
         raise ValueError(
-            "heightfog has no to_world; expected the box of the fog: the unit cube from its floor to its cap"
+            "heightfog has no to_world; expected the box of the fog: the unit cube from its floor "
+            "to its cap"
         )
     matrix = matrix_of(props["to_world"])
     height = float(np.linalg.norm(matrix[:3, 2]))
     if not (np.isfinite(matrix).all() and height > 0):
-        raise ValueError("heightfog has a to_world without a height; expected its cap above its floor")
+        raise ValueError(
+            "heightfog has a to_world without a height; expected its cap above its floor"
+        )
     up = matrix[:3, 2] / height
     axis = int(np.argmax(np.abs(up)))
     level = np.abs(matrix[axis, :2]).max() <= 1e-6 * np.abs(matrix[axis, 2])
     if abs(up[axis]) < 1 - 1e-6 or not level:
         raise ValueError(
-            "heightfog has a to_world that is tilted; expected its third axis along x, y or z, the others level"
+            "heightfog has a to_world that is tilted; expected its third axis along x, y or z, the "
+            "others level"
         )
     up = np.sign(up) * (np.arange(3) == axis)
     floor = float(up @ matrix[:3, 3])
@@ -143,17 +160,22 @@ def _checked_largest(given: dict[str, float], clamped: bool, floor: float) -> fl
         sigma_t, base, scale = (given[f"{name}_{i}"] for name in ("sigma", "z", "H"))
         if sigma_t and not scale > 0:
             raise ValueError(
-                f"heightfog has sigma_{i} = {sigma_t:g} and H_{i} = {scale:g}; expected a scale height above 0"
+                f"heightfog has sigma_{i} = {sigma_t:g} and H_{i} = {scale:g}; expected a scale "
+                "height above 0"
             )
         if sigma_t:
             above = (max(floor - base, 0.0) if clamped else floor - base) / scale
             total += sigma_t * (math.exp(-above) if above > -700 else math.inf)
     negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not given[name] >= 0]
     if negative:
-        raise ValueError(f"heightfog has {negative[0]} = {given[negative[0]]:g}; expected an extinction of 0 or more")
+        raise ValueError(
+            f"heightfog has {negative[0]} = {given[negative[0]]:g}; expected an extinction of 0 or "
+            "more"
+        )
     if not total < 1e9:
         raise ValueError(
-            f"heightfog has the extinction {total:g} per m at its floor, {floor:g} m: nothing bounds the density that "
+            f"heightfog has the extinction {total:g} per m at its floor, {floor:g} m: nothing "
+            "bounds the density that "
             "Mitsuba samples; raise the floor, the lower end of the box of to_world"
         )
     return total

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Hypertexture (Perlin and Hoffert 1989; Bouthors et al. 2008, section 8): a cloud's density by distance and noise.
+r"""Hypertexture (Perlin and Hoffert 1989; Bouthors et al. 2008, section 8): a cloud's
+density by distance and noise.
 
 With D the distance from the surface into the cloud, 0 on it, the density is
 
     rho(p) = S(D(p) + noise(p)),
 
-S a sigmoid from 0 to 1. Here S is 3 u^2 - 2 u^3 between two depths, so that it is 0 and 1 exactly outside them: the
-core is homogeneous, and where the first depth is above all of the noise, the surface is empty.
+S a sigmoid from 0 to 1. Here S is 3 u^2 - 2 u^3 between two depths, so that it is 0 and 1 exactly
+outside them: the core is homogeneous, and where the first depth is above all of the noise, the
+surface is empty.
 
-The noise is a sum of octaves of gradient noise (Perlin 1985, with the fade of Perlin 2002): gradients of unit length at
-the points with whole coordinates, by a hash of these and a seed (Jarzynski and Olano 2020), their planes blended by 6
-t^5 - 15 t^4 + 10 t^3. It is continuous with its first two derivatives, 0 at the whole points, and below sqrt(3)/2.
+The noise is a sum of octaves of gradient noise (Perlin 1985, with the fade of Perlin 2002):
+gradients of unit length at the points with whole coordinates, by a hash of these and a seed
+(Jarzynski and Olano 2020), their planes blended by 6 t^5 - 15 t^4 + 10 t^3. It is continuous with
+its first two derivatives, 0 at the whole points, and below sqrt(3)/2.
 """
 
 import numpy as np
@@ -24,15 +27,24 @@ SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [
 
 
 def hypertexture(
-    mesh: Mesh, voxels: int, *, cells: float, amplitude: float, depths: tuple[float, float], margin: float, seed: int
+    mesh: Mesh,
+    voxels: int,
+    *,
+    cells: float,
+    amplitude: float,
+    depths: tuple[float, float],
+    margin: float,
+    seed: int,
 ) -> tuple[NDArray[np.float32], Array, Array]:
-    """Return rho from 0 to 1 in a mesh, (z, y, x), and the corners of the box of its voxels, (3,) each [m].
+    """Return rho from 0 to 1 in a mesh, (z, y, x), and the corners of the box of
+    its voxels, (3,) each [m].
 
     The distance is computed on every second voxel, and linear between these; it takes seconds.
 
-    The mesh is closed; `voxels` is their number along each axis, in a box with a `margin` around the mesh [m]. The four
-    octaves of noise have `cells` as the size of the first, the largest value `amplitude` [m], and the `seed`; without
-    noise the density rises from 0 to 1 between two `depths` [m].
+    The mesh is closed; `voxels` is their number along each axis, in a box with a `margin` around
+    the mesh [m]. The four octaves of noise have `cells` as the size of the first, the largest value
+    `amplitude` [m], and the `seed`; without noise the density rises from 0 to 1 between two
+    `depths` [m].
     """
     from scipy.ndimage import map_coordinates
 
@@ -43,14 +55,17 @@ def hypertexture(
     distance = np.zeros(within.shape)
     distance[within] = distance_into(mesh, sparse[within])
     place = (np.arange(voxels) + 0.5) * (coarse / voxels) - 0.5
-    depth = map_coordinates(distance, np.meshgrid(place, place, place, indexing="ij"), order=1, mode="nearest")
+    depth = map_coordinates(
+        distance, np.meshgrid(place, place, place, indexing="ij"), order=1, mode="nearest"
+    )
     edge = (depth > 0) & (depth < depths[1] + amplitude)
     depth[edge] += amplitude * octaves(grid_points(low, high, (voxels,) * 3)[edge], cells, 4, seed)
     return sigmoid(depth, *depths).astype(np.float32), low, high
 
 
 def gradient_noise(points: Array, seed: int) -> Array:
-    """Return one octave of gradient noise at points (n, 3) in cells of size 1, (n,), within `NOISE_BOUND`.
+    """Return one octave of gradient noise at points (n, 3) in cells of size 1,
+    (n,), within `NOISE_BOUND`.
 
     The gradients of all cells of the box around the points are in memory.
     """
@@ -73,7 +88,8 @@ def gradient_noise(points: Array, seed: int) -> Array:
 def octaves(points: Array, size: float, count: int, seed: int) -> Array:
     """Return noise at points (n, 3) [m], (n,), within -1 and 1.
 
-    The cells of the first octave have the `size` [m]; those of each next are half as large and count half as much.
+    The cells of the first octave have the `size` [m]; those of each next are half as
+    large and count half as much.
     """
     weights = 0.5 ** np.arange(count)
     total = np.zeros(len(points))
@@ -89,20 +105,26 @@ def sigmoid(depth: Array, empty: float, full: float) -> Array:
 
 
 def grid_points(low: Array, high: Array, counts: tuple[int, int, int]) -> Array:
-    """Return the centres of the voxels of a box, (z, y, x, 3) [m], Mitsuba's order; `counts` along x, y, z."""
+    """Return the centres of the voxels of a box, (z, y, x, 3) [m], Mitsuba's
+    order; `counts` along x, y, z.
+    """
     along = [
-        first + (last - first) * (np.arange(n) + 0.5) / n for first, last, n in zip(low, high, counts, strict=True)
+        first + (last - first) * (np.arange(n) + 0.5) / n
+        for first, last, n in zip(low, high, counts, strict=True)
     ]
     z, y, x = np.meshgrid(along[2], along[1], along[0], indexing="ij")
     return np.stack([x, y, z], axis=-1)
 
 
 def inside(mesh: Mesh, points: Array) -> Bools:
-    """Return which points of a lattice, as of `grid_points`, lie within a closed mesh, (z, y, x)."""
+    """Return which points of a lattice, as of `grid_points`, lie within
+    a closed mesh, (z, y, x).
+    """
     vertices, faces = mesh
     x, y, z = points[0, 0, :, 0], points[0, :, 0, 1], points[:, 0, 0, 2]
     corners = vertices[faces]
-    # Columns may lie on edges of a regular mesh: a little beside it they meet one face, not two or none.
+    # Columns may lie on edges of a regular mesh: a little beside it they meet
+    # one face, not two or none.
     x, y = x + 1e-7 * (x[1] - x[0]), y + 1.7e-7 * (y[1] - y[0])
     ends = [np.searchsorted(own, corners[:, :, axis]) for axis, own in enumerate((x, y))]
     (x_low, x_high), (y_low, y_high) = ((end.min(axis=1), end.max(axis=1)) for end in ends)
@@ -112,23 +134,32 @@ def inside(mesh: Mesh, points: Array) -> Bools:
     row = y_low[triangle] + number // np.maximum(x_high - x_low, 1)[triangle]
     place = np.stack([x[column], y[row]], axis=1)
     a, b, c = (corners[triangle, corner] for corner in range(3))
-    areas = [_twice_area(first[:, :2], second[:, :2], place) for first, second in ((b, c), (c, a), (a, b))]
+    areas = [
+        _twice_area(first[:, :2], second[:, :2], place)
+        for first, second in ((b, c), (c, a), (a, b))
+    ]
     whole = np.sum(areas, axis=0)
-    crosses = np.logical_or(np.all(np.array(areas) > 0, axis=0), np.all(np.array(areas) < 0, axis=0))
-    height = np.sum([area * corner[:, 2] for area, corner in zip(areas, (a, b, c))], axis=0) / np.where(
-        crosses, whole, 1.0
+    crosses = np.logical_or(
+        np.all(np.array(areas) > 0, axis=0), np.all(np.array(areas) < 0, axis=0)
     )
-    # A line upwards leaves the mesh where it meets a face from inside: as many times as it entered it, plus one.
+    height = np.sum(
+        [area * corner[:, 2] for area, corner in zip(areas, (a, b, c))], axis=0
+    ) / np.where(crosses, whole, 1.0)
+    # A line upwards leaves the mesh where it meets a face from inside: as many times as
+    # it entered it, plus one.
     leaves = np.zeros((len(z) + 1, len(y), len(x)), dtype=np.int64)
     below = np.searchsorted(z, height[crosses])
-    np.add.at(leaves, (below, row[crosses], column[crosses]), np.sign(whole[crosses]).astype(np.int64))
+    np.add.at(
+        leaves, (below, row[crosses], column[crosses]), np.sign(whole[crosses]).astype(np.int64)
+    )
     return np.asarray(leaves[::-1].cumsum(axis=0)[::-1][1:] > 0)
 
 
 def distance_into(mesh: Mesh, points: Array) -> Array:
     """Return the distance of points, (n, 3) [m], from a mesh, (n,) [m].
 
-    It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too long at a depth of 40 m.
+    It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too
+    long at a depth of 40 m.
     """
     from scipy.spatial import cKDTree
 
@@ -138,14 +169,19 @@ def distance_into(mesh: Mesh, points: Array) -> Array:
     parts = np.ceil(longest / SAMPLING).astype(np.int64)
     samples = []
     for count in np.unique(parts):
-        i, j = (index.ravel() for index in np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij"))
+        i, j = (
+            index.ravel()
+            for index in np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
+        )
         weights = np.stack([i, j, count - i - j], axis=1)[i + j <= count] / count
         samples.append(np.einsum("wc,tcx->twx", weights, corners[parts == count]).reshape(-1, 3))
     return np.asarray(cKDTree(np.unique(np.concatenate(samples), axis=0)).query(points)[0])
 
 
 def _gradients(cell: Index, seed: int) -> Array:
-    """Return unit vectors by whole coordinates, (n, 3): `pcg3d` of Jarzynski and Olano 2020, in wrapping integers."""
+    """Return unit vectors by whole coordinates, (n, 3): `pcg3d` of Jarzynski and Olano
+    2020, in wrapping integers.
+    """
     v = (cell + np.array([seed, 3 * seed + 1, 7 * seed + 5])).astype(np.uint32)
     v = v * np.uint32(1664525) + np.uint32(1013904223)
     for _ in range(2):

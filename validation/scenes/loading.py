@@ -47,12 +47,13 @@ def load_scene(
 ) -> LoadedScene:
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 
-    `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a Mitsuba scene file;
-    `size`: width and height of the image [pixels]; the scene's own by default; `changes`: what is not as the scene has
-    it, values by name, see `validation.scenes.changes`.
+    `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a
+    Mitsuba scene file; `size`: width and height of the image [pixels]; the scene's own by default;
+    `changes`: what is not as the scene has it, values by name, see `validation.scenes.changes`.
 
-    Raises InputError for an unknown name, a missing or malformed file, a size that no image can have, and a change that
-    the scene cannot have. Whether methods and reference support the scene is checked when they read it.
+    Raises InputError for an unknown name, a missing or malformed file, a size that no image can
+    have, and a change that the scene cannot have. Whether methods and reference support the scene
+    is checked when they read it.
     """
     register_height_fog()
     record = find_record(name_or_path)
@@ -60,15 +61,27 @@ def load_scene(
     if record is not None:
         built = mi.load_dict(record.build(), optimize=False)
         if record.digest and not is_whole(built):
-            give_description(built, f"{record.name} {source_digest('airlight.validation.scenes.registry')}")
-        loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
+            give_description(
+                built, f"{record.name} {source_digest('airlight.validation.scenes.registry')}"
+            )
+        loaded = LoadedScene(
+            record.name, built, record.purpose, record.published, animation=record.animation
+        )
     else:
         path = _existing(name_or_path)
-        loaded = LoadedScene(path.stem, _read(path), f"The user's own scene, {path.name}.", "", path)
+        loaded = LoadedScene(
+            path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
+        )
     isotropic = isotropic_media(loaded.scene) if changes else {}
-    lobes = {isotropic[name]: value[0] for name, value in changes.items() if name in isotropic and any(value)}
+    lobes = {
+        isotropic[name]: value[0]
+        for name, value in changes.items()
+        if name in isotropic and any(value)
+    }
     if lobes:
-        scene = scene_with_lobes(record.build(), lobes) if record is not None else _read(path, lobes)
+        scene = (
+            scene_with_lobes(record.build(), lobes) if record is not None else _read(path, lobes)
+        )
         name_shapes(scene)
         loaded = replace(loaded, scene=scene)
     if size is not None:
@@ -89,31 +102,43 @@ def find_record(name: str) -> SceneRecord | None:
 
 
 def scene_stem(name_or_path: str) -> str:
-    """Return the stem of the names of a scene's files: its name, the stem of its path, or 'random-7'."""
+    """Return the stem of the names of a scene's files: its name, the stem of
+    its path, or 'random-7'.
+    """
     if is_random(name_or_path):
         return f"{PREFIX[:-1]}-{random_parts(name_or_path)[0]}"
     return Path(name_or_path).stem
 
 
 def scene_identity(scene: str) -> str:
-    """Return the identity of a scene: a name or seed with a digest of its description, the digest of a file's scene.
+    """Return the identity of a scene: a name or seed with a digest of its description, the
+    digest of a file's scene.
 
-    A scene that has no digest has an identity of its own each time: what is made of it is never found again.
+    A scene that has no digest has an identity of its own each time: what is made of
+    it is never found again.
     """
     if scene in SCENES:
         return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):
         seed, ranges = random_parts(scene)
         meshes = read_ranges(ranges)["meshes"] if ranges else ""
-        files = [RANGES, *([ranges] if ranges else []), *(sorted(Path(meshes).iterdir()) if meshes else [])]
-        stamps = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file())
+        files = [
+            RANGES,
+            *([ranges] if ranges else []),
+            *(sorted(Path(meshes).iterdir()) if meshes else []),
+        ]
+        stamps = tuple(
+            (path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file()
+        )
         return f"{PREFIX}{seed} {ranges is not None} {_files_digest(stamps)}"
     return scene_digest(load_scene(scene).scene) or f"no digest, {time.time_ns()}"
 
 
 @lru_cache(maxsize=8)
 def _files_digest(stamps: tuple[tuple[Path, int, int], ...]) -> str:
-    """Return a digest of files by their names and contents; a file that changed has another stamp."""
+    """Return a digest of files by their names and contents; a file that
+    changed has another stamp.
+    """
     digest = hashlib.sha256()
     for path, _, _ in stamps:
         digest.update(f"|{path.name} ".encode() + hashlib.sha256(path.read_bytes()).digest())
@@ -124,41 +149,54 @@ def parse_size(text: str) -> tuple[int, int]:
     """Return width and height [pixels] from 'WIDTHxHEIGHT'."""
     match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
     if not match:
-        raise InputError(f"size: got {text!r}, expected WIDTHxHEIGHT in pixels, for example 800x600")
+        raise InputError(
+            f"size: got {text!r}, expected WIDTHxHEIGHT in pixels, for example 800x600"
+        )
     return int(match[1]), int(match[2])
 
 
 def _existing(name_or_path: str) -> Path:
     path = Path(name_or_path)
     if name_or_path.strip() and path.is_dir():
-        raise InputError(f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML file in it")
+        raise InputError(
+            f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML file in it"
+        )
     if path.is_file():
         return path
     looks_like_path = path.suffix or os.sep in name_or_path
     if looks_like_path:
         raise InputError(
-            f"scene: there is no file {name_or_path}; expected a Mitsuba XML file, random:SEED or one of "
+            f"scene: there is no file {name_or_path}; expected a Mitsuba XML file, random:SEED or "
+            "one of "
             f"{', '.join(SCENES)}"
         )
     raise InputError(
-        f"scene: got {name_or_path!r}, expected one of {', '.join(SCENES)}, random:SEED or the path of a "
+        f"scene: got {name_or_path!r}, expected one of {', '.join(SCENES)}, random:SEED or the "
+        "path of a "
         "Mitsuba XML file" + nearest(name_or_path, SCENES)
     )
 
 
 def _check_films(loaded: LoadedScene) -> None:
-    """Refuse films without pixels, with more than any image has, and cropped ones, of which a part would be shown."""
+    """Refuse films without pixels, with more than any image has, and cropped ones, of
+    which a part would be shown.
+    """
     for sensor in loaded.scene.sensors():
-        size, crop = (tuple(int(n) for n in pair) for pair in (sensor.film().size(), sensor.film().crop_size()))
+        size, crop = (
+            tuple(int(n) for n in pair)
+            for pair in (sensor.film().size(), sensor.film().crop_size())
+        )
         where = f"scene {loaded.path or loaded.name}"
         if not all(1 <= n <= _LARGEST for n in size):
             raise InputError(
-                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, expected at least 1 x 1 and at most "
+                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, expected at least 1 "
+                "x 1 and at most "
                 f"{_LARGEST} on a side; change its width and height, or give --size"
             )
         if crop != size:
             raise InputError(
-                f"{where}: the camera's film is cropped to {crop[0]} x {crop[1]} of {size[0]} x {size[1]} pixels; "
+                f"{where}: the camera's film is cropped to {crop[0]} x {crop[1]} of {size[0]} x "
+                f"{size[1]} pixels; "
                 "remove crop_width, crop_height and crop_offset from the film, or give --size"
             )
 
@@ -168,7 +206,10 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
 
     scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):
-        raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole <scene>")
+        raise InputError(
+            f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole "
+            "<scene>"
+        )
     name_shapes(scene)
     check_numbers(scene)
     check_bodies(scene)
@@ -176,7 +217,9 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
 
 
 def name_shapes(scene) -> None:
-    """Name the shapes of a Mitsuba scene that have no id, such as 'sphere-2': messages and copies need names."""
+    """Name the shapes of a Mitsuba scene that have no id, such as 'sphere-2':
+    messages and copies need names.
+    """
     taken = {shape.id() for shape in scene.shapes()}
     for number, shape in enumerate(scene.shapes(), 1):
         if not shape.id():
@@ -188,7 +231,8 @@ def resize(scene, size: tuple[int, int]) -> None:
     """Set the image size of all cameras of a Mitsuba scene in place, width and height [pixels]."""
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(
-            f"size: got {size[0]}x{size[1]}, expected at least 1x1 and at most {_LARGEST} pixels on a side"
+            f"size: got {size[0]}x{size[1]}, expected at least 1x1 and at most {_LARGEST} pixels "
+            "on a side"
         )
     for sensor in scene.sensors():
         parameters = mi.traverse(sensor)

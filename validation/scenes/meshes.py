@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes by their parameters: solids, walls with openings, turned profiles, and the odd shapes of built-in scenes.
+"""Meshes by their parameters: solids, walls with openings, turned profiles, and the odd
+shapes of built-in scenes.
 
-A mesh is a pair of vertices and faces. Closed meshes store each vertex once, every edge has two triangles, and faces
-run counter-clockwise as seen from outside: silhouette edges form closed loops only if triangles share their vertices.
+A mesh is a pair of vertices and faces. Closed meshes store each vertex once, every edge has two
+triangles, and faces run counter-clockwise as seen from outside: silhouette edges form closed loops
+only if triangles share their vertices.
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,9 @@ Mesh = tuple[Vertices, Faces]
 
 
 def rotation(axis: ArrayLike, degrees: float) -> Array:
-    """Return the matrix, (3, 3), of a rotation about an axis through the origin by an angle [degrees] (Rodrigues)."""
+    """Return the matrix, (3, 3), of a rotation about an axis through the origin by an
+    angle [degrees] (Rodrigues).
+    """
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.deg2rad(degrees)
@@ -26,7 +30,9 @@ def rotation(axis: ArrayLike, degrees: float) -> Array:
 
 
 def placed(mesh: Mesh, position: ArrayLike, turn: Array | None = None) -> Mesh:
-    """Return a mesh turned about the origin by a matrix, (3, 3), then moved by `position`, (3,) [m]."""
+    """Return a mesh turned about the origin by a matrix, (3, 3), then moved
+    by `position`, (3,) [m].
+    """
     vertices, faces = mesh
     return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
 
@@ -47,9 +53,11 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
-    """Return the closed surface of a profile turned about the z axis, 2 sides len(radius) triangles.
+    """Return the closed surface of a profile turned about the z axis, 2
+    sides len(radius) triangles.
 
-    Radii and heights go from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
+    Radii and heights go from bottom to top, (n,) each [m]. Every radius is
+    positive; fans close the ends.
     """
     radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -58,10 +66,11 @@ def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
 
 
 def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
-    """Return the closed surface through n rings of k points, (n, k, 3) [m]: 2 k n triangles with or without ends.
+    """Return the closed surface through n rings of k points, (n, k, 3) [m]: 2 k n
+    triangles with or without ends.
 
-    Each ring runs counter-clockwise as seen from the next one. The last is joined to the first in a ring of rings;
-    otherwise fans about the mean of a ring close both ends.
+    Each ring runs counter-clockwise as seen from the next one. The last is joined to the first in a
+    ring of rings; otherwise fans about the mean of a ring close both ends.
     """
     rings = np.asarray(rings, dtype=np.float64)
     count, sides = rings.shape[:2]
@@ -70,7 +79,10 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
     faces = []
     for ring in range(count if ring_of_rings else count - 1):
         low, high = ring * sides, (ring + 1) % count * sides
-        faces += [np.stack([low + i, low + j, high + j], axis=1), np.stack([low + i, high + j, high + i], axis=1)]
+        faces += [
+            np.stack([low + i, low + j, high + j], axis=1),
+            np.stack([low + i, high + j, high + i], axis=1),
+        ]
     vertices = rings.reshape(-1, 3)
     if not ring_of_rings:
         first, last, end = count * sides, count * sides + 1, (count - 1) * sides
@@ -82,43 +94,71 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
     return vertices, np.concatenate(faces)
 
 
-def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return an open rectangle from a corner and the edges that start there [m]; its normal is across x up.
+def grid(
+    corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]
+) -> Mesh:
+    """Return an open rectangle from a corner and the edges that start there [m];
+    its normal is across x up.
 
     Along `across` and along `up` it has so many `cells` of two triangles.
     """
     n, m = cells
     u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
-    vertices = np.asarray(corner) + u.reshape(-1, 1) * np.asarray(across) + v.reshape(-1, 1) * np.asarray(up)
+    vertices = (
+        np.asarray(corner)
+        + u.reshape(-1, 1) * np.asarray(across)
+        + v.reshape(-1, 1) * np.asarray(up)
+    )
     i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
-    a, b, c, d = i * (m + 1) + j, (i + 1) * (m + 1) + j, (i + 1) * (m + 1) + j + 1, i * (m + 1) + j + 1
+    a, b, c, d = (
+        i * (m + 1) + j,
+        (i + 1) * (m + 1) + j,
+        (i + 1) * (m + 1) + j + 1,
+        i * (m + 1) + j + 1,
+    )
     return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def box(size: ArrayLike) -> Mesh:
-    """Return a box about the origin with edges of lengths `size`, (3,) [m]: 12 triangles, 8 vertices."""
+    """Return a box about the origin with edges of lengths `size`, (3,) [m]:
+    12 triangles, 8 vertices.
+    """
     corners = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
-    quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+    quads = np.array(
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    )
     return corners * np.asarray(size), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def tetrahedron(radius: float) -> Mesh:
-    """Return a regular tetrahedron whose corners are at a distance `radius` [m] from the origin: 4 triangles."""
+    """Return a regular tetrahedron whose corners are at a distance `radius` [m] from
+    the origin: 4 triangles.
+    """
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
     return radius * corners, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 
 
 def icosphere(levels: int) -> Mesh:
-    """Return the unit sphere as an icosahedron subdivided `levels` times: 20 * 4^levels triangles, strictly convex."""
+    """Return the unit sphere as an icosahedron subdivided `levels` times: 20 * 4^levels
+    triangles, strictly convex.
+    """
     golden = (1 + np.sqrt(5)) / 2
     base = [(s, t * golden) for s in (-1, 1) for t in (-1, 1)]
-    vertices = np.array([(0, s, t) for s, t in base] + [(s, t, 0) for s, t in base] + [(t, 0, s) for s, t in base])
+    vertices = np.array(
+        [(0, s, t) for s, t in base] + [(s, t, 0) for s, t in base] + [(t, 0, s) for s, t in base]
+    )
     # The faces of the icosahedron are its triples of vertices at distance 2.
     near = np.isclose(np.linalg.norm(vertices[:, None] - vertices, axis=2), 2)
     triples = [
-        (a, b, c) for a in range(12) for b in range(a) for c in range(b) if near[a, b] and near[b, c] and near[a, c]
+        (a, b, c)
+        for a in range(12)
+        for b in range(a)
+        for c in range(b)
+        if near[a, b] and near[b, c] and near[a, c]
     ]
-    faces = np.array([t if np.linalg.det(vertices[list(t)]) > 0 else (t[0], t[2], t[1]) for t in triples])
+    faces = np.array(
+        [t if np.linalg.det(vertices[list(t)]) > 0 else (t[0], t[2], t[1]) for t in triples]
+    )
     vertices = vertices / np.linalg.norm(vertices[0])
     for _ in range(levels):
         known = len(vertices)
@@ -128,7 +168,9 @@ def icosphere(levels: int) -> Mesh:
 
 
 def divided(mesh: Mesh) -> Mesh:
-    """Return each face as four, cut at the midpoints of its edges, which come after the vertices that were there."""
+    """Return each face as four, cut at the midpoints of its edges, which come after the
+    vertices that were there.
+    """
     vertices, faces = mesh
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     unique, number = np.unique(edges, axis=0, return_inverse=True)
@@ -136,11 +178,15 @@ def divided(mesh: Mesh) -> Mesh:
     a, b, c = faces.T
     corners = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
     middles = vertices[unique].mean(axis=1)
-    return np.concatenate([vertices, middles]), np.concatenate([np.stack(triple, axis=1) for triple in corners])
+    return np.concatenate([vertices, middles]), np.concatenate(
+        [np.stack(triple, axis=1) for triple in corners]
+    )
 
 
 def gem(sides: int, rings: int) -> Mesh:
-    """Return a faceted unit sphere whose rings are turned by half a side each: 2 sides rings triangles, convex."""
+    """Return a faceted unit sphere whose rings are turned by half a side each: 2 sides
+    rings triangles, convex.
+    """
     polar = np.pi * (1 - np.arange(1, rings + 1) / (rings + 1))
     i = np.arange(sides)
     j = (i + 1) % sides
@@ -151,16 +197,24 @@ def gem(sides: int, rings: int) -> Mesh:
     faces = [np.stack([np.full(sides, rings * sides), j, i], axis=1)]
     for low in range(0, (rings - 1) * sides, sides):
         high = low + sides
-        faces += [np.stack([low + i, low + j, high + i], axis=1), np.stack([low + j, high + j, high + i], axis=1)]
+        faces += [
+            np.stack([low + i, low + j, high + i], axis=1),
+            np.stack([low + j, high + j, high + i], axis=1),
+        ]
     last = (rings - 1) * sides
     faces += [np.stack([np.full(sides, rings * sides + 1), last + i, last + j], axis=1)]
-    return np.concatenate([points.reshape(-1, 3), [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]]), np.concatenate(faces)
+    return np.concatenate(
+        [points.reshape(-1, 3), [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]]
+    ), np.concatenate(faces)
 
 
 def torus(radius: float, thickness: float, cells: tuple[int, int]) -> Mesh:
-    """Return a torus about the z axis, with the radius of its tube [m]: cells around the axis and around the tube."""
+    """Return a torus about the z axis, with the radius of its tube [m]: cells around the
+    axis and around the tube.
+    """
     around = 2 * np.pi * np.arange(cells[0])[:, None] / cells[0]
-    # Clockwise in (distance, height): then each ring is counter-clockwise as seen from the next one.
+    # Clockwise in (distance, height): then each ring is counter-clockwise
+    # as seen from the next one.
     across = -2 * np.pi * np.arange(cells[1])[None] / cells[1]
     distance = radius + thickness * np.cos(across)
     height = np.broadcast_to(thickness * np.sin(across), (cells[0], cells[1]))
@@ -169,7 +223,8 @@ def torus(radius: float, thickness: float, cells: tuple[int, int]) -> Mesh:
 
 
 def prism(outline: ArrayLike, height: float) -> Mesh:
-    """Return an upright prism on z = 0 of 4 k triangles; its outline, (k, 2) [m], runs counter-clockwise.
+    """Return an upright prism on z = 0 of 4 k triangles; its outline, (k, 2)
+    [m], runs counter-clockwise.
 
     The outline is star-shaped about the mean of its points.
     """
@@ -178,13 +233,18 @@ def prism(outline: ArrayLike, height: float) -> Mesh:
 
 
 def star(inner: float, outer: float, points: int) -> Array:
-    """Return the outline of a star about the origin with an inner and an outer radius [m], (2 points, 2) [m]."""
+    """Return the outline of a star about the origin with an inner and an outer
+    radius [m], (2 points, 2) [m].
+    """
     angle = np.pi * np.arange(2 * points) / points
-    return np.where(np.arange(2 * points) % 2, inner, outer)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.where(np.arange(2 * points) % 2, inner, outer)[:, None] * np.stack(
+        [np.cos(angle), np.sin(angle)], axis=1
+    )
 
 
 def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
-    """Return half a ring of rectangular section in the plane y = 0, standing on z = 0: 8 (steps + 1) triangles.
+    """Return half a ring of rectangular section in the plane y = 0, standing on z = 0:
+    8 (steps + 1) triangles.
 
     It has an inner and an outer radius and a depth along y [m], and so many segments.
     """
@@ -195,8 +255,12 @@ def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
     return skin(np.stack([distance * np.cos(angle), side, distance * np.sin(angle)], axis=2))
 
 
-def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return the wall `grid` with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles."""
+def gable(
+    corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]
+) -> Mesh:
+    """Return the wall `grid` with a gable of half its height: 2 cells[0]
+    cells[1] + cells[0] triangles.
+    """
     vertices, faces = grid(corner, across, up, cells)
     apex = np.asarray(corner) + 0.5 * np.asarray(across) + 1.5 * np.asarray(up)
     eaves = np.arange(cells[0] + 1) * (cells[1] + 1) + cells[1]
@@ -205,19 +269,27 @@ def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float],
 
 
 def pierced(
-    corner: Sequence[float], across: Sequence[float], up: Sequence[float], *, hole, cells: tuple[int, int]
+    corner: Sequence[float],
+    across: Sequence[float],
+    up: Sequence[float],
+    *,
+    hole,
+    cells: tuple[int, int],
 ) -> Mesh:
-    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0] of which touch the hole.
+    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0]
+    of which touch the hole.
 
-    A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal across x up. The hole
-    has the position of its centre along `across` and along `up`, as fractions of them, and a radius [m]. Cells are
-    counted around the hole, even and at least 8, and from the hole to the border.
+    A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal
+    across x up. The hole has the position of its centre along `across` and along `up`, as fractions
+    of them, and a radius [m]. Cells are counted around the hole, even and at least 8, and from the
+    hole to the border.
     """
     u, v, radius = hole
     right, above = np.asarray(across, dtype=np.float64), np.asarray(up, dtype=np.float64)
     angle = 2 * np.pi * (np.arange(cells[0]) + 0.5) / cells[0]
     width, height = np.linalg.norm(right), np.linalg.norm(above)
-    # Each ray from the centre ends at the side that it meets first; the ray nearest to a corner ends at the corner.
+    # Each ray from the centre ends at the side that it meets first; the ray nearest to a
+    # corner ends at the corner.
     x, y = np.cos(angle), np.sin(angle)
     sideways = np.where(x > 0, 1 - u, u) * width / np.abs(x)
     upwards = np.where(y > 0, 1 - v, v) * height / np.abs(y)
@@ -226,21 +298,29 @@ def pierced(
         border[np.argmax((x * end[0] + y * end[1]) / np.linalg.norm(end))] = end
     fraction = np.arange(cells[1] + 1)[:, None, None] / cells[1]
     offset = (1 - fraction) * radius * np.stack([x, y], axis=1) + fraction * border
-    points = np.asarray(corner) + (u + offset[..., :1] / width) * right + (v + offset[..., 1:] / height) * above
+    points = (
+        np.asarray(corner)
+        + (u + offset[..., :1] / width) * right
+        + (v + offset[..., 1:] / height) * above
+    )
     i, n = np.arange(cells[0]), cells[0]
     j = (i + 1) % n
     faces = []
     for low in range(0, cells[1] * n, n):
         high = low + n
-        faces += [np.stack([low + i, high + i, high + j], axis=1), np.stack([low + i, high + j, low + j], axis=1)]
+        faces += [
+            np.stack([low + i, high + i, high + j], axis=1),
+            np.stack([low + i, high + j, low + j], axis=1),
+        ]
     return points.reshape(-1, 3), np.concatenate(faces)
 
 
 def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence[float]) -> Mesh:
-    """Return a closed upright slab in the plane x = corner[0] with a hole in every cell (i, j) with i and j odd.
+    """Return a closed upright slab in the plane x = corner[0] with a hole in every cell
+    (i, j) with i and j odd.
 
-    Lines between cells along y and z ascend from the lowest `corner` of the slab, (3,) [m], on, an even number of each,
-    (n,) [m]; its thickness is towards -x [m].
+    Lines between cells along y and z ascend from the lowest `corner` of the slab, (3,) [m], on, an
+    even number of each, (n,) [m]; its thickness is towards -x [m].
     """
     n, m = len(along) - 1, len(up) - 1
     y, z = np.meshgrid(along, up, indexing="ij")
@@ -262,24 +342,41 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
             quads.append([at(*point, 0) for point in ring])
             quads.append([at(*point, 1) for point in reversed(ring)])
             # Where the next cell is open, a wall joins the two layers.
-            for a, b, beyond in zip(ring, [*ring[1:], ring[0]], [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)]):
+            for a, b, beyond in zip(
+                ring, [*ring[1:], ring[0]], [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)]
+            ):
                 if not solid(*beyond):
                     quads.append([at(*a, 1), at(*b, 1), at(*b, 0), at(*a, 0)])
     faces = np.array(quads)
     return vertices, np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-# Shapes of single scenes ----------------------------------------------------------------------------------------------
+# Shapes of single scenes --------------------------------------------------------------------------
 
 
-def profile(stops: Sequence[float], radii: Sequence[float], *, height: float, rings: int, sides: int) -> Mesh:
-    """Return the lathe of a profile that is linear between stops (fractions of the height) with radii [m]."""
+def profile(
+    stops: Sequence[float], radii: Sequence[float], *, height: float, rings: int, sides: int
+) -> Mesh:
+    """Return the lathe of a profile that is linear between stops (fractions of
+    the height) with radii [m].
+    """
     level = np.linspace(0.0, 1.0, rings)
     return lathe(np.interp(level, stops, radii), height * level, sides)
 
 
-def vase(radius: float, swelling: float, wave: float, phase: float, *, height: float, rings: int, sides: int) -> Mesh:
-    """Return the lathe of the profile radius + swelling sin^2(wave level + phase) [m], level from 0 to 1."""
+def vase(
+    radius: float,
+    swelling: float,
+    wave: float,
+    phase: float,
+    *,
+    height: float,
+    rings: int,
+    sides: int,
+) -> Mesh:
+    """Return the lathe of the profile radius + swelling sin^2(wave level +
+    phase) [m], level from 0 to 1.
+    """
     level = np.linspace(0.0, 1.0, rings)
     return lathe(radius + swelling * np.sin(wave * level + phase) ** 2, height * level, sides)
 
@@ -287,11 +384,16 @@ def vase(radius: float, swelling: float, wave: float, phase: float, *, height: f
 def spindle(height: float, rings: int, sides: int) -> Mesh:
     """Return a lathe that is thin at its ends and swells twice between them."""
     level = np.linspace(0.0, 1.0, rings)
-    return lathe(0.023 + 0.093 * np.sin(np.pi * level) ** 2 * (1.3 + np.cos(9.1 * level)), height * level, sides)
+    return lathe(
+        0.023 + 0.093 * np.sin(np.pi * level) ** 2 * (1.3 + np.cos(9.1 * level)),
+        height * level,
+        sides,
+    )
 
 
 def faceted_sphere(radius: float, rings: int, sides: int, toward: Sequence[float]) -> Mesh:
-    """Return a sphere of rings in the middle of equal bands of the polar angle; its axis points along `toward`, (3,).
+    """Return a sphere of rings in the middle of equal bands of the polar angle; its axis
+    points along `toward`, (3,).
 
     Seen along the axis its silhouette is one ring.
     """
@@ -314,7 +416,9 @@ def fluted_column(
     rings: int,
     sides: int,
 ) -> Mesh:
-    """Return a column with twelve flutes: its radius falls by `taper`, foot and head add (size [m], decay [height])."""
+    """Return a column with twelve flutes: its radius falls by `taper`, foot and head add
+    (size [m], decay [height]).
+    """
     level = np.linspace(0.0, 1.0, rings)
     widened = foot[0] * np.exp(-level / foot[1]) + head[0] * np.exp(-(1 - level) / head[1])
     vertices, faces = lathe(radius * (1 - taper * level) + widened, height * level, sides)
@@ -324,11 +428,15 @@ def fluted_column(
 
 
 def statue(fold: float) -> Mesh:
-    """Return a draped figure on a plinth, with folds that turn with height from the angle `fold`: 3584 triangles."""
+    """Return a draped figure on a plinth, with folds that turn with height from the
+    angle `fold`: 3584 triangles.
+    """
     level = np.linspace(0.0, 1.0, 32)[:, None]
     angle = 2 * np.pi * np.arange(56)[None] / 56
     stops = [0, 0.2, 0.21, 0.3, 0.55, 0.62, 0.79, 0.83, 0.86, 0.93, 0.98, 1]
-    outline = np.interp(level, stops, [0.37, 0.37, 0.29, 0.31, 0.19, 0.2, 0.27, 0.11, 0.08, 0.13, 0.1, 0.03])
+    outline = np.interp(
+        level, stops, [0.37, 0.37, 0.29, 0.31, 0.19, 0.2, 0.27, 0.11, 0.08, 0.13, 0.1, 0.03]
+    )
     draped = np.clip((level - 0.21) / 0.1, 0, 1) * np.clip((0.8 - level) / 0.2, 0, 1)
     folds = 1 + 0.13 * draped * np.cos(7 * angle + 5.3 * level + fold)
     radius = outline * folds * (1 - 0.23 * draped * np.sin(angle) ** 2)
@@ -336,14 +444,17 @@ def statue(fold: float) -> Mesh:
     return skin(np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=2))
 
 
-def knot(turns: Sequence[int], radii: Sequence[float], thickness: float, cells: Sequence[int]) -> Mesh:
-    """Return a tube of uneven section along a knot on a torus about the z axis: 2 cells[0] cells[1] triangles.
+def knot(
+    turns: Sequence[int], radii: Sequence[float], thickness: float, cells: Sequence[int]
+) -> Mesh:
+    """Return a tube of uneven section along a knot on a torus about the z axis: 2
+    cells[0] cells[1] triangles.
 
-    The normal of the torus is perpendicular to every curve on it. It therefore orients the sections all the way round,
-    and the last section joins the first without a seam.
+    The normal of the torus is perpendicular to every curve on it. It therefore orients the sections
+    all the way round, and the last section joins the first without a seam.
 
-    The turns about the axis of the torus and about its core are coprime; the radii are those of the core, and from it
-    to the middle of the tube [m]; cells are along and about the tube.
+    The turns about the axis of the torus and about its core are coprime; the radii are those of the
+    core, and from it to the middle of the tube [m]; cells are along and about the tube.
     """
     (about, across), (radius, core), (rings, sides) = turns, radii, cells
     t = 2 * np.pi * np.arange(rings)[:, None] / rings
@@ -360,14 +471,20 @@ def knot(turns: Sequence[int], radii: Sequence[float], thickness: float, cells: 
     ridges = 1 + 0.21 * np.cos(3 * a + (about + across) * t) + 0.13 * np.cos(2 * a - 5 * t + 0.9)
     section = (thickness * swelling * ridges)[:, :, None]
     centre = radius * outwards + core * normal
-    return skin(centre + section * (np.cos(a)[:, :, None] * normal + np.sin(a)[:, :, None] * side), ring_of_rings=True)
+    return skin(
+        centre + section * (np.cos(a)[:, :, None] * normal + np.sin(a)[:, :, None] * side),
+        ring_of_rings=True,
+    )
 
 
-def bent(points: Vertices, waves: Sequence[tuple[Sequence[float], Sequence[float], float]]) -> Vertices:
-    """Return points, (n, 3) [m], displaced by waves: displacement [m], wave vector [1/m] and phase of each.
+def bent(
+    points: Vertices, waves: Sequence[tuple[Sequence[float], Sequence[float], float]]
+) -> Vertices:
+    """Return points, (n, 3) [m], displaced by waves: displacement [m], wave vector
+    [1/m] and phase of each.
 
-    Where the products of displacement and wave vector sum to less than 1, the map is one to one: no surface touches
-    another or turns inside out.
+    Where the products of displacement and wave vector sum to less than 1, the map is one to one: no
+    surface touches another or turns inside out.
     """
     moved = points.copy()
     for displacement, wave, phase in waves:

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The numbers of a scene: each is refused by name where no float32 arithmetic can give a finite image with it.
+"""The numbers of a scene: each is refused by name where no float32 arithmetic can
+give a finite image with it.
 
-Mitsuba takes NaN, infinity and 1e30 nearly everywhere. The methods square lengths, and the area of a triangle and the
-planes of a silhouette need the fourth power of a coordinate: of 1e9 m that is 1e36, below the largest float32 number,
-3.4e38. An intensity is divided by a square and multiplied by coefficients, so its limit is lower than the type's.
+Mitsuba takes NaN, infinity and 1e30 nearly everywhere. The methods square lengths, and the area of
+a triangle and the planes of a silhouette need the fourth power of a coordinate: of 1e9 m that is
+1e36, below the largest float32 number, 3.4e38. An intensity is divided by a square and multiplied
+by coefficients, so its limit is lower than the type's.
 """
 
 from collections.abc import Iterator
@@ -31,7 +33,8 @@ _FLATTEST = 1e-9  # of one axis beside another
 
 
 def check_numbers(scene: Any) -> None:
-    """Refuse an `mi.Scene` with a number that no image can be computed from, by the name of its part.
+    """Refuse an `mi.Scene` with a number that no image can be computed from,
+    by the name of its part.
 
     A scene whose lengths are lost in its coordinates is refused too (`realtime.scene.rounding`).
     """
@@ -47,11 +50,18 @@ def check_numbers(scene: Any) -> None:
 
 
 def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the parts of a scene under names that a user knows; media first, which are parts of others too."""
+    """Yield the parts of a scene under names that a user knows; media first, which
+    are parts of others too.
+    """
     media = [sensor.get_medium() for sensor in scene.sensors()]
     for shape in scene.shapes():
         media += [shape.interior_medium(), shape.exterior_medium()]
-    parts = (("medium", media), ("camera", scene.sensors()), ("light", scene.emitters()), ("shape", scene.shapes()))
+    parts = (
+        ("medium", media),
+        ("camera", scene.sensors()),
+        ("light", scene.emitters()),
+        ("shape", scene.shapes()),
+    )
     for kind, plugins in parts:
         for number, plugin in enumerate(plugins, 1):
             if plugin is not None:
@@ -63,7 +73,9 @@ def _name(kind: str, plugin: Any, number: int) -> str:
 
 
 def _parameter(parameters: Any, key: str) -> Any:
-    """Return a parameter, None where a plugin has none in its place, at which Mitsuba's own look-up fails."""
+    """Return a parameter, None where a plugin has none in its place, at which
+    Mitsuba's own look-up fails.
+    """
     try:
         return parameters[key]
     except TypeError:
@@ -74,7 +86,8 @@ def _numbers(value: Any) -> Array | None:
     """Return the numbers of a parameter, None where it has none."""
     if value is None:
         return None
-    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its
+    # first channel six times.
     matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:
         return np.array(matrix, dtype=np.float64)
@@ -88,22 +101,32 @@ def _check(name: str, key: str, values: Array) -> None:
         return
     if words[-1] == _CUTOFF and not np.all((values > 0) & (values < 90)):
         raise InputError(
-            f"{name}: {key} has {values.ravel()[0]:g} degrees; expected more than 0 and less than 90: a wider light is "
+            f"{name}: {key} has {values.ravel()[0]:g} degrees; expected more than 0 and less than "
+            "90: a wider light is "
             "a 'point' light"
         )
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
     if "albedo" in words:
         largest = _LARGEST_ALBEDO
-    least = 0.0 if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES else -largest
+    least = (
+        0.0
+        if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES
+        else -largest
+    )
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
-        way = "a medium scatters no more than arrives" if "albedo" in words else "use other units, or the right sign"
+        way = (
+            "a medium scatters no more than arrives"
+            if "albedo" in words
+            else "use other units, or the right sign"
+        )
         given = f"{values[wrong].ravel()[0]:g}"
         given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
         wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:.3g}"
         raise InputError(
-            f"{name}: {key.removesuffix('.value').removesuffix('.value')} has {given}; expected {wanted}: {way}"
+            f"{name}: {key.removesuffix('.value').removesuffix('.value')} has {given}; expected "
+            f"{wanted}: {way}"
         )
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))
@@ -113,7 +136,8 @@ def _check_transform(name: str, key: str, matrix: Array) -> None:
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[-1] < _LEAST_SCALE or scale[-1] < _FLATTEST * scale[0]:
         raise InputError(
-            f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; expected at least "
+            f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; "
+            "expected at least "
             f"{_LEAST_SCALE:g} m, and {_FLATTEST:g} of the other: give it a size"
         )
 
@@ -123,4 +147,6 @@ def _check_faces(name: str, parameters: Any) -> None:
     faces = np.array(parameters["faces"], dtype=np.int64)
     count = len(np.array(parameters["vertex_positions"])) // 3
     if faces.size and faces.max() >= count:
-        raise InputError(f"{name}: a face has vertex {faces.max()} of {count}, counted from 0; repair the mesh")
+        raise InputError(
+            f"{name}: a face has vertex {faces.max()} of {count}, counted from 0; repair the mesh"
+        )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of scenes, for `mi.load_dict`: shapes of meshes, media, phase functions, lights and cameras."""
+"""The parts of scenes, for `mi.load_dict`: shapes of meshes, media, phase
+functions, lights and cameras.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +16,9 @@ from airlight.validation.scenes.meshes import Mesh
 
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
-    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB `reflectance` [1], 0 to 1."""
+    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB
+    `reflectance` [1], 0 to 1.
+    """
     diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
     return mesh_with_material(name, mesh, {"type": "twosided", "bsdf": diffuse})
 
@@ -25,7 +29,8 @@ def mesh_with_material(name: str, mesh: Mesh, material):
 
 
 def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
-    """Return a Mitsuba mesh of the material `null` with a medium inside, and outside where that is not vacuum.
+    """Return a Mitsuba mesh of the material `null` with a medium inside, and outside
+    where that is not vacuum.
 
     Media are dictionaries or Mitsuba's own.
     """
@@ -50,7 +55,9 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
 def fog(
     sigma_t: float | Sequence[float], albedo: Sequence[float], phase: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return a homogeneous medium with the id 'fog', of grey or RGB extinction [1/m], isotropic by default."""
+    """Return a homogeneous medium with the id 'fog', of grey or RGB extinction
+    [1/m], isotropic by default.
+    """
     grey = isinstance(sigma_t, float)
     channels = [sigma_t] if isinstance(sigma_t, float) else list(sigma_t)
     scale = max(channels)
@@ -67,14 +74,22 @@ def fog(
 
 
 def height_fog(
-    layers: Sequence[Sequence[float]], floor: float, cap: float, *, albedo: Sequence[float], phase: dict[str, Any]
+    layers: Sequence[Sequence[float]],
+    floor: float,
+    cap: float,
+    *,
+    albedo: Sequence[float],
+    phase: dict[str, Any],
 ) -> dict[str, Any]:
-    """Return height fog with the id 'fog': one or two layers of extinction [1/m], base and scale height [m].
+    """Return height fog with the id 'fog': one or two layers of extinction [1/m],
+    base and scale height [m].
 
     `floor` and `cap` are the heights where it ends [m].
     """
     numbers = {
-        f"{name}_{i}": value for i, layer in enumerate(layers, 1) for name, value in zip(("sigma", "z", "H"), layer)
+        f"{name}_{i}": value
+        for i, layer in enumerate(layers, 1)
+        for name, value in zip(("sigma", "z", "H"), layer)
     }
     box = mi.ScalarTransform4f().translate([0, 0, floor]).scale([1, 1, cap - floor])
     return {
@@ -88,7 +103,9 @@ def height_fog(
 
 
 def phase_function(words: str, values: int) -> dict[str, Any]:
-    """Return a phase function from words such as 'hg:0.37', a table of `values` where Mitsuba has no other plugin."""
+    """Return a phase function from words such as 'hg:0.37', a table of `values` where
+    Mitsuba has no other plugin.
+    """
     name, _, number = words.partition(":")
     if name == "hg":
         return {"type": "hg", "g": float(number)}
@@ -96,14 +113,16 @@ def phase_function(words: str, values: int) -> dict[str, Any]:
 
 
 def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
-    """Return any phase function as a table, which Mitsuba and both readers of scenes take; 'mie' has no other plugin.
+    """Return any phase function as a table, which Mitsuba and both readers of scenes take;
+    'mie' has no other plugin.
 
-    Each value is the mean of the function under the hat of its cosine: the table has the same mean, 1, is nowhere below
-    0, and blurs a peak by a cell, which beside the forward direction is the angle acos(1 - 2/(values - 1)), 2.6 degrees
-    for 2001 values and 0.8 for 20001. Mitsuba, reference and methods then agree on the table, blur included.
+    Each value is the mean of the function under the hat of its cosine: the table has the same mean,
+    1, is nowhere below 0, and blurs a peak by a cell, which beside the forward direction is the
+    angle acos(1 - 2/(values - 1)), 2.6 degrees for 2001 values and 0.8 for 20001. Mitsuba,
+    reference and methods then agree on the table, blur included.
 
-    The words are those of `analytic.phase.phase_from_words`, the values lie at regularly spaced cosines; the reference
-    of a scene takes a time in proportion to their number.
+    The words are those of `analytic.phase.phase_from_words`, the values lie at regularly spaced
+    cosines; the reference of a scene takes a time in proportion to their number.
     """
     if values < 2:
         raise InputError(f"the table of '{words}' has {values} values; expected at least 2")
@@ -124,16 +143,21 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
 def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
     """Return a light of a type and a colour, RGB.
 
-    'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk', 'sphere' and 'sky'
-    a radiance [W/(m^2 sr)]. All but sun and sky need a `position`; all but these and points a `target`. A spot needs
-    the half angles `cutoff` and `beam` [degrees], and perhaps `up`; a sun the `direction` of its light; others `size`,
-    and `opaque`, which is false for a light that only shines.
+    'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk',
+    'sphere' and 'sky' a radiance [W/(m^2 sr)]. All but sun and sky need a `position`; all but these
+    and points a `target`. A spot needs the half angles `cutoff` and `beam` [degrees], and perhaps
+    `up`; a sun the `direction` of its light; others `size`, and `opaque`, which is false for a
+    light that only shines.
     """
     match type:
         case "point":
             return point_light(given["position"], colour)
         case "spot":
-            aim = {"origin": given["position"], "target": given["target"], "up": given.get("up", [0, 0, 1])}
+            aim = {
+                "origin": given["position"],
+                "target": given["target"],
+                "up": given.get("up", [0, 0, 1]),
+            }
             return {
                 "type": "spot",
                 "to_world": mi.ScalarTransform4f().look_at(**aim),
@@ -151,11 +175,17 @@ def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
 
 def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:
     """Return a point light at `position`, (3,) [m], with the RGB `intensity`, (3,) [W/sr]."""
-    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": list(intensity)}}
+    return {
+        "type": "point",
+        "position": list(position),
+        "intensity": {"type": "rgb", "value": list(intensity)},
+    }
 
 
 def sun(travels: Sequence[float], irradiance: Sequence[float]) -> dict[str, Any]:
-    """Return a directional light that travels in a direction, (3,), with an RGB `irradiance` across it [W/m^2]."""
+    """Return a directional light that travels in a direction, (3,), with an RGB
+    `irradiance` across it [W/m^2].
+    """
     return {
         "type": "directional",
         "direction": [float(part) for part in np.asarray(travels) / np.linalg.norm(travels)],
@@ -177,11 +207,14 @@ def area_lamp(
 ) -> dict[str, Any]:
     """Return a black area light of constant RGB radiance [W/(m^2 sr)].
 
-    It is a 'rectangle' or 'disk', which shine on one side, or a 'sphere', its middle at a position, facing a target,
-    (3,) each [m]. The size is the radius, or half of both sides of a rectangle [m].
+    It is a 'rectangle' or 'disk', which shine on one side, or a 'sphere', its middle at a position,
+    facing a target, (3,) each [m]. The size is the radius, or half of both sides of a rectangle
+    [m].
     """
     across, up = (size, size) if isinstance(size, float) else size
-    turned = mi.ScalarTransform4f().look_at(origin=list(position), target=list(target), up=[0, 0, 1])
+    turned = mi.ScalarTransform4f().look_at(
+        origin=list(position), target=list(target), up=[0, 0, 1]
+    )
     return {
         "type": shape,
         "to_world": turned @ mi.ScalarTransform4f().scale([across, up, min(across, up)]),
@@ -191,11 +224,17 @@ def area_lamp(
 
 
 def camera(
-    origin: Sequence[float], target: Sequence[float], *, fov: float, size: tuple[int, int], in_fog: bool = True
+    origin: Sequence[float],
+    target: Sequence[float],
+    *,
+    fov: float,
+    size: tuple[int, int],
+    in_fog: bool = True,
 ) -> dict[str, Any]:
     """Return a perspective sensor at an origin that looks at a target, (3,) each [m]; its up is z.
 
-    The field of view is horizontal [degrees], the size in pixels. The camera is in the medium 'fog' or in vacuum.
+    The field of view is horizontal [degrees], the size in pixels. The camera is in the
+    medium 'fog' or in vacuum.
     """
     medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
     return medium | {
@@ -204,7 +243,9 @@ def camera(
         "fov_axis": "x",
         "near_clip": 1e-5,
         "far_clip": 1e5,
-        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=[0, 0, 1]),
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=list(origin), target=list(target), up=[0, 0, 1]
+        ),
         "film": {
             "type": "hdrfilm",
             "width": size[0],

@@ -1,29 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The built-in scenes: files such as `fog.toml` describe them, and a record of each builds Mitsuba's dictionary.
+"""The built-in scenes: files such as `fog.toml` describe them, and a record of each
+builds Mitsuba's dictionary.
 
-Their numbers are arbitrary, never round, so that no constant of the code can hide behind a constant of a scene. Those
-of `FOG_SCENES` scatter light once in homogeneous fog: the standard report and the tests of all methods study these.
-Baselines have all scenes but clouds.
+Their numbers are arbitrary, never round, so that no constant of the code can hide behind a constant
+of a scene. Those of `FOG_SCENES` scatter light once in homogeneous fog: the standard report and the
+tests of all methods study these. Baselines have all scenes but clouds.
 
 Each scene is a table with these keys; lengths are in metres, angles in degrees, colours RGB:
 
-* `purpose`: one sentence, what the scene is for; `published`: the published figure that it stands for;
-* `animation`: what moves in it, see `Animation`; `clouds`: whether light is scattered many times in it;
-* `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in words of
-  `analytic.phase.phase_from_words`; or with `layers`; or with `smoke`, whose densities `sigma_t` multiplies;
+* `purpose`: one sentence, what the scene is for; `published`: the published
+  figure that it stands for;
+* `animation`: what moves in it, see `Animation`; `clouds`: whether light is
+  scattered many times in it;
+* `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in
+  words of `analytic.phase.phase_from_words`; or with `layers`; or with `smoke`, whose densities
+  `sigma_t` multiplies;
 * `camera`: `origin`, `target` and the horizontal `fov`;
-* `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what `parts.light` takes; one
-  with a `swarm` stands for many at random places of a box, with powers whose logarithm is normal with that `spread`;
-* `shapes`: each with `name` and either `reflectance` or the `medium` that it bounds, which may have a `density`;
+* `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what
+  `parts.light` takes; one with a `swarm` stands for many at random places of a box, with powers
+  whose logarithm is normal with that `spread`;
+* `shapes`: each with `name` and either `reflectance` or the `medium` that it bounds,
+  which may have a `density`;
 * `kinds`: meshes by name that its shapes use.
 
-A shape, a part of one and a kind is a mesh. `mesh` names a kind or a function of `MESHES`, which takes the further
-keys; or there are `parts`, which are joined. A mesh may be displaced by `waves`, then multiplied by a `scale`, turned
-(`turn`: an axis and an angle) and moved to `at`, and from there by `polar`: a distance and an angle about the vertical.
+A shape, a part of one and a kind is a mesh. `mesh` names a kind or a function of `MESHES`, which
+takes the further keys; or there are `parts`, which are joined. A mesh may be displaced by `waves`,
+then multiplied by a `scale`, turned (`turn`: an axis and an angle) and moved to `at`, and from
+there by `polar`: a distance and an angle about the vertical.
 
-If a shape or part has `copies`, k times the numbers of `step` are added to those of copy k, and a shape gets the name
-'NAME-k', from `first` on; with `of` all of that list are copied together. With `sunflower` the copies lie like its
-seeds, and take the kinds of that list in turn.
+If a shape or part has `copies`, k times the numbers of `step` are added to those of copy k, and a
+shape gets the name 'NAME-k', from `first` on; with `of` all of that list are copied together. With
+`sunflower` the copies lie like its seeds, and take the kinds of that list in turn.
 """
 
 import hashlib
@@ -55,17 +62,26 @@ from airlight.validation.scenes.parts import (
 
 MOVES = ("light", "objects", "medium", "colour")
 FILES = tuple(
-    Path(__file__).with_name(f"{name}.toml") for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
+    Path(__file__).with_name(f"{name}.toml")
+    for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
 )
 
 Table = dict[str, Any]
 
-_DROPLETS = 20001  # values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
+# values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
+_DROPLETS = 20001
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
 _PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
 MESHES: dict[str, Callable[..., Mesh]] = {
-    **{name: each for module in (meshes, cloud_meshes) for name, each in vars(module).items() if isfunction(each)},
-    "star": lambda inner, outer, points, height: meshes.prism(meshes.star(inner, outer, points), height),
+    **{
+        name: each
+        for module in (meshes, cloud_meshes)
+        for name, each in vars(module).items()
+        if isfunction(each)
+    },
+    "star": lambda inner, outer, points, height: meshes.prism(
+        meshes.star(inner, outer, points), height
+    ),
     "triangle": lambda corners: (np.array(corners), np.array([[0, 1, 2]])),
 }
 
@@ -75,7 +91,8 @@ class Animation:
     """The motion in the frames of a scene; see `validation.scenes.animation`."""
 
     moves: tuple[str, ...] = ("light",)  #: of `MOVES`
-    about: tuple[float, float, float] | None = None  #: on the axis that lights circle [m]; None: the scene's middle
+    #: on the axis that lights circle [m]; None: the scene's middle
+    about: tuple[float, float, float] | None = None
     objects: tuple[str, ...] = ()  #: names of the shapes that turn; empty: all closed ones
 
 
@@ -84,13 +101,16 @@ class SceneRecord:
     """A built-in scene."""
 
     name: str
-    build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
+    #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
+    build: Callable[[], dict[str, Any]]
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
     varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
     clouds: bool = (
-        False  #: whether light is scattered many times: then `cloud-paths` is its reference, and few methods fit
+        #: whether light is scattered many times: then `cloud-paths` is its
+        #: reference, and few methods fit
+        False
     )
     digest: str = ""  #: of its description
     many: bool = False  #: whether it has many lights, of which methods are to choose
@@ -103,13 +123,22 @@ def read_scenes(path: Path) -> dict[str, SceneRecord]:
 
 
 def _record(name: str, table: Table) -> SceneRecord:
-    animation = Animation(**{key: tuple(value) for key, value in table.get("animation", {}).items()})
+    animation = Animation(
+        **{key: tuple(value) for key, value in table.get("animation", {}).items()}
+    )
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
     varying = bool({"layers", "smoke"} & set(table.get("fog", {})))
     many = any("swarm" in each for each in table["lights"])
     return SceneRecord(
-        name, partial(_build, table), *words, animation, varying, table.get("clouds", False), digest, many
+        name,
+        partial(_build, table),
+        *words,
+        animation,
+        varying,
+        table.get("clouds", False),
+        digest,
+        many,
     )
 
 
@@ -124,7 +153,9 @@ def _build(table: Table) -> dict[str, Any]:
     for shape in copies(table.get("shapes", [])):
         name, mesh = shape["name"], mesh_of(shape, kinds)
         if "medium" in shape:
-            scene[name] = medium_boundary(name, mesh, _medium(shape["medium"], shape.get("mesh", "")))
+            scene[name] = medium_boundary(
+                name, mesh, _medium(shape["medium"], shape.get("mesh", ""))
+            )
         else:
             scene[name] = mitsuba_mesh(name, mesh, shape["reflectance"])
     return scene
@@ -141,7 +172,9 @@ def _lights(entries: Iterable[Table]) -> Iterator[Table]:
         rng = np.random.default_rng(swarm["seed"])
         places = rng.uniform(swarm["low"], swarm["high"], (swarm["count"], 3))
         colours = np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * own["colour"]
-        for number, (place, colour) in enumerate(zip(places.tolist(), colours.tolist(), strict=True)):
+        for number, (place, colour) in enumerate(
+            zip(places.tolist(), colours.tolist(), strict=True)
+        ):
             yield own | {"name": f"{own['name']}-{number}", "position": place, "colour": colour}
 
 
@@ -151,7 +184,11 @@ def copies(entries: Iterable[Table]) -> Iterator[Table]:
         step = entry.get("step", {})
         for number in range(entry.get("copies", 1)):
             for each in entry.get("of", [entry]):
-                copy = {key: _plus(value, step.get(key), number) for key, value in each.items() if key not in _COPYING}
+                copy = {
+                    key: _plus(value, step.get(key), number)
+                    for key, value in each.items()
+                    if key not in _COPYING
+                }
                 if "copies" in entry and "name" in each:
                     copy["name"] = f"{each['name']}-{number + entry.get('first', 0)}"
                 yield copy | (_seed(entry, number) if "sunflower" in entry else {})
@@ -166,7 +203,9 @@ def _plus(value: Any, step: Any, times: int) -> Any:
 
 
 def _seed(entry: Table, number: int) -> Table:
-    """Return place, kind, size, turn and colour of a seed of a sunflower, a spiral that is a little flat."""
+    """Return place, kind, size, turn and colour of a seed of a sunflower, a
+    spiral that is a little flat.
+    """
     distance, angle = 0.419 * math.sqrt(number + 2.3), math.radians(137.50776 * number + 21.7)
     x, y, z = entry["at"]
     return {
@@ -183,22 +222,35 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
     if "parts" in entry:
         mesh = joined([mesh_of(part, kinds) for part in copies(entry["parts"])])
     else:
-        name, given = entry["mesh"], {key: value for key, value in entry.items() if key not in _PLACING}
+        name, given = (
+            entry["mesh"],
+            {key: value for key, value in entry.items() if key not in _PLACING},
+        )
         mesh = mesh_of({**kinds[name], **given}, {}) if name in kinds else MESHES[name](**given)
     if "waves" in entry:
         mesh = bent(mesh[0], entry["waves"]), mesh[1]
     x, y, z = entry.get("at", (0.0, 0.0, 0.0))
     distance, angle = entry.get("polar", (0.0, 0.0))
-    at = x + distance * math.cos(math.radians(angle)), y + distance * math.sin(math.radians(angle)), z
+    at = (
+        x + distance * math.cos(math.radians(angle)),
+        y + distance * math.sin(math.radians(angle)),
+        z,
+    )
     *axis, degrees = entry.get("turn", (0, 0, 1, 0))
-    return placed(scaled(mesh, entry.get("scale", 1.0)), at, rotation(axis, degrees) if "turn" in entry else None)
+    return placed(
+        scaled(mesh, entry.get("scale", 1.0)),
+        at,
+        rotation(axis, degrees) if "turn" in entry else None,
+    )
 
 
 def _medium(table: Table, shape: str = "") -> dict[str, Any]:
     phase = phase_function(table.get("phase", "isotropic"), _DROPLETS)
     if "layers" in table:
         register_height_fog()
-        return height_fog(table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase)
+        return height_fog(
+            table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase
+        )
     medium = fog(table["sigma_t"], table["albedo"], phase)
     if "smoke" in table:
         from airlight.validation.scenes.smoke import smoke
@@ -224,4 +276,8 @@ def _density(mesh: str, given: str) -> Any:
 
 #: The built-in scenes by name, and those of homogeneous fog with few lights.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
-FOG_SCENES = {name: record for name, record in SCENES.items() if not (record.clouds or record.varying or record.many)}
+FOG_SCENES = {
+    name: record
+    for name, record in SCENES.items()
+    if not (record.clouds or record.varying or record.many)
+}

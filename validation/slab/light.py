@@ -10,15 +10,18 @@
 
 Each number of `error` and `standard_error` is the error of the same number of the light.
 
-The computation runs twice, the second time with three quarters of the streams and two nodes fewer in each panel of
-depth. The change is the error that is printed: it is that of the coarser run, so the printed numbers are better.
+The computation runs twice, the second time with three quarters of the streams and two nodes fewer
+in each panel of depth. The change is the error that is printed: it is that of the coarser run, so
+the printed numbers are better.
 
-Definitions: order n is light that was scattered n times. Lengths are in mean free paths. Reflectance and transmittance
-are fractions of the flux that enters the slab, the transmittance of all orders with the light that was never scattered;
-the fluence is that for unit flux across the beam, flux and radiance are diffuse, for a flux of pi. A displacement is
-measured from the point of entry, horizontally; `mean` is its mean along the horizontal direction in which the sun's
-light travels, `rms` the root of the mean of x^2 + y^2, both weighted with the flux (or fluence), None where there is no
-light. The spread of one axis about the mean, the sigma of Bouthors 2008, is sqrt((rms^2 - mean^2)/2).
+Definitions: order n is light that was scattered n times. Lengths are in mean free paths.
+Reflectance and transmittance are fractions of the flux that enters the slab, the transmittance of
+all orders with the light that was never scattered; the fluence is that for unit flux across the
+beam, flux and radiance are diffuse, for a flux of pi. A displacement is measured from the point of
+entry, horizontally; `mean` is its mean along the horizontal direction in which the sun's light
+travels, `rms` the root of the mean of x^2 + y^2, both weighted with the flux (or fluence), None
+where there is no light. The spread of one axis about the mean, the sigma of Bouthors 2008, is
+sqrt((rms^2 - mean^2)/2).
 """
 
 import math
@@ -36,9 +39,11 @@ from airlight.validation.slab.moments import DOWN, FLUENCE, UP, SlabOrders, orde
 from airlight.validation.slab.radiance import slab_radiance
 from airlight.validation.slab.request import SlabRequest
 
-Exit = tuple[float | None, float | None, float | None]  # light through a plane: amount, mean and rms displacement
+# light through a plane: amount, mean and rms displacement
+Exit = tuple[float | None, float | None, float | None]
 
-#: Streams in each hemisphere: the first of these that leaves less than `_RESOLVED` of the phase function to the peak.
+#: Streams in each hemisphere: the first of these that leaves less than `_RESOLVED` of the
+#: phase function to the peak.
 STREAMS = (64, 96, 128)
 _RESOLVED = 1e-4
 _NODES = 8
@@ -51,11 +56,16 @@ _SCATTERING = 0.4e-6
 def slab_numbers(
     request: SlabRequest, *, photons: int = 0, seed: int = 0, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Return all numbers of a slab, see the module; None where nothing is known, such as the mean place of no light."""
+    """Return all numbers of a slab, see the module; None where nothing is known, such as
+    the mean place of no light.
+    """
     tell = progress or (lambda fraction, what: None)
     tell(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
-    numbers, others = _numbers(request, streams, _NODES), _numbers(request, 3 * streams // 4, _NODES - 2)
+    numbers, others = (
+        _numbers(request, streams, _NODES),
+        _numbers(request, 3 * streams // 4, _NODES - 2),
+    )
     record: dict[str, Any] = {
         **{name: getattr(request, name) for name in ("tau", "sun", "albedo")},
         "phase": request.phase.name,
@@ -64,7 +74,9 @@ def slab_numbers(
         "photons": None,
     }
     if photons:
-        slab = Slab(request.tau, request.mu0, request.albedo, request.phase.sampled(), request.depths)
+        slab = Slab(
+            request.tau, request.mu0, request.albedo, request.phase.sampled(), request.depths
+        )
         estimate = slab_estimate(slab, request.ranges, photons=photons, seed=seed, progress=tell)
         record["photons"] = {
             "count": photons,
@@ -119,7 +131,11 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
         "reflectance": float(total[UP, 0, 0]) / request.mu0,
         "transmittance": float(total[DOWN, 0, -1]) / request.mu0 + direct,
         "flux": [
-            {"depth": depth, "up": np.pi * float(total[UP, 0, place]), "down": np.pi * float(total[DOWN, 0, place])}
+            {
+                "depth": depth,
+                "up": np.pi * float(total[UP, 0, place]),
+                "down": np.pi * float(total[DOWN, 0, place]),
+            }
             for depth, place in zip(request.depths, places, strict=True)
         ],
         "radiance": radiance,
@@ -136,7 +152,9 @@ def _exit(moments: Array, unit: float) -> Exit:
 
 def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> dict[str, Any]:
     """Return the values of photons for 0, or their standard errors for 1."""
-    exits, totals, flux = (part[which].tolist() for part in (estimate.exits, estimate.totals, estimate.flux))
+    exits, totals, flux = (
+        part[which].tolist() for part in (estimate.exits, estimate.totals, estimate.flux)
+    )
     orders = [
         _order_row(name, request.depths, reflected, transmitted, fluence)
         for name, (reflected, transmitted, *fluence) in zip(request.orders, exits, strict=True)
@@ -145,7 +163,8 @@ def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> dict
         "reflectance": totals[0],
         "transmittance": totals[1],
         "flux": [
-            {"depth": depth, "up": up, "down": down} for depth, (up, down) in zip(request.depths, flux, strict=True)
+            {"depth": depth, "up": up, "down": down}
+            for depth, (up, down) in zip(request.depths, flux, strict=True)
         ],
         "radiance": [],
     }
@@ -153,20 +172,34 @@ def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> dict
 
 
 def _order_row(
-    name: str, depths: tuple[float, ...], reflected: Exit, transmitted: Exit, fluence: Iterable[Exit]
+    name: str,
+    depths: tuple[float, ...],
+    reflected: Exit,
+    transmitted: Exit,
+    fluence: Iterable[Exit],
 ) -> dict[str, Any]:
-    row: dict[str, Any] = {"orders": name, "reflectance": reflected[0], "transmittance": transmitted[0]}
+    row: dict[str, Any] = {
+        "orders": name,
+        "reflectance": reflected[0],
+        "transmittance": transmitted[0],
+    }
     for side, found in (("reflected", reflected), ("transmitted", transmitted)):
         row |= {f"{side}_mean": found[1], f"{side}_rms": found[2]}
     within = zip(depths, fluence, strict=True)
-    return row | {"fluence": [{"depth": z, "value": a, "mean": mean, "rms": rms} for z, (a, mean, rms) in within]}
+    return row | {
+        "fluence": [
+            {"depth": z, "value": a, "mean": mean, "rms": rms} for z, (a, mean, rms) in within
+        ]
+    }
 
 
 def _differences(numbers: Any, others: Any) -> Any:
     """Return the same structure with the differences of its numbers; what a row is of stays."""
     if isinstance(numbers, Mapping):
         return {
-            name: value if name in _GIVEN and not isinstance(value, list) else _differences(value, others[name])
+            name: value
+            if name in _GIVEN and not isinstance(value, list)
+            else _differences(value, others[name])
             for name, value in numbers.items()
         }
     if isinstance(numbers, list):

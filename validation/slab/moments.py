@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The light of each order in a slab, and the moments of its horizontal displacement, without random numbers.
+"""The light of each order in a slab, and the moments of its horizontal
+displacement, without random numbers.
 
-A beam enters a slab at one point. I_n is the radiance of light that was scattered n times; D its horizontal
-displacement from that point, as a complex number x + i y with x along the horizontal direction of the beam. With s the
-optical length along a direction, w = sin theta exp(i phi) its horizontal part, and
+A beam enters a slab at one point. I_n is the radiance of light that was scattered n times; D its
+horizontal displacement from that point, as a complex number x + i y with x along the horizontal
+direction of the beam. With s the optical length along a direction, w = sin theta exp(i phi) its
+horizontal part, and
 
     M0 = I,    M1 = <D I>,    M2 = <|D|^2 I>,
 
@@ -17,17 +19,19 @@ with S[I](w) = (albedo/4 pi) int P(w, w') I(w') dw'. In modes of the azimuth,
 
     M0 = sum_m B_m e^{i m phi},   M1 = sum_m A_m e^{i m phi},   M2 = sum_m C_m e^{i m phi}     (all real: y -> -y),
 
-w couples m to m + 1: A_m gains sin theta B_{m-1}, C_0 gains 2 sin theta A_1. Fluxes and fluences, which are integrals
-over all azimuths, need B_0, A_0 and C_0 alone, hence five fields: B_0, B_1 = B_{-1}, A_0, A_1, C_0. The beam is a
-stream of its own, the last, with b, <x b> and <x^2 b>.
+w couples m to m + 1: A_m gains sin theta B_{m-1}, C_0 gains 2 sin theta A_1. Fluxes and fluences,
+which are integrals over all azimuths, need B_0, A_0 and C_0 alone, hence five fields: B_0, B_1 =
+B_{-1}, A_0, A_1, C_0. The beam is a stream of its own, the last, with b, <x b> and <x^2 b>.
 
-The sum X of all orders after n obeys the same equations with S[M_n + X] for S[M_{n-1}], and is solved for directly
-(`discrete_ordinates`): a thick slab that absorbs nothing would need thousands of orders.
+The sum X of all orders after n obeys the same equations with S[M_n + X] for S[M_{n-1}], and is
+solved for directly (`discrete_ordinates`): a thick slab that absorbs nothing would need thousands
+of orders.
 
 References
 ----------
-Bouthors, Neyret, Max, Bruneton, Crassin 2008, "Interactive multiple anisotropic scattering in clouds", sections 5.1
-(canonical transport: mean and spread of the exit of light by sets of orders), which samples what is solved here.
+Bouthors, Neyret, Max, Bruneton, Crassin 2008, "Interactive multiple anisotropic scattering in
+clouds", sections 5.1 (canonical transport: mean and spread of the exit of light by sets of orders),
+which samples what is solved here.
 """
 
 import math
@@ -36,24 +40,29 @@ from collections.abc import Sequence
 import numpy as np
 
 from airlight.realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import (
+    Eigenmodes,
+    Streams,
+    double_gauss,
+    mode_kernel,
+)
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 from airlight.validation.arrays import Array
 
 #: Places of the fields of one order at the nodes, (5, Z, 2 N + 1), the beam last.
 B0, B1, A0, A1, C0 = range(5)
-#: Places of the moments of some orders at the edges of the panels, for unit flux across the beam, (3, 3, P + 1): flux
-#: up and down through the horizontal plane, and fluence; of each the amount [1], the first moment in x [mean free
-#: paths], and the second in x^2 + y^2.
+#: Places of the moments of some orders at the edges of the panels, for unit flux across the beam,
+#: (3, 3, P + 1): flux up and down through the horizontal plane, and fluence; of each the amount
+#: [1], the first moment in x [mean free paths], and the second in x^2 + y^2.
 UP, DOWN, FLUENCE = range(3)
 
 
 class SlabOrders:
     """The orders of one slab under one beam.
 
-    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam; `phase`: the phase function;
-    `albedo`: in [0, 1]; `depths`: depths in [0, tau] where moments are wanted besides 0 and tau; `streams`: N, in each
-    hemisphere; `nodes`: of each panel of depth.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam; `phase`: the
+    phase function; `albedo`: in [0, 1]; `depths`: depths in [0, tau] where moments are wanted
+    besides 0 and tau; `streams`: N, in each hemisphere; `nodes`: of each panel of depth.
     """
 
     def __init__(
@@ -84,7 +93,9 @@ class SlabOrders:
         mu, weights, albedo, moments = self.streams.mu, self.streams.weights, self.albedo, self.kept
         matrix = np.zeros((mu.size + 1, mu.size + 1))
         matrix[:-1, :-1] = albedo / 2 * mode_kernel(m, moments, mu, mu) * weights
-        matrix[:-1, -1] = albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
+        matrix[:-1, -1] = (
+            albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
+        )
         return matrix + albedo * self.peak * np.eye(mu.size + 1)
 
     def beam(self) -> Array:
@@ -102,14 +113,20 @@ class SlabOrders:
         sources = np.empty_like(fields)
         for m, own in enumerate(([B0, A0, C0], [B1, A1])):
             # In one product, which is faster than one for each.
-            sources[own] = (fields[own].reshape(-1, fields.shape[2]) @ self.scatter[m]).reshape(sources[own].shape)
+            sources[own] = (fields[own].reshape(-1, fields.shape[2]) @ self.scatter[m]).reshape(
+                sources[own].shape
+            )
         return self._carried(sources)
 
     def _carried(self, sources: Array) -> tuple[Array, Array]:
-        """Return the light of scattered sources, with the displacement it gains on the way, and its moments."""
+        """Return the light of scattered sources, with the displacement it gains on
+        the way, and its moments.
+        """
         light, lengths = np.empty_like(sources), self._sines
         light[[B0, B1]], (b0_edges, _) = self._transport(sources[[B0, B1]])
-        light[[A0, A1]], (a0_edges, _) = self._transport(sources[[A0, A1]] + lengths * light[[B1, B0]])
+        light[[A0, A1]], (a0_edges, _) = self._transport(
+            sources[[A0, A1]] + lengths * light[[B1, B0]]
+        )
         light[[C0]], (c0_edges,) = self._transport(sources[[C0]] + 2 * lengths * light[[A1]])
         return light, self._edges(np.stack([b0_edges, a0_edges, c0_edges]))
 
@@ -136,24 +153,32 @@ class _AllOrders:
 
     def __init__(self, slab: SlabOrders, m: int):
         self._scatter = slab.scatter[m]
-        self._modes = Eigenmodes(slab.streams, m, albedo=slab.albedo, moments=slab.kept, peak=slab.peak)
+        self._modes = Eigenmodes(
+            slab.streams, m, albedo=slab.albedo, moments=slab.kept, peak=slab.peak
+        )
         self._transport = Transport(slab.panels, self._modes.cosines)
-        # The beam meets only the peak: its sum of orders fades as if the medium were thinner by what goes on.
+        # The beam meets only the peak: its sum of orders fades as if the medium were
+        # thinner by what goes on.
         self._passing = 1 - slab.albedo * slab.peak
         self._beam = Transport(slab.panels, np.array([-slab.mu0 / self._passing]))
 
     def __call__(self, last: Array, gained: Array | float = 0.0) -> Array:
-        """Return X = T (S (last + X) + gained), with T the way of light through the slab; all (Z, 2 N + 1)."""
+        """Return X = T (S (last + X) + gained), with T the way of light through
+        the slab; all (Z, 2 N + 1).
+        """
         source = last @ self._scatter + gained
         beam = self._beam(source[None, :, -1:] / self._passing)[0][0]
         diffuse = source[:, :-1] + beam * self._scatter[-1, :-1]
-        return np.concatenate([self._modes.all_orders(self._transport, diffuse[None])[0], beam], axis=-1)
+        return np.concatenate(
+            [self._modes.all_orders(self._transport, diffuse[None])[0], beam], axis=-1
+        )
 
 
 def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[Array, Array]:
     """Return the moments of sets of orders, (sets, 3, 3, P + 1), and of all orders from 1 on.
 
-    `slab`: the slab; `sets`: first and last order of each set, the last one `math.inf` for a set without end.
+    `slab`: the slab; `sets`: first and last order of each set, the last one
+    `math.inf` for a set without end.
     """
     finite = [int(last) for _, last in sets if math.isfinite(last)]
     finite += [first - 1 for first, last in sets if not math.isfinite(last)]

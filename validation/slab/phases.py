@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions of a slab by name or from a file, written for each side by itself.
 
-A file has two columns: the scattering angle [degrees], increasing from 0 to 180, and the phase function there, in any
-unit: it is divided by its mean over the sphere. Between rows it is linear in the angle. A first line of names is
-allowed, and so are lines that begin with #.
+A file has two columns: the scattering angle [degrees], increasing from 0 to 180, and the phase
+function there, in any unit: it is divided by its mean over the sphere. Between rows it is linear in
+the angle. A first line of names is allowed, and so are lines that begin with #.
 """
 
 from collections.abc import Callable
@@ -41,8 +41,8 @@ class PhasePair:
 def phase_pair(name: str) -> PhasePair:
     """Return a phase function by its name.
 
-    'isotropic', 'hg', 'hg-draine', 'mie' and 'mie-modified', with numbers as of `analytic.phase.phase_from_words`, or
-    the path of a CSV file.
+    'isotropic', 'hg', 'hg-draine', 'mie' and 'mie-modified', with numbers as of
+    `analytic.phase.phase_from_words`, or the path of a CSV file.
     """
     if name.lower().endswith(".csv"):
         angles, heights = read_phase_file(Path(name))
@@ -52,20 +52,26 @@ def phase_pair(name: str) -> PhasePair:
         g = known.g if isinstance(known, analytic.HenyeyGreenstein) else 0.0
         if abs(g) > LARGEST_G:
             raise InputError(
-                f"phase: got the mean cosine {g:g}, expected -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
+                f"phase: got the mean cosine {g:g}, expected -{LARGEST_G} to {LARGEST_G}, for "
+                "example hg:0.85"
             )
         return PhasePair(name, HenyeyGreensteinPhase(g), lambda: HenyeyGreenstein(g))
     if isinstance(known, analytic.HgDraine):
         return PhasePair(name, hg_draine_phase(known.diameter), lambda: _table(known))
     if not isinstance(known, analytic.Mie):
-        raise InputError(f"phase: got {name!r}, expected isotropic, hg:G, hg-draine, mie, mie-modified or FILE.csv")
+        raise InputError(
+            f"phase: got {name!r}, expected isotropic, hg:G, hg-draine, mie, mie-modified or "
+            "FILE.csv"
+        )
     numbers = known.droplets.effective_radius, known.droplets.gamma, known.wavelength
     deterministic = droplet_phase(*numbers, modified=isinstance(known, analytic.MieModified))
     return PhasePair(name, deterministic, lambda: _table(known))
 
 
 def _table(phase: analytic.PhaseFunction) -> Tabulated:
-    """Return droplets as a table, by angles that resolve the peak, and the place where one is cut out."""
+    """Return droplets as a table, by angles that resolve the peak, and the
+    place where one is cut out.
+    """
     angles, edge = np.linspace(0.0, np.pi, _TABLE + 1), np.deg2rad(Modified.angle)
     if phase.name == "hg-draine":
         angles = np.append(np.concatenate([[0.0], np.geomspace(1e-6, np.pi, _TABLE)])[:-1], np.pi)
@@ -81,22 +87,35 @@ def read_phase_file(path: Path) -> tuple[Array, Array]:
         rows = rows[1:]
     for number, cells in rows:
         if len(cells) != 2 or not all(map(_is_number, cells)):
-            raise InputError(f"{path}, line {number}: got {','.join(cells)!r}, expected an angle [degrees] and a value")
+            raise InputError(
+                f"{path}, line {number}: got {','.join(cells)!r}, expected an angle [degrees] and "
+                "a value"
+            )
     if len(rows) < 2:
-        raise InputError(f"{path}: got {len(rows)} rows, expected at least two, of angles from 0 to 180 degrees")
+        raise InputError(
+            f"{path}: got {len(rows)} rows, expected at least two, of angles from 0 to 180 degrees"
+        )
     table = np.array([[float(cell) for cell in cells] for _, cells in rows])
     degrees, values = table.T
     if degrees[0] != 0 or degrees[-1] != 180:
-        raise InputError(f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, expected 0 to 180 degrees")
+        raise InputError(
+            f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, expected 0 to 180 degrees"
+        )
     falling = np.flatnonzero(np.diff(degrees) <= 0)
     if falling.size:
-        raise InputError(f"{path}, line {rows[int(falling[0]) + 1][0]}: angles must increase from row to row")
+        raise InputError(
+            f"{path}, line {rows[int(falling[0]) + 1][0]}: angles must increase from row to row"
+        )
     bad = np.flatnonzero((values < 0) | (values > 1e30))
     if bad.size:
         number = rows[int(bad[0])][0]
-        raise InputError(f"{path}, line {number}: got the value {values[bad[0]]:g}, expected 0 to 1e30")
+        raise InputError(
+            f"{path}, line {number}: got the value {values[bad[0]]:g}, expected 0 to 1e30"
+        )
     if not values[1:-1].any() and not (len(values) == 2 and values.any()):
-        raise InputError(f"{path}: all values are 0 between 0 and 180 degrees, expected a phase function")
+        raise InputError(
+            f"{path}: all values are 0 between 0 and 180 degrees, expected a phase function"
+        )
     return np.deg2rad(degrees), values / values.max()
 
 
@@ -116,21 +135,26 @@ def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
 
 
 def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: bool) -> AnglePhase:
-    """Return the phase function of droplets; the numbers are those of `realtime.droplets.droplet_series`.
+    """Return the phase function of droplets; the numbers are those of
+    `realtime.droplets.droplet_series`.
 
-    If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
-    lowered by the fraction of the peak.
+    If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium
+    whose density is lowered by the fraction of the peak.
     """
     series, edge = droplet_series(radius, gamma, wavelength), np.deg2rad(CUT)
     if not modified:
         return AnglePhase(series.values, np.array([0.0, np.pi]))
-    return AnglePhase(lambda angles: np.where(angles < edge, 0.0, series.values(angles)), np.array([0.0, edge, np.pi]))
+    return AnglePhase(
+        lambda angles: np.where(angles < edge, 0.0, series.values(angles)),
+        np.array([0.0, edge, np.pi]),
+    )
 
 
 def hg_draine_phase(diameter: float) -> AnglePhase:
     """Return `realtime.scene.phase.HgDraine` of droplets of a diameter of 5 to 50 um.
 
-    Its narrow lobe is a few thousandths wide: panels near the peak are as short as their distance from it.
+    Its narrow lobe is a few thousandths wide: panels near the peak are as short
+    as their distance from it.
     """
     fit = HgDraine(diameter)
     (fraction, narrow), (_, wide) = fit.lobes

@@ -6,12 +6,14 @@ The source at a direction of the user is summed over the modes of the azimuth,
     J(z, mu, phi) = sum_m (2 - delta_m0) cos(m phi) (albedo/2) sum_j w_j K_m(mu, mu_j) I_m(z, mu_j)
                   + (albedo/4 pi) P(cos Theta_0) exp(-z/mu_0),
 
-and carried to the depths. The peak that the streams cannot resolve is left in the beam (delta-M): with f its fraction,
-depths are (1 - albedo f) z and the albedo albedo (1 - f)/(1 - albedo f). The last term has the true phase function
-over 1 - albedo f (Nakajima and Tanaka 1988, their TMS). With more streams both corrections vanish; the error that
-`light.py` prints is the change from three quarters of the streams.
+and carried to the depths. The peak that the streams cannot resolve is left in the beam (delta-M):
+with f its fraction, depths are (1 - albedo f) z and the albedo albedo (1 - f)/(1 - albedo f). The
+last term has the true phase function over 1 - albedo f (Nakajima and Tanaka 1988, their TMS). With
+more streams both corrections vanish; the error that `light.py` prints is the change from three
+quarters of the streams.
 
-I_m of the exponential source of the beam is known in closed form on the lines of `discrete_ordinates`.
+I_m of the exponential source of the beam is known in closed form on the lines
+of `discrete_ordinates`.
 """
 
 from collections.abc import Sequence
@@ -19,7 +21,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from airlight.realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import (
+    Eigenmodes,
+    Streams,
+    double_gauss,
+    mode_kernel,
+)
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 from airlight.validation.arrays import Array
 
@@ -38,11 +45,13 @@ def slab_radiance(
     streams: int = 64,
     nodes: int = 8,
 ) -> Array:
-    """Return the diffuse radiance of a slab [1/sr], (depths, directions), for unit flux across the beam.
+    """Return the diffuse radiance of a slab [1/sr], (depths, directions), for
+    unit flux across the beam.
 
-    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam, in (0, 1]; `phase`, `albedo`: of
-    the medium; `depths`: in [0, tau] [mean free paths]; `directions`: mu, positive upwards and not 0, and phi [rad], 0
-    along the beam's horizontal direction; N, in each hemisphere; `nodes`: of each panel of depth.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the beam, in (0, 1];
+    `phase`, `albedo`: of the medium; `depths`: in [0, tau] [mean free paths]; `directions`: mu,
+    positive upwards and not 0, and phi [rad], 0 along the beam's horizontal direction; N, in each
+    hemisphere; `nodes`: of each panel of depth.
     """
     rule = double_gauss(streams)
     moments = phase.moments(2 * streams + 1)
@@ -65,7 +74,14 @@ def slab_radiance(
 
 
 def _diffuse_source(
-    panels: DepthPanels, rule: Streams, mu0: float, *, kept: Array, albedo: float, mu: Array, phi: Array
+    panels: DepthPanels,
+    rule: Streams,
+    mu0: float,
+    *,
+    kept: Array,
+    albedo: float,
+    mu: Array,
+    phi: Array,
 ) -> Array:
     """Return the light that order 1 and above scatter into the directions, (Z, directions)."""
     tau = float(panels.edges[-1])
@@ -75,7 +91,9 @@ def _diffuse_source(
         to_user = albedo / 2 * mode_kernel(m, kept, mu, rule.mu) * rule.weights
         from_beam = albedo / (4 * np.pi) * mode_kernel(m, kept, rule.mu, np.array([-mu0]))[:, 0]
         modes = Eigenmodes(rule, m, albedo=albedo, moments=kept, peak=0.0)
-        field = modes.radiance(_beam_lines(modes, modes.decoupled(from_beam), mu0, panels.depths, tau))
+        field = modes.radiance(
+            _beam_lines(modes, modes.decoupled(from_beam), mu0, panels.depths, tau)
+        )
         part = (2 if m else 1) * field @ to_user.T
         total += part * np.cos(m * phi)
         quiet = quiet + 1 if np.max(np.abs(part)) <= _NEGLIGIBLE * np.max(np.abs(total)) else 0

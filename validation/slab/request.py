@@ -51,12 +51,18 @@ def slab_request(
     directions: str | Sequence[tuple[float, float]] = (),
 ) -> SlabRequest:
     """Return a request that was checked; words are read as the command takes them."""
-    tau, sun, albedo = (_number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo)))
+    tau, sun, albedo = (
+        _number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo))
+    )
     if not _SMALLEST_TAU <= tau <= THICKEST:
-        raise InputError(f"tau: got {tau:g}, expected a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
+        raise InputError(
+            f"tau: got {tau:g}, expected a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean "
+            "free paths"
+        )
     if not 0 <= sun <= LARGEST_SUN:
         raise InputError(
-            f"sun: got {sun:g}, expected a zenith angle from 0 to below 90 degrees; at 90 no light enters the slab"
+            f"sun: got {sun:g}, expected a zenith angle from 0 to below 90 degrees; at 90 no light "
+            "enters the slab"
         )
     if not 0 <= albedo <= 1:
         raise InputError(f"albedo: got {albedo:g}, expected a fraction from 0 to 1")
@@ -77,23 +83,35 @@ def order_range(name: str) -> tuple[int, float]:
         return 1, math.inf
     form = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}|inf))?", name)
     if form is None:
-        raise InputError(f"orders: got {name!r}, expected for example 1,2,4,8 or 3-4 or 31-inf, or sets, or all")
+        raise InputError(
+            f"orders: got {name!r}, expected for example 1,2,4,8 or 3-4 or 31-inf, or sets, or all"
+        )
     first = int(form[1])
     last = math.inf if form[2] == "inf" else int(form[2] or first)
     if first < 1:
-        raise InputError(f"orders: got {name!r}, expected orders from 1 on; light of order 0 was never scattered")
+        raise InputError(
+            f"orders: got {name!r}, expected orders from 1 on; light of order 0 was never scattered"
+        )
     if last < first:
-        raise InputError(f"orders: got {name!r}, which ends before it begins; write {form[2]}-{first}")
+        raise InputError(
+            f"orders: got {name!r}, which ends before it begins; write {form[2]}-{first}"
+        )
     highest = first - 1 if math.isinf(last) else last
     if highest > LARGEST_ORDER:
-        raise InputError(f"orders: got {name!r}, expected orders up to {LARGEST_ORDER}, or {LARGEST_ORDER}-inf")
+        raise InputError(
+            f"orders: got {name!r}, expected orders up to {LARGEST_ORDER}, or {LARGEST_ORDER}-inf"
+        )
     return first, last
 
 
 def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
-    """Return the names of sets of orders in the order given, each once; 'sets' stands for `SETS`."""
+    """Return the names of sets of orders in the order given, each once;
+    'sets' stands for `SETS`.
+    """
     words = given.split(",") if isinstance(given, str) else [str(word) for word in given]
-    names = [name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))]
+    names = [
+        name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))
+    ]
     for name in names:
         order_range(name)
     if not names:
@@ -108,7 +126,9 @@ def _depths(given: str | Sequence[float] | None, tau: float) -> tuple[float, ...
     depths = tuple(_number("depths", word) for word in words)
     for depth in depths:
         if not 0 <= depth <= tau:
-            raise InputError(f"depths: got {depth:g}, expected depths of 0 to tau, {tau:g} mean free paths")
+            raise InputError(
+                f"depths: got {depth:g}, expected depths of 0 to tau, {tau:g} mean free paths"
+            )
     return depths
 
 
@@ -120,11 +140,14 @@ def _directions(given: str | Sequence[tuple[float, float]]) -> tuple[tuple[float
     directions = []
     for pair in pairs:
         if len(pair) != 2:
-            raise InputError(f"directions: got {':'.join(pair)!r}, expected MU:PHI, for example 0.5:180,-1:0")
+            raise InputError(
+                f"directions: got {':'.join(pair)!r}, expected MU:PHI, for example 0.5:180,-1:0"
+            )
         mu, phi = (_number("directions", word) for word in pair)
         if not 1e-6 <= abs(mu) <= 1:
             raise InputError(
-                f"directions: got mu = {mu:g}, expected -1 to 1, positive upwards, and not horizontal (0): from 1e-6 on"
+                f"directions: got mu = {mu:g}, expected -1 to 1, positive upwards, and not "
+                "horizontal (0): from 1e-6 on"
             )
         directions.append((mu, phi))
     return tuple(directions)

@@ -1,34 +1,41 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Does an image with random errors agree with another one, and how small a disagreement would have been seen?
+r"""Does an image with random errors agree with another one, and how small a
+disagreement would have been seen?
 
-Each of the two images has a mean per value (a value is one channel of one pixel) and may have a standard error: with
-r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2. Both variances are used, and none is
-raised to a floor: a dim image is tested as sharply as a bright one. The two images must be independent, and so must be
-the errors of two pixels of one image (box filter, seeds of their own); channels of a pixel may depend on one another.
+Each of the two images has a mean per value (a value is one channel of one pixel) and may have a
+standard error: with r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2.
+Both variances are used, and none is raised to a floor: a dim image is tested as sharply as a bright
+one. The two images must be independent, and so must be the errors of two pixels of one image (box
+filter, seeds of their own); channels of a pixel may depend on one another.
 
-**Values.** z = d / s follows Student's law if the errors are normal and the standard errors come from K batch means.
-For two random images the degrees of freedom are Welch and Satterthwaite's, s^4 / (s_r^4/(K_r - 1) + s_t^4/(K_t - 1));
-the normal law holds if no K is given. P(|Z| >= |z|) is the p-value, uniform in [0, 1] if the images agree.
+**Values.** z = d / s follows Student's law if the errors are normal and the standard errors come
+from K batch means. For two random images the degrees of freedom are Welch and Satterthwaite's,
+s^4 / (s_r^4/(K_r - 1) + s_t^4/(K_t - 1)); the normal law holds if no K is given. P(|Z| >= |z|) is
+the p-value, uniform in [0, 1] if the images agree.
 
-**Rejected pixels.** The smallest of m independent p-values is below a with probability 1 - (1 - a)^m. Sidak's level
-a = 1 - (1 - A)^(1/m) makes that A (`LEVEL`): one false alarm in 1/A comparisons of images, however many pixels
-they have. The expected number of rejections is m a, about A. That finds an outlier, but hardly a bias of all pixels.
+**Rejected pixels.** The smallest of m independent p-values is below a with probability 1 - (1 -
+a)^m. Sidak's level a = 1 - (1 - A)^(1/m) makes that A (`LEVEL`): one false alarm in 1/A comparisons
+of images, however many pixels they have. The expected number of rejections is m a, about A. That
+finds an outlier, but hardly a bias of all pixels.
 
-**Exceedances.** n independent p-values are below a plain level a Binomial(n, a) times. More mean a bias or standard
-errors too small, fewer mean standard errors too large: hence both tails, p = 2 min(P(X <= k), P(X >= k)). Channels are
-not independent, so each has its own test, and the least p is multiplied by their number (Bonferroni). Likewise
-Kolmogorov and Smirnov's test of the p-values against the uniform law.
+**Exceedances.** n independent p-values are below a plain level a Binomial(n, a) times. More mean a
+bias or standard errors too small, fewer mean standard errors too large: hence both tails, p = 2
+min(P(X <= k), P(X >= k)). Channels are not independent, so each has its own test, and the least p
+is multiplied by their number (Bonferroni). Likewise Kolmogorov and Smirnov's test of the p-values
+against the uniform law.
 
-**Blocks.** sum d / sqrt(sum s^2) over the 8 x 8 pixels of a block, one channel: it shows a bias of local extent up to
-eight times as well as one pixel.
+**Blocks.** sum d / sqrt(sum s^2) over the 8 x 8 pixels of a block, one channel: it shows a bias of
+local extent up to eight times as well as one pixel.
 
-**The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see below. A bias that all
-pixels share shows here first: with 262 144 pixels 360 times better than in any one of them.
+**The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see below.
+A bias that all pixels share shows here first: with 262 144 pixels 360 times better than in any one
+of them.
 
-Values without variance (s = 0: a pixel without light, one that no path reached, a reference without noise) have no z.
-They are counted and compared in absolute terms, and they do enter the relative bias. The same holds for values where
-the reference is zero, which have no relative error: light where none should be shows there. Pixels that a mask leaves
-out (the light in their footprint) are counted, for a mask can hide what it should not.
+Values without variance (s = 0: a pixel without light, one that no path reached, a reference without
+noise) have no z. They are counted and compared in absolute terms, and they do enter the relative
+bias. The same holds for values where the reference is zero, which have no relative error: light
+where none should be shows there. Pixels that a mask leaves out (the light in their footprint) are
+counted, for a mask can hide what it should not.
 
 The relative bias of a whole image
 ----------------------------------
@@ -37,25 +44,29 @@ order in the errors dB = (dT - (1 + B) dR) / R, so with independent pixels
 
     var B = (sum v_t + (1 + B)^2 sum v_r) / R^2,     v = (sum over the channels of a pixel of s)^2.
 
-v is the variance of a sum of fully dependent channels, the largest that there can be (Minkowski's inequality): channels
-share their paths, and the interval must not be too narrow for it. It is up to sqrt(channels) too wide if they do not.
+v is the variance of a sum of fully dependent channels, the largest that there can be (Minkowski's
+inequality): channels share their paths, and the interval must not be too narrow for it. It is up to
+sqrt(channels) too wide if they do not.
 
-**Heavy tails.** The errors of pixels are independent but heavy tailed (P(X > x) ~ x^(-3/2) next to the light), and the
-sums are normal only if many pixels of similar weight add up. `largest_fraction`, that of one pixel in var B, says
-how far that holds; the degrees of freedom of Satterthwaite, (sum v)^2 / sum(v^2 / (K - 1)), fall to K - 1 where one
-pixel rules.
+**Heavy tails.** The errors of pixels are independent but heavy tailed (P(X > x) ~ x^(-3/2) next to
+the light), and the sums are normal only if many pixels of similar weight add up.
+`largest_fraction`, that of one pixel in var B, says how far that holds; the degrees of freedom of
+Satterthwaite, (sum v)^2 / sum(v^2 / (K - 1)), fall to K - 1 where one pixel rules.
 
-**Batches.** If the mean over the image is known for each of K batches, a second interval follows from the spread of
-these K numbers alone, with K - 1 degrees of freedom. Each of them is a mean over all pixels, much nearer to the normal
-law than the batch means of one pixel, and dependence of pixels or channels is in it as it is. If it is much wider than
-the first interval, then pixels are not independent (a filter wider than a pixel, a seed used twice).
+**Batches.** If the mean over the image is known for each of K batches, a second interval follows
+from the spread of these K numbers alone, with K - 1 degrees of freedom. Each of them is a mean over
+all pixels, much nearer to the normal law than the batch means of one pixel, and dependence of
+pixels or channels is in it as it is. If it is much wider than the first interval, then pixels are
+not independent (a filter wider than a pixel, a seed used twice).
 
-**Equivalence.** "Not rejected" is no agreement: few samples reject nothing. `equivalent` says that the whole 95 %
-interval lies within +-margin, which is two one-sided tests at 2.5 % each (Schuirmann 1987).
+**Equivalence.** "Not rejected" is no agreement: few samples reject nothing. `equivalent` says that
+the whole 95 % interval lies within +-margin, which is two one-sided tests at 2.5 % each (Schuirmann
+1987).
 
-**Detectable bias.** A two-sided test at the 5 % level rejects if |B| > q(0.975) se. With a true bias b it does so with
-probability P(B > q(0.975) se) = P((B - b)/se > q(0.975) - b/se), the other tail being negligible: that is 90 % if
-b = (q(0.975) + q(0.90)) se, q the quantiles of Student's law; 3.24 se for many degrees of freedom.
+**Detectable bias.** A two-sided test at the 5 % level rejects if |B| > q(0.975) se. With a true
+bias b it does so with probability P(B > q(0.975) se) = P((B - b)/se > q(0.975) - b/se), the other
+tail being negligible: that is 90 % if b = (q(0.975) + q(0.90)) se, q the quantiles of Student's
+law; 3.24 se for many degrees of freedom.
 """
 
 from dataclasses import dataclass
@@ -80,19 +91,24 @@ from airlight.validation.statistics.samples import (
 )
 
 BLOCK = 8  #: side of a block [pixels]
-#: The probability with which a comparison of images that agree rejects any pixel, and any block; values whose p-value
-#: is below it are counted.
+#: The probability with which a comparison of images that agree rejects any pixel, and any block;
+#: values whose p-value is below it are counted.
 LEVEL = 0.01
 
 
 @dataclass(frozen=True)
 class NoisyImage:
-    """One side of a comparison: an image with its noise, (height, width) or (height, width, channels)."""
+    """One side of a comparison: an image with its noise, (height, width) or
+    (height, width, channels).
+    """
 
     mean: ArrayLike  #: radiance [W/(m^2 sr)]
-    standard_error: ArrayLike | None = None  #: of `mean`, of the same shape; None for an image without random error
-    batches: int | None = None  #: independent ones, whose means gave the standard error; None for one as good as exact
-    batch_means: ArrayLike | None = None  #: over the pixels compared, of every batch, (batches,) or (batches, channels)
+    #: of `mean`, of the same shape; None for an image without random error
+    standard_error: ArrayLike | None = None
+    #: independent ones, whose means gave the standard error; None for one as good as exact
+    batches: int | None = None
+    #: over the pixels compared, of every batch, (batches,) or (batches, channels)
+    batch_means: ArrayLike | None = None
 
 
 @dataclass(frozen=True)
@@ -119,23 +135,27 @@ def compare_statistics(
 ) -> Statistics:
     """Test two images against each other (derivations: see the module).
 
-    Valid for pixels whose beam keeps away from the light: where it holds the light the variance is infinite and no test
-    means anything (the 95 % interval of Pareto's law with exponent 3/2 holds the true value in 80 % of cases), so mask
-    them. Skewed estimates need many batches: with 32, each one log-normal number of logarithmic deviation 1, 6 % of
-    values exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once.
-    `exceeding_p` and `uniformity_p` show it; the interval of the image keeps its 95 %
+    Valid for pixels whose beam keeps away from the light: where it holds the light the variance is
+    infinite and no test means anything (the 95 % interval of Pareto's law with exponent 3/2 holds
+    the true value in 80 % of cases), so mask them. Skewed estimates need many batches: with 32,
+    each one log-normal number of logarithmic deviation 1, 6 % of values exceed the 1 % level, as a
+    batch without a rare large value is too low and looks too sure at once. `exceeding_p` and
+    `uniformity_p` show it; the interval of the image keeps its 95 %
     (tests/validation/statistics/test_rates.py).
 
-    At least one of two independent estimates has a standard error. Pixels that the mask leaves out, (height, width) of
-    truth values, or that are not finite in either mean are not compared: `error_metrics` counts the latter, and batch
-    means, which would not be of these pixels, are then ignored. A relative bias up to the `margin` [1] counts as
-    agreement, such as 0.005. The relative bias may have an error of up to the `bound` [1] that is no noise: agreement
-    allows for it on both sides of each interval.
+    At least one of two independent estimates has a standard error. Pixels that the mask leaves out,
+    (height, width) of truth values, or that are not finite in either mean are not compared:
+    `error_metrics` counts the latter, and batch means, which would not be of these pixels, are then
+    ignored. A relative bias up to the `margin` [1] counts as agreement, such as 0.005. The relative
+    bias may have an error of up to the `bound` [1] that is no noise: agreement allows for it on
+    both sides of each interval.
     """
     check_margin(margin)
     ref, tst, asked = compared(reference.mean, test.mean, mask)
     if reference.standard_error is None and test.standard_error is None:
-        raise InputError("neither image has a standard error; give one, or compare them by their metrics alone")
+        raise InputError(
+            "neither image has a standard error; give one, or compare them by their metrics alone"
+        )
     chosen = asked & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
     whole = bool((chosen == asked).all())
     # Free of units from here on. A power of two leaves every digit as it is; squares stay in range.
@@ -144,7 +164,10 @@ def compare_statistics(
     expected = _side("reference", reference, chosen, scale=scale, with_batches=whole)
     tested = _side("test", test, chosen, scale=scale, with_batches=whole)
     bias = _relative_bias(expected, tested, int(chosen.sum()))
-    intervals = [bias["relative_bias_ci"], bias["relative_bias_ci_batches"] or bias["relative_bias_ci"]]
+    intervals = [
+        bias["relative_bias_ci"],
+        bias["relative_bias_ci_batches"] or bias["relative_bias_ci"],
+    ]
     found = {
         "masked": (~asked).sum(),
         **_value_tests(expected, tested, chosen),
@@ -190,7 +213,9 @@ def _value_tests(expected: _Side, tested: _Side, chosen: Bools) -> dict[str, Any
         "expected_rejections": z.size * sidak(LEVEL, z.size),
         "exceeding": int((p < LEVEL).sum()),
         "expected_exceeding": z.size * LEVEL,
-        "exceeding_p": bonferroni([binomial_p(int((q < LEVEL).sum()), q.size, LEVEL) for q in by_channel]),
+        "exceeding_p": bonferroni(
+            [binomial_p(int((q < LEVEL).sum()), q.size, LEVEL) for q in by_channel]
+        ),
         "uniformity_p": bonferroni([uniformity_p(q) for q in by_channel]),
     }
 
@@ -202,7 +227,9 @@ def _largest(difference: Array, mean: float) -> float:
 
 def _block_tests(expected: _Side, tested: _Side) -> dict[str, Any]:
     """Test the sums over blocks of pixels."""
-    difference = block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
+    difference = block_sums(
+        np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0)
+    )
     variance = block_sums(expected.error**2 + tested.error**2)
     spread = block_sums(expected.spread(expected.error**2) + tested.spread(tested.error**2))
     random = variance > 0
@@ -212,13 +239,19 @@ def _block_tests(expected: _Side, tested: _Side) -> dict[str, Any]:
 
 
 def block_sums(values: Array, side: int = BLOCK) -> Array:
-    """Return the sums over square blocks, smaller ones at the far edges: (rows, columns, channels)."""
+    """Return the sums over square blocks, smaller ones at the far edges:
+    (rows, columns, channels).
+    """
     rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
 
-def _side(name: str, estimate: NoisyImage, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:
-    """Check one estimate and make it regular: float64 of three dimensions, scaled, zero outside the chosen pixels."""
+def _side(
+    name: str, estimate: NoisyImage, chosen: Bools, *, scale: float, with_batches: bool
+) -> _Side:
+    """Check one estimate and make it regular: float64 of three dimensions, scaled, zero
+    outside the chosen pixels.
+    """
     shape = np.shape(estimate.mean)
     inside = chosen[:, :, None]
     mean = np.asarray(estimate.mean, dtype=np.float64).reshape(*shape[:2], -1)
@@ -228,23 +261,32 @@ def _side(name: str, estimate: NoisyImage, chosen: Bools, *, scale: float, with_
         given = np.asarray(estimate.standard_error, dtype=np.float64)
         if given.shape != shape:
             raise InputError(
-                f"the standard error of the {name} has shape {given.shape}; expected that of its image, {shape}"
+                f"the standard error of the {name} has shape {given.shape}; expected that of its "
+                f"image, {shape}"
             )
         error = np.where(inside, given.reshape(mean.shape), 0.0) / scale
     wrong = int((~(np.isfinite(error) & (error >= 0))).any(axis=2).sum())
     if wrong:
-        raise InputError(f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask them")
+        raise InputError(
+            f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask "
+            "them"
+        )
     if estimate.batches is not None and estimate.batches < 2:
-        raise InputError(f"batches of the {name}: got {estimate.batches}, expected at least 2 for a standard error")
+        raise InputError(
+            f"batches of the {name}: got {estimate.batches}, expected at least 2 for a standard "
+            "error"
+        )
     if estimate.batch_means is None or not with_batches:
         return _Side(mean, error, estimate.batches)
     means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
     means = means.reshape(len(means), -1).mean(axis=1)
-    # Means of a mask, or of other pixels, would give an interval for something else; float32 sums agree to 1e-4.
+    # Means of a mask, or of other pixels, would give an interval for something else;
+    # float32 sums agree to 1e-4.
     bias = float(mean[chosen].mean())
     if len(means) < 2 or not np.isclose(means.mean(), bias, rtol=1e-4, atol=0):
         raise InputError(
-            f"the {len(means)} batch means of the {name} have the mean {means.mean() * scale:.6g}, the pixels compared "
+            f"the {len(means)} batch means of the {name} have the mean {means.mean() * scale:.6g}, "
+            "the pixels compared "
             f"{bias * scale:.6g}; give two or more, taken over the same pixels"
         )
     return _Side(mean, error, estimate.batches, means)
@@ -254,10 +296,14 @@ def _side(name: str, estimate: NoisyImage, chosen: Bools, *, scale: float, with_
 
 
 def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]:
-    """Pool the error of all pixels into one relative bias; nothing of it is known if the reference is not bright."""
+    """Pool the error of all pixels into one relative bias; nothing of it is known if the
+    reference is not bright.
+    """
     numbers = ("relative_bias", "relative_bias_se", "relative_bias_freedom", "relative_bias_p")
     found: dict[str, Any] = dict.fromkeys(numbers, np.nan)
-    found |= dict.fromkeys(("reference_variance_fraction", "largest_fraction", "detectable_bias"), np.nan)
+    found |= dict.fromkeys(
+        ("reference_variance_fraction", "largest_fraction", "detectable_bias"), np.nan
+    )
     found |= {"relative_bias_ci": (np.nan, np.nan), "relative_bias_ci_batches": None}
     bright = float(reference.mean.sum())
     if not bright > 0:
@@ -280,7 +326,9 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]
     found |= {"relative_bias_ci": interval, "relative_bias_ci_batches": interval_batches}
     found["detectable_bias"] = max(reach, reach_batches)
     if total > 0:
-        found["relative_bias_p"] = float(two_sided_p(np.asarray(value / error), np.asarray(freedom)))
+        found["relative_bias_p"] = float(
+            two_sided_p(np.asarray(value / error), np.asarray(freedom))
+        )
         found["reference_variance_fraction"] = of_reference / total
         found["largest_fraction"] = float(variance.max()) / total
     return found

@@ -8,8 +8,9 @@ estimated    it is about one error away: by two rules of an integral, or by a fi
 statistical  twice the error is half of a 95 % interval. It is a standard error, widened by Student's law where few
              samples gave it
 
-An error that is not known is None, not 0. Questions are answered by `exceeds` and `within`: yes, no or unknown. An
-`Answer` has no truth value, so that `if estimate.within(margin)` is an error of the program instead of a verdict.
+An error that is not known is None, not 0. Questions are answered by `exceeds` and `within`: yes, no
+or unknown. An `Answer` has no truth value, so that `if estimate.within(margin)` is an error of the
+program instead of a verdict.
 """
 
 import enum
@@ -29,7 +30,9 @@ class Answer(enum.Enum):
     UNKNOWN = "unknown"
 
     def __bool__(self) -> NoReturn:
-        raise TypeError("an answer may be unknown: compare it with Answer.YES, Answer.NO or Answer.UNKNOWN")
+        raise TypeError(
+            "an answer may be unknown: compare it with Answer.YES, Answer.NO or Answer.UNKNOWN"
+        )
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class Estimate:
     kind: Kind = "statistical"
 
     def ends(self, errors: float = INTERVAL) -> tuple[float, float] | None:
-        """Return the ends of the interval of the true number; None where value or error is not known.
+        """Return the ends of the interval of the true number; None where
+        value or error is not known.
 
         Parameters
         ----------

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies: scenes x sizes x changes x configurations, what each combination costs, and how wrong it is.
+"""Studies: scenes x sizes x changes x configurations, what each combination
+costs, and how wrong it is.
 
-A *study* says which scenes, methods and sizes; a *cell* is one combination of them; a *row* is what came of a cell.
+A *study* says which scenes, methods and sizes; a *cell* is one combination of them; a
+*row* is what came of a cell.
 
 Read in this order:
 
@@ -19,6 +21,8 @@ Read in this order:
 - `rows.py`: finished rows on disk, and their Parquet;
 - `cost.py`: what a command will take, and the question before it starts;
 - `causes.py`: the error of an image by its causes, which add up to it;
-- `variation.py`: independent runs of methods that draw random numbers, and frames under a light that moves;
-- `growth.py`: a scene with less and more of one kind of work, and the exponents with which times grow with it.
+- `variation.py`: independent runs of methods that draw random numbers, and frames
+  under a light that moves;
+- `growth.py`: a scene with less and more of one kind of work, and the exponents with
+  which times grow with it.
 """

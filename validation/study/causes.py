@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The error of an image by its causes: differences of renders, which add up to the whole.
 
-A method says which of its parameters make errors (`realtime.methods.interface.method.Method.error_causes`). They are
-taken away one on top of the other: R_0 is the image as asked for, R_1 that without the first cause, and so on to R_n,
-the best that the method can do. E is the exact sum over the same light samples, by `shadow-planes` with the kernel
-`exact`, and T the reference. Then
+A method says which of its parameters make errors
+(`realtime.methods.interface.method.Method.error_causes`). They are taken away one on top of the
+other: R_0 is the image as asked for, R_1 that without the first cause, and so on to R_n, the best
+that the method can do. E is the exact sum over the same light samples, by `shadow-planes` with the
+kernel `exact`, and T the reference. Then
 
     R_0 - T = (R_0 - R_1) + (R_1 - R_2) + ... + (R_n - E) + (E - T),
 
-pixel by pixel: by its causes, the rest, and the light samples in place of the light's extent. In a scene without lights
-with extent E is the reference. If the method says that its last cause is all that is left, that takes the rest.
+pixel by pixel: by its causes, the rest, and the light samples in place of the light's extent. In a
+scene without area lights E is the reference. If the method says that its last cause is all
+that is left, that takes the rest.
 
-With <a, b> the mean of a b over pixels and channels, the *fraction* of a part P in the error D = R_0 - T is
+With <a, b> the mean of a b over pixels and channels, the *fraction* of a part P in
+the error D = R_0 - T is
 
     <P, D> / <D, D>,
 
@@ -43,17 +46,22 @@ class ErrorPart:
     without: str = column("gone with", meaning="values of parameters, 'exact sum' or 'reference'")
     relative_rmse: float | None = column("rel. RMSE", meaning="over the mean of the reference")
     relative_bias: float | None = column("rel. bias", meaning="over the mean of the reference")
-    fraction: float | None = column("fraction of the whole", meaning="in the square of the whole error")
+    fraction: float | None = column(
+        "fraction of the whole", meaning="in the square of the whole error"
+    )
     image: Array  #: signed, (height, width, 3) [W/(m^2 sr)]
 
 
 def decompose(
-    scene: Scene, chosen: Configuration, reference: Array, airlight: Callable[[Configuration], Array]
+    scene: Scene,
+    chosen: Configuration,
+    reference: Array,
+    airlight: Callable[[Configuration], Array],
 ) -> list[ErrorPart]:
     """Return the whole error of a configuration, and the parts by its causes, which add up to it.
 
-    The reference is that at pixel centres, (height, width, 3) [W/(m^2 sr)]; `airlight` renders a configuration in the
-    scene to such an image.
+    The reference is that at pixel centres, (height, width, 3) [W/(m^2 sr)]; `airlight` renders a
+    configuration in the scene to such an image.
     """
     images, named = [airlight(chosen)], [("whole", "reference")]
     left, last = REST, chosen
@@ -67,16 +75,24 @@ def decompose(
     if scene.area_lights:
         points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
         named.append((left, "exact sum"))
-        images.append(airlight(Configuration("shadow-planes", "exact", tuple(values(points).items()))))
+        images.append(
+            airlight(Configuration("shadow-planes", "exact", tuple(values(points).items())))
+        )
     named.append((POINTS if scene.area_lights else left, "reference"))
     images = [np.asarray(image, dtype=np.float64) for image in (*images, reference)]
     whole = images[0] - images[-1]
     parts = [whole, *(before - after for before, after in pairwise(images))]
-    return [_part(*words, part, whole, images[-1]) for words, part in zip(named, parts, strict=True)]
+    return [
+        _part(*words, part, whole, images[-1]) for words, part in zip(named, parts, strict=True)
+    ]
 
 
-def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tuple[str, Configuration | None]]:
-    """Yield the causes that matter, and the configuration without each and those before it; None for the exact sum."""
+def _configurations(
+    chosen: Configuration, size: tuple[int, int]
+) -> Iterator[tuple[str, Configuration | None]]:
+    """Yield the causes that matter, and the configuration without each and those before
+    it; None for the exact sum.
+    """
     if chosen.kernel not in (None, "exact"):
         chosen = replace(chosen, kernel="exact")
         yield "kernel", chosen
@@ -96,7 +112,11 @@ def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tu
 
 def _changes(before: Configuration, after: Configuration) -> str:
     known = dict(before.parameters)
-    words = [f"{name}={value}" for name, value in after.parameters if name not in known or known[name] != value]
+    words = [
+        f"{name}={value}"
+        for name, value in after.parameters
+        if name not in known or known[name] != value
+    ]
     return ", ".join([f"kernel={after.kernel}"] * (before.kernel != after.kernel) + words)
 
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Configurations: a method with a kernel and the values of its parameters, by the names that a user gives.
+"""Configurations: a method with a kernel and the values of its parameters, by the
+names that a user gives.
 
-A kernel is named 'quadrature', 'quadrature-32', or as a user's 'module:function' or 'file.py:function'.
+A kernel is named 'quadrature', 'quadrature-32', or as a user's
+'module:function' or 'file.py:function'.
 """
 
 import hashlib
@@ -30,7 +32,9 @@ from airlight.validation.study.cost import TIMED, Work, frame_work
 
 @dataclass(frozen=True)
 class Configuration:
-    """A method, its kernel (None if it calls none) and the parameters that differ from their defaults."""
+    """A method, its kernel (None if it calls none) and the parameters that
+    differ from their defaults.
+    """
 
     method: str  #: name in the registry, or one's own as 'module:function' or 'fog.glsl'
     kernel: str | None = None  #: see `find_kernel`
@@ -49,7 +53,9 @@ class Configuration:
         return is_users(self.method) or is_users(self.kernel or "")
 
 
-_NAMED = tomllib.loads((Path(__file__).parent / "studies" / "methods.toml").read_text(encoding="utf-8"))
+_NAMED = tomllib.loads(
+    (Path(__file__).parent / "studies" / "methods.toml").read_text(encoding="utf-8")
+)
 
 
 def named_configurations(word: str) -> tuple[Configuration, ...]:
@@ -62,27 +68,36 @@ def named_configurations(word: str) -> tuple[Configuration, ...]:
     return tuple(found)
 
 
-STANDARD, QUICK = named_configurations("standard"), named_configurations("quick")  #: see `studies/methods.toml`
-SHARED_POINTS: Mapping[str, Any] = _NAMED["shared_points"]  #: parameters of `soft-shafts`, beyond Ali 2016
+#: see `studies/methods.toml`
+STANDARD, QUICK = named_configurations("standard"), named_configurations("quick")
+#: parameters of `soft-shafts`, beyond Ali 2016
+SHARED_POINTS: Mapping[str, Any] = _NAMED["shared_points"]
 
 
 def configuration(
-    method: str | Callable[..., Any], kernel: str | None = None, parameters: Mapping[str, Any] | None = None
+    method: str | Callable[..., Any],
+    kernel: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
 ) -> Configuration:
     """Return a configuration, checked.
 
-    `method`: a name of `realtime.methods.registry.METHODS`, one's own as 'module:function', 'path/to/file.py:function'
-    or 'path/to/file.glsl', or a function itself; `kernel`: see `find_kernel`; 'exact' by default for methods that call
-    a kernel; `parameters`: values of the method's parameters; words are converted to the type of the default.
+    `method`: a name of `realtime.methods.registry.METHODS`, one's own as 'module:function',
+    'path/to/file.py:function' or 'path/to/file.glsl', or a function itself; `kernel`: see
+    `find_kernel`; 'exact' by default for methods that call a kernel; `parameters`: values of the
+    method's parameters; words are converted to the type of the default.
 
-    Raises InputError for an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or
-    outside its range, values that contradict one another, and a method of one's own that cannot be loaded.
+    Raises InputError for an unknown method, kernel or parameter (the nearest is named), a value of
+    the wrong type or outside its range, values that contradict one another, and a method of one's
+    own that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     chosen, light_samples = method_parameters(find_method(method), parameters or {})
     uses_kernel = chosen.uses_kernel
     if not uses_kernel and kernel is not None:
-        raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
+        raise InputError(
+            f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave "
+            "it out"
+        )
     if uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
@@ -110,13 +125,16 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 
 
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
-    """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
+    """Return the frame renderer of a configuration for a scene;
+    `extra_layers` as of `frame_renderer`.
 
     Raises InputError if the method refuses.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     parameters: dict[str, Any] = dict(chosen.parameters)
-    return frame_renderer(scene, find_method(chosen.method), kernel=kernel, extra_layers=extra_layers, **parameters)
+    return frame_renderer(
+        scene, find_method(chosen.method), kernel=kernel, extra_layers=extra_layers, **parameters
+    )
 
 
 def rendered_lights(scene: Scene, chosen: Configuration) -> int:
@@ -132,7 +150,9 @@ def rendered_lights(scene: Scene, chosen: Configuration) -> int:
 def configuration_work(scene: Scene, chosen: Configuration, frames: float = TIMED) -> Work:
     """Return the work of some frames of a configuration at the size of a scene's image."""
     given = dict(chosen.parameters)
-    steps = float(given.get("steps", 100)) if chosen.method == "ray-march" or "steps" in given else 0.0
+    steps = (
+        float(given.get("steps", 100)) if chosen.method == "ray-march" or "steps" in given else 0.0
+    )
     size = scene.camera.width, scene.camera.height
     return frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
 
@@ -145,7 +165,8 @@ def _function_name(function: Callable[..., Any]) -> str:
         named = getattr(named, part, None)
     if not callable(function) or named is not function:
         raise InputError(
-            f"method: got {function!r}, expected a name or a function at the top of a module: give it a name there"
+            f"method: got {function!r}, expected a name or a function at the top of a module: give "
+            "it a name there"
         )
     return name
 
@@ -153,9 +174,9 @@ def _function_name(function: Callable[..., Any]) -> str:
 def find_kernel(name: str) -> Kernel:
     """Return the kernel of a name.
 
-    The name is one of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter
-    set to the whole number N, or a user's, 'module:function' or 'path/to/file.py:function'. An unknown one is
-    refused with the nearest.
+    The name is one of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its
+    first parameter set to the whole number N, or a user's, 'module:function' or
+    'path/to/file.py:function'. An unknown one is refused with the nearest.
     """
     if ":" in name:
         return _imported(name)
@@ -170,12 +191,14 @@ def split_name(name: str) -> tuple[Kernel, int | None]:
     base, separator, digits = name.rpartition("-")
     if not (separator and base in KERNELS and digits.isascii() and digits.isdecimal()):
         raise InputError(
-            f"kernel: got {name!r}, expected one of {', '.join(KERNELS)}, such a name with '-N', or 'module:function'"
-            + nearest(name, KERNELS)
+            f"kernel: got {name!r}, expected one of {', '.join(KERNELS)}, such a name with '-N', "
+            "or 'module:function'" + nearest(name, KERNELS)
         )
     record = KERNELS[base]
     if not record.parameters:
-        raise InputError(f"kernel: got {name!r}, but {base!r} has no parameter to set: leave '-{digits}' out")
+        raise InputError(
+            f"kernel: got {name!r}, but {base!r} has no parameter to set: leave '-{digits}' out"
+        )
     return record, int(digits)
 
 
@@ -198,7 +221,9 @@ def _imported(name: str) -> Kernel:
 
 
 def user_code(chosen: Configuration) -> tuple[Content, ...]:
-    """Return digests of the user's code in a configuration, with the modules of its folder that it imports."""
+    """Return digests of the user's code in a configuration, with the modules of
+    its folder that it imports.
+    """
     names = [name for name in (chosen.method, chosen.kernel) if name is not None and is_users(name)]
     return tuple(Content(_user_digest(name)) for name in names)
 

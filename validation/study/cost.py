@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The time and memory of a command, estimated from counts before it starts, so that they are not a surprise.
+"""The time and memory of a command, estimated from counts before it starts, so that
+they are not a surprise.
 
-The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November 2026 and rounded; a
-scene can be some times cheaper or costlier, and a machine faster or slower. That is enough to share a progress bar out
-among its parts, and for a note where a command may take minutes. A command is refused for its time only where the least
-that it needs takes longer than an hour on threads that are `_FASTER` times as fast, too. Whether one frame keeps a
-limit is another question: the code of a user's method cannot be counted, and `validation.study.run` times a small frame
-instead.
+The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November
+2026 and rounded; a scene can be some times cheaper or costlier, and a machine faster or slower.
+That is enough to share a progress bar out among its parts, and for a note where a command may take
+minutes. A command is refused for its time only where the least that it needs takes longer than an
+hour on threads that are `_FASTER` times as fast, too. Whether one frame keeps a limit is another
+question: the code of a user's method cannot be counted, and `validation.study.run` times a small
+frame instead.
 """
 
 import os
@@ -26,12 +28,13 @@ _NOTED = 60.0  # seconds from which on a user would rather know before than wait
 _STEP = 40e-9  # of a marched ray [s]
 _RAY = 2e-6  # of any other method, by light [s]
 _REFERENCE = 100e-6  # of the quadrature, by ray and light at a place or in a direction [s]
-_LIGHT_SAMPLE = 10e-6  # by ray and sample of an area light: 6 to 19 in four scenes on 29 November 2026 [s]
+# by ray and sample of an area light: 6 to 19 in four scenes on 29 November 2026 [s]
+_LIGHT_SAMPLE = 10e-6
 _SAMPLE = 1e-6  # of single-scatter and volpath [s]
 _PATH = 20e-6  # of a path through a cloud [s]
 _GPU = 100.0  # threads that a GPU replaces
-#: The fastest thread against the measured one, with twice its clock, twice the width of its vectors, and a scene that
-#: is two and a half times cheaper than most.
+#: The fastest thread against the measured one, with twice its clock, twice the width of its
+#: vectors, and a scene that is two and a half times cheaper than most.
 _FASTER = 10.0
 TIMED = 8  #: frames that timing takes where they are slow
 _FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
@@ -43,17 +46,26 @@ class Work:
 
     seconds: float  #: on one thread; the least where errors decide how much there is to do
     memory: float = 0.0  #: at most at once [bytes]
-    most: float | None = None  #: seconds on one thread where errors ask for the most; None if that is the same
+    #: seconds on one thread where errors ask for the most; None if that is the same
+    most: float | None = None
 
 
-def frame_work(size: tuple[int, int], *, lights: int = 1, steps: float = 0, frames: float = TIMED) -> Work:
-    """Return the work of some frames of a size [pixels] by a method that marches with so many steps, or with none."""
+def frame_work(
+    size: tuple[int, int], *, lights: int = 1, steps: float = 0, frames: float = TIMED
+) -> Work:
+    """Return the work of some frames of a size [pixels] by a method that marches with so
+    many steps, or with none.
+    """
     pixels = float(size[0]) * size[1]
     return Work(frames * pixels * max(lights, 1) * max(steps * _STEP, _RAY), pixels * _FRAME_BYTES)
 
 
-def reference_work(size: tuple[int, int], *, lights: int = 1, area_lights: int = 0, pixel: str = "centre") -> Work:
-    """Return the work of an image of the quadrature reference, at pixel centres or of means over areas of pixels."""
+def reference_work(
+    size: tuple[int, int], *, lights: int = 1, area_lights: int = 0, pixel: str = "centre"
+) -> Work:
+    """Return the work of an image of the quadrature reference, at pixel centres or of
+    means over areas of pixels.
+    """
     pixels = float(size[0]) * size[1]
     least, most = (
         pixels * rays * (max(lights, 1) * _REFERENCE + area_lights * samples * _LIGHT_SAMPLE)
@@ -63,16 +75,19 @@ def reference_work(size: tuple[int, int], *, lights: int = 1, area_lights: int =
 
 
 def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:
-    """Return the work of an image by random samples, so many in each pixel, each a path through clouds or one step."""
+    """Return the work of an image by random samples, so many in each pixel, each a path
+    through clouds or one step.
+    """
     pixels = float(size[0]) * size[1]
     return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
 
 
 def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
-    """Refuse what would take more than an hour on any machine, or more memory than there is, unless it is forced.
+    """Refuse what would take more than an hour on any machine, or more memory than there
+    is, unless it is forced.
 
-    `what` is asked for, as the message begins, which gives the estimated time, the memory and what to do. Returns notes
-    for the user: how long the command may take, if that is more than a minute.
+    `what` is asked for, as the message begins, which gives the estimated time, the memory and what
+    to do. Returns notes for the user: how long the command may take, if that is more than a minute.
     """
     works = list(works)
     threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
@@ -84,16 +99,23 @@ def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
     reasons = []
     if least > LONGEST * _FASTER and not forced:
         reasons.append(
-            f"would take about {_duration(least)} at the speed of one machine, and more than an hour at {_FASTER:g} "
+            f"would take about {_duration(least)} at the speed of one machine, and more than an "
+            f"hour at {_FASTER:g} "
             "times that speed"
         )
     if usable is not None and memory > usable.size and not forced:
         reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which {usable}")
     if reasons:
-        raise InputError(f"{what}: {' and '.join(reasons)}; ask for less, or set AIRLIGHT_FORCE=1 to start it")
+        raise InputError(
+            f"{what}: {' and '.join(reasons)}; ask for less, or set AIRLIGHT_FORCE=1 to start it"
+        )
     if most <= _NOTED:
         return ()
-    time = f"about {_duration(most)}" if most < 1.1 * least else f"between {_duration(least)} and {_duration(most)}"
+    time = (
+        f"about {_duration(most)}"
+        if most < 1.1 * least
+        else f"between {_duration(least)} and {_duration(most)}"
+    )
     words = "by its rays and samples and the speed of one machine; another machine or scene may take several times that"
     return (f"{what}: {time} {words}",)
 

@@ -36,14 +36,17 @@ from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.clock import timed, timing_of
 from airlight.validation.timing import FrameTimes, TimingRun
 
-_BRIEF_SLOW = 500.0  # of a slower frame the airlight is not timed by itself where times are brief [ms]
+# of a slower frame the airlight is not timed by itself where times are brief [ms]
+_BRIEF_SLOW = 500.0
 
 
-def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
+def timed_image(
+    renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool
+):
     """Render the next frame by `realtime.frame.incremental.next_parts`.
 
-    Return the image on the host, what its parts leave to the next frame, and what it took without bringing it to
-    the host [ms].
+    Return the image on the host, what its parts leave to the next frame, and what it took without
+    bringing it to the host [ms].
     """
     in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
     while True:
@@ -51,7 +54,9 @@ def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache,
         took += spent.ms
         if found is None:
             assert frame is not None
-            check_radiance(scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+            check_radiance(
+                scene, renderer.method.name, frame.airlight, frame.surface, frame.distance
+            )
             return frame, tuple(kept), took
         part, stages, cache = found
         frame = frame_with_part(frame, part, stages, cache.extra)
@@ -60,12 +65,16 @@ def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache,
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
-    """Return the work of a frame after the light moved: all stages run again, camera rays too, in the same geometry."""
+    """Return the work of a frame after the light moved: all stages run again, camera rays
+    too, in the same geometry.
+    """
     return _step(renderer, None, light_moved=True)
 
 
 def camera_rays(scene: Scene) -> Callable[[], Any]:
-    """Return the work of casting the camera rays without shading, the least time of a frame that casts them."""
+    """Return the work of casting the camera rays without shading, the least time of
+    a frame that casts them.
+    """
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
     dr.eval(pixel)
 
@@ -76,20 +85,28 @@ def camera_rays(scene: Scene) -> Callable[[], Any]:
     return lambda: dr.eval(cast(scene.geometry, scene.facets, pixel, scene.camera))
 
 
-def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
-    """Return the work of the next frame, which reuses what a cache has; without one camera rays are cast too."""
+def _step(
+    renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool
+) -> Callable[[], Any]:
+    """Return the work of the next frame, which reuses what a cache has; without one
+    camera rays are cast too.
+    """
     moved = {"camera_moved": cache is None, "geometry_moved": False, "light_moved": light_moved}
     return lambda: next_frame(renderer, renderer.scene, cache, **moved)
 
 
 def first_frame(renderer: FrameRenderer) -> FrameCache:
     """Render the frame of the renderer's scene and return its cache for the next frame."""
-    return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
+    return next_frame(
+        renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True
+    )[1]
 
 
 @dataclass(frozen=True)
 class FrameSpent:
-    """The times of the frames of one turn, by the names of `FrameTimes`; None for what was not asked for."""
+    """The times of the frames of one turn, by the names of `FrameTimes`; None
+    for what was not asked for.
+    """
 
     frame: Spent
     airlight: Spent
@@ -105,10 +122,13 @@ Turn = Callable[[], list[FrameSpent]]
 
 
 def whole_turn(renderer: FrameRenderer) -> Turn:
-    """Return a turn whose frames are timed as wholes, each by itself, with their two largest stages."""
+    """Return a turn whose frames are timed as wholes, each by itself, with
+    their two largest stages.
+    """
 
     def turn() -> list[FrameSpent]:
-        # The preparation on the host goes on while the device is busy with the surface: no sum of stages.
+        # The preparation on the host goes on while the device is busy with the
+        # surface: no sum of stages.
         (_, cache), light_moved = timed(moved_light(renderer))
         (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, renderer))
         airlight = timed(partial(_ready, run_method, renderer, cache.state, cast, by_light))[1]
@@ -121,7 +141,9 @@ def whole_turn(renderer: FrameRenderer) -> Turn:
 
 
 def staged_turn(renderer: FrameRenderer) -> Turn:
-    """Return a turn of one frame, stage by stage, of which all frames are sums; large images are run in parts."""
+    """Return a turn of one frame, stage by stage, of which all frames are sums; large
+    images are run in parts.
+    """
     in_parts, needed = parts(renderer), renderer.method.prepared_from
 
     def turn() -> list[FrameSpent]:
@@ -146,7 +168,8 @@ def brief_turn(renderer: FrameRenderer) -> Turn:
     def turn() -> list[FrameSpent]:
         state, prepare = timed(lambda: renderer.prepare(renderer.scene))
         frame = timed(lambda: run_stages(renderer, state))[1]
-        if frame.ms >= _BRIEF_SLOW:  # camera rays and surfaces take little of it, and it takes too long to ask
+        # camera rays and surfaces take little of it, and it takes too long to ask
+        if frame.ms >= _BRIEF_SLOW:
             return [FrameSpent(frame, frame, prepare=prepare)]
         cast, by_light = run_cast_and_shade(renderer)
         dr.eval(cast, by_light)
@@ -157,7 +180,8 @@ def brief_turn(renderer: FrameRenderer) -> Turn:
 
 
 def shader_turn(renderer: FrameRenderer, seconds: float) -> tuple[str, Turn]:
-    """Return the device that draws a shader, and a turn of all its passes there for so many seconds.
+    """Return the device that draws a shader, and a turn of all its passes
+    there for so many seconds.
 
     Transfers from and to the host are left out: an engine has its rays and its maps.
     """
@@ -173,7 +197,8 @@ def shader_turn(renderer: FrameRenderer, seconds: float) -> tuple[str, Turn]:
 
 
 def object_moves(scene: Scene) -> Callable[[], Any] | None:
-    """Return the work of moving all objects of a scene, to where they stand; None where none can be moved.
+    """Return the work of moving all objects of a scene, to where they stand; None
+    where none can be moved.
 
     The work is that of any other place, the same for all methods.
     """
@@ -182,10 +207,14 @@ def object_moves(scene: Scene) -> Callable[[], Any] | None:
 
 
 def times_of(spent: Sequence[FrameSpent], moves: Sequence[Spent], run: TimingRun) -> FrameTimes:
-    """Return the times of the frames of all turns in a run; `moves`: what moving all objects took, if anybody asks."""
+    """Return the times of the frames of all turns in a run; `moves`: what moving all
+    objects took, if anybody asks.
+    """
     timings = {}
     for each in fields(FrameSpent):
-        values = [value for value in (getattr(one, each.name) for one in spent) if value is not None]
+        values = [
+            value for value in (getattr(one, each.name) for one in spent) if value is not None
+        ]
         if values and each.name != "prepare":
             timings[each.name] = timing_of(values)
     lights = [one.light_moved for one in spent if one.light_moved is not None]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How times grow with the work of a scene, which has less and more of one kind of work, step by step.
+"""How times grow with the work of a scene, which has less and more of one
+kind of work, step by step.
 
 | kind | work | what changes |
 |---|---|---|
@@ -10,18 +11,21 @@
 
 The other kinds keep the image at the size that is asked for.
 
-A flat triangle cut into four has no new silhouette. All vertices therefore move by one smooth map of space,
+A flat triangle cut into four has no new silhouette. All vertices therefore move by
+one smooth map of space,
 
     u(p) = p + sum_i a_i sin(k_i . p + i),     |a_i| |k_i| = 0.15,     i = 1 .. 4,
 
-with wavelengths from a quarter to a thirtieth of the scene's size. The norms of its derivative less the identity add
-up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was disjoint is disjoint. Its bumps turn
-smooth outlines into silhouettes of which more and more edges are found as triangles shrink below the wavelengths, about
-the root of their number. Equal places move equally, so that seams of doubled vertices stay closed. Bounds of media and
-area lights stay as they are: they must be convex, or of their shape.
+with wavelengths from a quarter to a thirtieth of the scene's size. The norms of its derivative less
+the identity add up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was
+disjoint is disjoint. Its bumps turn smooth outlines into silhouettes of which more and more edges
+are found as triangles shrink below the wavelengths, about the root of their number. Equal places
+move equally, so that seams of doubled vertices stay closed. Bounds of media and area lights stay as
+they are: they must be convex, or of their shape.
 
-A column t = t_0 w^e of the work w has the exponent e, the slope of log t over log w by least squares. The constant cost
-of a frame makes the exponent of a time smaller. Between two steps a time may grow at most as
+A column t = t_0 w^e of the work w has the exponent e, the slope of log t over log w by least
+squares. The constant cost of a frame makes the exponent of a time smaller. Between two steps a time
+may grow at most as
 
 | work | a frame | the light moved | objects moved | why |
 |---|---|---|---|---|
@@ -30,7 +34,8 @@ of a frame makes the exponent of a time smaller. Between two steps a time may gr
 | lights | 1 | 1 | 1 | one after the other |
 | texels on a side of a map | 1 | 2 | 2 | a ray crosses a row of texels; the map has their square |
 
-A step that is steeper by more than `CLIFF` is a cliff, where it takes longer than `_SHORT`: something overflows there.
+A step that is steeper by more than `CLIFF` is a cliff, where it takes longer than `_SHORT`:
+something overflows there.
 """
 
 import math
@@ -64,7 +69,8 @@ from airlight.validation.study.turns import time_cells
 from airlight.validation.timing import Scaling, TimeGrowth, TimingRun, joined
 
 TIMES = ("frame", "light_moved", "objects_moved")
-CLIFF = 0.6  #: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
+#: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
+CLIFF = 0.6
 _SHORT = 5.0  # a time below which launches and clocks decide [ms]
 #: By kind of work, the exponents of `TIMES`.
 USUAL = {
@@ -78,7 +84,8 @@ _SIDES = (0.5, 1, 2, 4)  # of the image
 _COPIES = (1, 2, 4, 8)  # of each light
 _MAPS = (128, 256, 512, 1024, 2048)
 _ASIDE = 0.07  # between the copies of a light, as a fraction of its distance from the camera
-_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
+# along the size of the scene
+_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))
 _STEEPNESS = 0.15
 _TURN = 2.3  # between the copies of a light from infinity [degrees]
 
@@ -89,17 +96,21 @@ class Step:
 
     work: float  #: of its kind
     scene: Callable[[], Scene]
-    parameters: Mapping[str, Any] = field(default_factory=dict)  #: of the method, beside the configuration's own
+    #: of the method, beside the configuration's own
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
 
 def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
-    """Return the steps of a kind of work, of `GROWTH`, for a scene at a size [pixels], the least work first.
+    """Return the steps of a kind of work, of `GROWTH`, for a scene at a size
+    [pixels], the least work first.
 
     A scene that has nothing of the kind of which there could be less or more is refused.
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
     if kind not in makers:
-        raise InputError(f"scaling: got {kind!r}, expected some of {', '.join(GROWTH)}, with commas between them")
+        raise InputError(
+            f"scaling: got {kind!r}, expected some of {', '.join(GROWTH)}, with commas between them"
+        )
     return makers[kind](name_or_path, size)
 
 
@@ -118,7 +129,8 @@ def _triangles(name: str, size: tuple[int, int]) -> list[Step]:
     levels = [level for level in range(10) if 0 < count * 4**level <= MOST_TRIANGLES]
     if len(levels) < 2:
         raise InputError(
-            f"scaling triangles: {name} has {count} triangles of opaque meshes; expected some, and four times as many "
+            f"scaling triangles: {name} has {count} triangles of opaque meshes; expected some, and "
+            "four times as many "
             f"not more than {MOST_TRIANGLES}; use another scene"
         )
     return [Step(count * 4**level, partial(_finer, name, size, level)) for level in levels]
@@ -132,14 +144,21 @@ def _lights(name: str, size: tuple[int, int]) -> list[Step]:
     scene = _read(name, size)
     count = len(scene.lights)
     if not count:
-        raise InputError(f"scaling lights: {name} has area lights only; expected a point, spot or directional one")
+        raise InputError(
+            f"scaling lights: {name} has area lights only; expected a point, spot or directional "
+            "one"
+        )
     return [Step(count * copies, partial(with_copies, scene, copies)) for copies in _COPIES]
 
 
 def with_copies(scene: Scene, copies: int) -> Scene:
-    """Return a scene in which each light without extent stands several times, with its fraction of the intensity."""
+    """Return a scene in which each light without extent stands several times, with its
+    fraction of the intensity.
+    """
     here = np.array(scene.camera.origin, dtype=np.float64).ravel()
-    lights = tuple(_copy(light, number, copies, here) for light in scene.lights for number in range(copies))
+    lights = tuple(
+        _copy(light, number, copies, here) for light in scene.lights for number in range(copies)
+    )
     return replace(scene, lights=lights)
 
 
@@ -151,7 +170,11 @@ def _copy(light: Light, number: int, copies: int, camera) -> Light:
     if light.extent is not None:
         return turned_light(light, position, rotation((0.31, 0.53, 0.79), _TURN * number))
     step = _ASIDE * np.linalg.norm(position - camera)
-    aside = step * number**0.5 * np.array([np.cos(2.4 * number), np.sin(2.4 * number), 0.3 * np.cos(1.7 * number)])
+    aside = (
+        step
+        * number**0.5
+        * np.array([np.cos(2.4 * number), np.sin(2.4 * number), 0.3 * np.cos(1.7 * number)])
+    )
     return replace(light, position=type(light.position)(*(float(c) for c in position + aside)))
 
 
@@ -165,17 +188,26 @@ def triangles_of(scene) -> int:
 
 
 def subdivided(scene, levels: int) -> Any:
-    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times the triangles, and bumps."""
+    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times
+    the triangles, and bumps.
+    """
     if not triangles_of(scene):
-        raise InputError("triangles: the scene has no opaque meshes, which alone can have more triangles; use another")
+        raise InputError(
+            "triangles: the scene has no opaque meshes, which alone can have more triangles; use "
+            "another"
+        )
     box = scene.bbox()
     low, high = (np.array(corner, dtype=np.float64) for corner in (box.min, box.max))
-    shapes = [_cut(shape, levels, low, float(np.linalg.norm(high - low))) for shape in scene.shapes()]
+    shapes = [
+        _cut(shape, levels, low, float(np.linalg.norm(high - low))) for shape in scene.shapes()
+    ]
     return with_shapes(scene, shapes)
 
 
 def with_shapes(scene, shapes: Iterable[Any]) -> Any:
-    """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
+    """Return a Mitsuba scene of other shapes, with the camera and the
+    lights without extent of one.
+    """
     emitters = (emitter for emitter in scene.emitters() if emitter.class_name() != "AreaLight")
     parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
     return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
@@ -194,12 +226,19 @@ def _cut(shape, levels: int, corner: Array, size: float) -> Any:
 
 
 def bumpy(points: Array, corner: Array, size: float) -> Array:
-    """Return points (n, 3) after the map of space above, for a scene of a `size` from a `corner` on [m]."""
+    """Return points (n, 3) after the map of space above, for a scene of a
+    `size` from a `corner` on [m].
+    """
     moved = points.copy()
     for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):
         across = np.cross(wave, (0.31, 0.53, 0.79))
         height = _STEEPNESS / np.linalg.norm(wave)
-        moved += height * across / np.linalg.norm(across) * np.sin((points - corner) @ wave + number)[:, None]
+        moved += (
+            height
+            * across
+            / np.linalg.norm(across)
+            * np.sin((points - corner) @ wave + number)[:, None]
+        )
     return moved
 
 
@@ -207,13 +246,20 @@ def _is_cut(shape) -> bool:
     return shape.is_mesh() and not shape.is_emitter() and shape.bsdf().class_name() != "Null"
 
 
-def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Counted | None = None) -> list[Scaling]:
+def study_growth(
+    study: Study, kind: str, steps: Sequence[Step], *, progress: Counted | None = None
+) -> list[Scaling]:
     """Measure how methods grow with a kind of work, in steps of `ladder`, in the first scene.
 
-    Methods take turns in each step; steps follow one another, as their scenes are too large to be loaded together. The
-    anchor of all steps says whether the machine changed between them. A method ends at the first step that it refuses.
+    Methods take turns in each step; steps follow one another, as their scenes are too large to be
+    loaded together. The anchor of all steps says whether the machine changed between them. A method
+    ends at the first step that it refuses.
     """
-    name, rows, runs = study.scenes[0], list[list[Row]]([] for _ in study.configurations), list[TimingRun]()
+    name, rows, runs = (
+        study.scenes[0],
+        list[list[Row]]([] for _ in study.configurations),
+        list[TimingRun](),
+    )
     anchor: Callable[[], Any] | None = None
     for number, step in enumerate(steps):
         scene = step.scene()
@@ -224,7 +270,10 @@ def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Co
         for place, (chosen, own) in enumerate(zip(study.configurations, rows, strict=True)):
             cell = None
             if all(row.status == "done" for row in own):
-                asked = replace(chosen, parameters=tuple((dict(chosen.parameters) | dict(step.parameters)).items()))
+                asked = replace(
+                    chosen,
+                    parameters=tuple((dict(chosen.parameters) | dict(step.parameters)).items()),
+                )
                 cell = Cell(name, size, (), asked, study.measure, (kind, step.work))
                 own.append(run(cell, scene, None)[0])
             cells.append(cell if cell is not None and own[-1].status == "done" else None)
@@ -236,11 +285,20 @@ def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Co
         for own, cell, timed in zip(rows, cells, timings, strict=True):
             if cell is not None:
                 own[-1] = replace(with_times(own[-1], timed), work=Growth(kind, step.work, rays))
-        runs += [each.times.run for each in timings if each.times is not None and each.times.run is not None][:1]
+        runs += [
+            each.times.run
+            for each in timings
+            if each.times is not None and each.times.run is not None
+        ][:1]
     found = []
     for chosen, own in zip(study.configurations, rows):
         costs: list[dict[str, Any]] = [
-            {**row.times.measured, "work": row.work.amount, "rays": row.work.rays, "memory": row.memory}
+            {
+                **row.times.measured,
+                "work": row.work.amount,
+                "rays": row.work.rays,
+                "memory": row.memory,
+            }
             for row in own
             if row.times is not None and row.work is not None
         ]
@@ -265,24 +323,35 @@ def _same(scene: Scene, cell: Cell) -> Scene:
 
 
 def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> TimeGrowth:
-    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least first, grows with the work."""
+    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least
+    first, grows with the work.
+    """
     exponent, standard_error = fitted_exponent(works, times)
     steps = list(pairwise(zip(works, times)))
     local = [
-        (math.log(after / before) / math.log(second / first), second) for (first, before), (second, after) in steps
+        (math.log(after / before) / math.log(second / first), second)
+        for (first, before), (second, after) in steps
     ]
     steepest, at = max(local, default=(None, None))
     most = USUAL[kind][TIMES.index(name)] + CLIFF
-    cliff = any(slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps))
-    found = {"exponent": exponent, "standard_error": standard_error, "steepest": steepest, "at": at, "cliff": cliff}
+    cliff = any(
+        slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps)
+    )
+    found = {
+        "exponent": exponent,
+        "standard_error": standard_error,
+        "steepest": steepest,
+        "at": at,
+        "cliff": cliff,
+    }
     return record_of(found, TimeGrowth)
 
 
 def fitted_exponent(works: ArrayLike, values: ArrayLike) -> tuple[float, float]:
     """Return the exponent with which values (n,) grow with works (n,), and its standard error.
 
-    The exponent is that of least squares of the logarithms, NaN for fewer than two values that are positive and finite;
-    its standard error, from the scatter about the line, for fewer than three.
+    The exponent is that of least squares of the logarithms, NaN for fewer than two values that are
+    positive and finite; its standard error, from the scatter about the line, for fewer than three.
     """
     n, e = np.asarray(works, dtype=np.float64), np.asarray(values, dtype=np.float64)
     counts = (e > 0) & np.isfinite(e)

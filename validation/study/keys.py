@@ -35,29 +35,43 @@ class Made:
         """Return in words what differs in `other`; the last number of Python's version may."""
         mine, theirs = self._words(), other._words()
         return [
-            f"{name} {theirs.get(name, 'missing')}, not {mine[name]}" for name in mine if mine[name] != theirs[name]
+            f"{name} {theirs.get(name, 'missing')}, not {mine[name]}"
+            for name in mine
+            if mine[name] != theirs[name]
         ]
 
     def _words(self) -> dict[str, str]:
-        python = self.python.rpartition(".")[0]  # the digest is of the code as this version compiles it
-        words = {"airlight": self.airlight, "Python": python, "source code": self.source[:12], "variant": self.variant}
+        # the digest is of the code as this version compiles it
+        python = self.python.rpartition(".")[0]
+        words = {
+            "airlight": self.airlight,
+            "Python": python,
+            "source code": self.source[:12],
+            "variant": self.variant,
+        }
         return words | dict(self.packages)
 
 
 def made_here(airlight: str, variant: str) -> Made:
-    """Return the software that computes rows in this process; `airlight`: its version, `variant` the current one."""
+    """Return the software that computes rows in this process; `airlight`: its version,
+    `variant` the current one.
+    """
     packages = tuple((name, version(name)) for name in _PACKAGES)
     return Made(airlight, row_source(), packages, variant, platform.python_version())
 
 
 def row_source() -> str:
     """Return a digest of the source code that computes rows, the same wherever it is installed."""
-    return source_digest(*(function.__module__ for function in (run, cell_reference, scene_properties)))
+    return source_digest(
+        *(function.__module__ for function in (run, cell_reference, scene_properties))
+    )
 
 
 @dataclass(frozen=True)
 class CellReference:
-    """The inputs of the reference of a cell, known before its scene is loaded; its code is in `Made.source`."""
+    """The inputs of the reference of a cell, known before its scene is loaded; its
+    code is in `Made.source`.
+    """
 
     scene: str  #: see `scene_identity`
     size: tuple[int, int]  #: [pixels]
@@ -80,12 +94,16 @@ class RowInputs(Inputs):
 
 
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
-    """Return the key of the row of a cell that these versions compute; one that is never found again if it has none.
+    """Return the key of the row of a cell that these versions compute; one that is never
+    found again if it has none.
 
-    `scenes` are digests of scenes that were read before, by name: anyone who has many cells of a file reads it once.
+    `scenes` are digests of scenes that were read before, by name: anyone who has many cells
+    of a file reads it once.
     """
     chosen = replace(cell.chosen, parameters=tuple(sorted(cell.chosen.parameters)))
-    reference = CellReference((scenes or {}).get(cell.scene) or scene_identity(cell.scene), cell.size, cell.medium)
+    reference = CellReference(
+        (scenes or {}).get(cell.scene) or scene_identity(cell.scene), cell.size, cell.medium
+    )
     versions = made.source, made.packages, made.variant
     inputs = RowInputs(reference, chosen, user_code(cell.chosen), cell.measure, *versions)
     return inputs.key or f"row-{uuid.uuid4().hex}"
@@ -93,4 +111,6 @@ def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) ->
 
 def scene_identities(scenes: Iterable[str]) -> dict[str, str]:
     """Return the digests of those scenes that are files, by name."""
-    return {name: scene_identity(name) for name in scenes if not (name in SCENES or is_random(name))}
+    return {
+        name: scene_identity(name) for name in scenes if not (name in SCENES or is_random(name))
+    }

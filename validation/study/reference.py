@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of the cells of one image, computed once, with its own error.
 
-It is the quadrature at pixel centres. An area light needs many light samples, each as costly as a point light: it has
-fewer here than in `airlight reference`, and their standard error is part of the bound. A sixteenth of the pixels has a
-reference there, chosen by chance once for all: quantiles of errors need no more.
+It is the quadrature at pixel centres. An area light needs many light samples, each as costly as a
+point light: it has fewer here than in `airlight reference`, and their standard error is part of the
+bound. A sixteenth of the pixels has a reference there, chosen by chance once for all: quantiles of
+errors need no more.
 """
 
 from dataclasses import dataclass
@@ -26,8 +27,9 @@ from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.study.row import ReferenceError
 from airlight.validation.study.study import Cell
 
-# Points of area lights: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
-# point takes as long as a point light does, and surfaces take as long again: these are left out.
+# Points of area lights: a ray has enough at a standard error of 2 %, and has never more than 8
+# times 4. Each point takes as long as a point light does, and surfaces take as long again: these
+# are left out.
 _PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
 _FRACTION = 16  # one pixel in so many has a reference where lights have an extent
@@ -75,7 +77,9 @@ class Reference:
 def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
     drawn = 0.0 if image.airlight_se is None else _STANDARD_ERRORS * image.airlight_se
-    return Reference(image.airlight, image.airlight_bound + drawn, image.surface, None, image.transitions, spent)
+    return Reference(
+        image.airlight, image.airlight_bound + drawn, image.surface, None, image.transitions, spent
+    )
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -106,9 +110,15 @@ def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
     width, height = scene.sensors()[0].film().size()
     count = int(width * height)
-    pixels = np.sort(np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)])
+    pixels = np.sort(
+        np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)]
+    )
     some = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
     airlight, bound, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
     airlight[pixels], bound[pixels], mask[pixels] = some.airlight[0], some.bound[0], True
     shape = int(height), int(width)
-    return {"airlight": airlight.reshape(*shape, 3), "bound": bound.reshape(*shape, 3), "mask": mask.reshape(shape)}
+    return {
+        "airlight": airlight.reshape(*shape, 3),
+        "bound": bound.reshape(*shape, 3),
+        "mask": mask.reshape(shape),
+    }

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows on disk: a database to which finished rows are added, and the Parquet and JSON that are made of it.
+"""Rows on disk: a database to which finished rows are added, and the Parquet and
+JSON that are made of it.
 
-`rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row that was added is on
-disk: a run that is killed, or whose disk is full, loses nothing that was finished. One run at a time writes.
+`rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row
+that was added is on disk: a run that is killed, or whose disk is full, loses nothing that was
+finished. One run at a time writes.
 """
 
 import heapq
@@ -16,20 +18,26 @@ from airlight.errors import InputError
 from airlight.reference.storage.files import atomic_path, ensure_folder
 from airlight.validation.study.row import COLUMNS, arrow_schema, property_names
 
-ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"  #: files of the folder of a study
+#: files of the folder of a study
+ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"
 
-#: Number of the worst rows of a configuration, by each of `_WORST_BY`, that keep their pictures in the Parquet.
+#: Number of the worst rows of a configuration, by each of `_WORST_BY`, that keep their
+#: pictures in the Parquet.
 PICTURES = 12
 _WORST_BY = ("error.relative_rmse", "error.p99", "error.max")
 
 _BATCH = 4096  # rows that the Parquet is written in at once
-_TABLE = "CREATE TABLE IF NOT EXISTS rows (key TEXT PRIMARY KEY, status TEXT, data TEXT, picture BLOB)"
+_TABLE = (
+    "CREATE TABLE IF NOT EXISTS rows (key TEXT PRIMARY KEY, status TEXT, data TEXT, picture BLOB)"
+)
 _ADD = "INSERT INTO rows VALUES (?, ?, ?, ?) ON CONFLICT DO UPDATE SET (status, data, picture) = "
 _ADD += "(excluded.status, excluded.data, excluded.picture)"
 
 
 class RowStore:
-    """The rows of a folder, open for adding: each is a dictionary by the names of `validation.study.row.COLUMNS`."""
+    """The rows of a folder, open for adding: each is a dictionary by the names of
+    `validation.study.row.COLUMNS`.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = ensure_folder(folder)
@@ -49,7 +57,9 @@ class RowStore:
             raise OSError(f"{error}: {self.path}") from error
         except sqlite3.DatabaseError as error:
             self.close()
-            raise InputError(f"{self.path}: {error}; remove it, or name another folder by -o") from None
+            raise InputError(
+                f"{self.path}: {error}; remove it, or name another folder by -o"
+            ) from None
         except BaseException:
             self.close()
             raise
@@ -86,7 +96,9 @@ class RowStore:
 
         If the disk is full an OSError names the file; the rows are as they were.
         """
-        data = {name: value for name, value in row.items() if value is not None and name != "picture"}
+        data = {
+            name: value for name, value in row.items() if value is not None and name != "picture"
+        }
         text = json.dumps(data, allow_nan=False)
         try:
             self._rows.execute(_ADD, (row["key"], row["status"], text, row.get("picture")))
@@ -108,7 +120,9 @@ class RowStore:
         target = self.folder / PARQUET
         with (
             atomic_path(target) as temporary,
-            pq.ParquetWriter(temporary, schema, compression="zstd", write_page_checksum=True) as writer,
+            pq.ParquetWriter(
+                temporary, schema, compression="zstd", write_page_checksum=True
+            ) as writer,
         ):
             batch: list[dict[str, Any]] = []
             for row in self.rows():
@@ -120,7 +134,9 @@ class RowStore:
         return target
 
     def write_json(self) -> Path:
-        """Write `sweep.jsonl`, a row a line without its picture, whole or not at all, and return its path."""
+        """Write `sweep.jsonl`, a row a line without its picture, whole or not at
+        all, and return its path.
+        """
         target = self.folder / JSON
         with atomic_path(target) as temporary, open(temporary, "w", encoding="utf-8") as file:
             for (data,) in self._rows.execute("SELECT data FROM rows ORDER BY rowid"):
@@ -133,7 +149,9 @@ class RowStore:
 
 
 def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
-    """Return the keys of the rows whose pictures are worth keeping: the worst of each configuration."""
+    """Return the keys of the rows whose pictures are worth keeping: the
+    worst of each configuration.
+    """
     worst: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
         for measure in _WORST_BY:

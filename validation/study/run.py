@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A cell becomes a row: its image is rendered and compared with the reference.
 
-Its times belong to a run of all that it is compared with (`validation.study.turns`); only where they need not be
-compared, as of sweeps whose cells are timed while others run, they are taken here.
+Its times belong to a run of all that it is compared with (`validation.study.turns`); only where
+they need not be compared, as of sweeps whose cells are timed while others run, they are taken here.
 
-A method that refuses a scene gives a row too, with its reason, and so does one that would take too long. Other
-exceptions are the caller's: they are faults. Nothing here knows where it runs.
+A method that refuses a scene gives a row too, with its reason, and so does one that would take too
+long. Other exceptions are the caller's: they are faults. Nothing here knows where it runs.
 """
 
 import json
@@ -51,12 +51,16 @@ from airlight.validation.study.study import Cell, map_side, seed_of
 from airlight.validation.study.turns import Apart, CellTimes, brief_times
 
 Array = NDArray[np.float64]
-#: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
+#: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)];
+#: None where there is none.
 Paint = Callable[[Array, Array], bytes | None]
 
 RUNS = 8  #: of a method that draws random numbers
-PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame is estimated [pixels]
-_DOUBTFUL = 0.5  # fraction of the limit: after a longer preparation, the time of a frame is estimated before it begins
+#: size of the frame from which the time of a full-size frame is estimated [pixels]
+PROBE = (64, 48)
+# fraction of the limit: after a longer preparation, the time of a frame is
+# estimated before it begins
+_DOUBTFUL = 0.5
 
 
 def run(
@@ -70,9 +74,10 @@ def run(
 ) -> tuple[Row, Frame | None]:
     """Render and compare a cell, and time it where its times are taken 'with' its errors.
 
-    Scene and reference are of the same image, at the size of the cell; without a reference nothing is compared.
-    `whole` is the `mi.Scene` that both were read from: without it no error is held against what the method states.
-    `paint` makes the picture of the row, and `apart` calls a user's method in a separate process.
+    Scene and reference are of the same image, at the size of the cell; without a reference nothing
+    is compared. `whole` is the `mi.Scene` that both were read from: without it no error is held
+    against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
+    method in a separate process.
     """
     took = stopwatch()
     runs: list[Array] = []
@@ -91,7 +96,9 @@ def run(
         return row, None
     row = replace(row, **_errors(cell, frame, scene, reference, whole))
     if runs:
-        row = replace(row, noise=_runs_error(reference, [np.asarray(frame.airlight, dtype=np.float64), *runs]))
+        row = replace(
+            row, noise=_runs_error(reference, [np.asarray(frame.airlight, dtype=np.float64), *runs])
+        )
     if paint is not None:
         shown = np.asarray(frame.airlight, dtype=np.float64)
         # Pixels without a reference are shown as if they were right.
@@ -128,14 +135,18 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
 
 
 def render_cell(cell: Cell) -> tuple[Row, Frame | None, list[Array]]:
-    """Render a cell in a process that has loaded nothing; return the airlight of its other runs too."""
+    """Render a cell in a process that has loaded nothing; return the
+    airlight of its other runs too.
+    """
     scene = read_scene(load_cell(cell).scene)
     row, frame = render(scene, cell)
     return row, frame, [] if frame is None else _other_runs(scene, cell)
 
 
 def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
-    """Render a cell; return its row, not yet compared with anything, and its frame, if there is one."""
+    """Render a cell; return its row, not yet compared with anything, and
+    its frame, if there is one.
+    """
     chosen, wanted = cell.chosen, cell.measure
     row_of = partial(cell_row, cell, knows_shadows=knows_shadows(chosen))
     dr.sync_thread()
@@ -146,7 +157,9 @@ def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
         reason = _too_long(renderer, cell, making.seconds)
         if reason:
             return row_of(status="left out", reason=reason), None
-        frame, first = timed(partial(render_frame if wanted.times == "stages" else _unchecked, renderer))
+        frame, first = timed(
+            partial(render_frame if wanted.times == "stages" else _unchecked, renderer)
+        )
     except InputError as error:
         return row_of(status="refused", reason=str(error)), None
     after = dr.detail.launch_stats()
@@ -170,21 +183,29 @@ def with_times(row: Row, found: CellTimes) -> Row:
     notes = [row.note, found.note, f"not timed: {found.lost}" if found.lost else None]
     cost = row.cost and replace(row.cost, prepare_ms=found.prepare_ms)
     note = "; ".join(filter(None, notes)) or None
-    return replace(row, times=found.times, memory=found.memory, device=found.device, cost=cost, note=note)
+    return replace(
+        row, times=found.times, memory=found.memory, device=found.device, cost=cost, note=note
+    )
 
 
 def _other_runs(scene: Scene, cell: Cell) -> list[Array]:
-    """Return the airlight of further runs of a method that draws random numbers, (height, width, 3); of others none."""
+    """Return the airlight of further runs of a method that draws random numbers, (height,
+    width, 3); of others none.
+    """
     parameters: dict[str, Any] = dict(cell.chosen.parameters)
     if not method_parameters(find_method(cell.chosen.method), parameters)[0].noisy:
         return []
-    renderer, rendered = prepared(scene, cell.chosen), render_frame if cell.measure.times == "stages" else _unchecked
+    renderer, rendered = (
+        prepared(scene, cell.chosen),
+        render_frame if cell.measure.times == "stages" else _unchecked,
+    )
     frames = (rendered(replace(renderer, run=run)) for run in range(1, RUNS))
     return [np.asarray(frame.airlight, dtype=np.float64) for frame in frames]
 
 
 def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
-    """Return bias and error of runs; None where they are the same, or nothing is relative to the reference.
+    """Return bias and error of runs; None where they are the same, or nothing is
+    relative to the reference.
 
     Runs that are the same bit by bit count once.
     """
@@ -225,7 +246,11 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
     attributes = {"airlight:scene": name, "airlight:method": chosen.method}
     attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
     attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
-    return Image({"airlight": frame.airlight, "surface": frame.surface, **frame.extra}, frame.distance, attributes)
+    return Image(
+        {"airlight": frame.airlight, "surface": frame.surface, **frame.extra},
+        frame.distance,
+        attributes,
+    )
 
 
 def _unchecked(renderer: FrameRenderer) -> Frame:
@@ -233,7 +258,9 @@ def _unchecked(renderer: FrameRenderer) -> Frame:
     return unchecked_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
 
 
-def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: Any) -> dict[str, Any]:
+def _errors(
+    cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: Any
+) -> dict[str, Any]:
     """Return the errors of a frame by the names of their fields in a row."""
     test, mask = np.asarray(frame.airlight, dtype=np.float64), reference.mask
     errors: dict[str, Any] = {"error": error_metrics(reference.airlight, test, mask=mask)}
@@ -241,7 +268,11 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
     if scene.features.surfaces and reference.surface is not None:
         errors["surface_error"] = error_metrics(reference.surface, surface)
     if cell.measure.flip:
-        lit = (reference.airlight, test) if reference.surface is None else (reference.light, test + surface)
+        lit = (
+            (reference.airlight, test)
+            if reference.surface is None
+            else (reference.light, test + surface)
+        )
         errors["flip"] = flip_hdr(*lit, mask=mask)[0]
     if not cell.measure.every_metric:
         return errors
@@ -250,7 +281,8 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
     errors["colour"] = colour_difference(reference.airlight, test, mask=mask)
     bound = stated_bound(cell.chosen, scene)
     if bound is not None and whole is not None:
-        floor = FLOOR * reference.airlight.mean()  # of all pixels: who states a bound has a reference in each
+        # of all pixels: who states a bound has a reference in each
+        floor = FLOOR * reference.airlight.mean()
         allowed = bound * np.maximum(reference.airlight, floor) + reference.bound
         excess = np.abs(test - reference.airlight).reshape(-1, 3) - allowed.reshape(-1, 3)
         outside = np.flatnonzero(~(excess <= 0).all(axis=1))
@@ -263,10 +295,11 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
 def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     """Return why a frame would take longer than the limit, or None.
 
-    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's method, by the
-    second frame of a small scene, whose preparation takes as long. If there are many groups of lights, only the first
-    are prepared before the frame; the others take as long each. Nothing is judged where there is one group, and making
-    the renderer `took` so little [s] that a frame is far below the limit.
+    It is judged by its preparation once kernels are compiled and, where that takes long and for a
+    user's method, by the second frame of a small scene, whose preparation takes as long. If there
+    are many groups of lights, only the first are prepared before the frame; the others take as long
+    each. Nothing is judged where there is one group, and making the renderer `took` so little [s]
+    that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
     many = len(renderer.groups) > 1
@@ -282,7 +315,10 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"
     if not chosen.own and preparation <= _DOUBTFUL * limit:
         return None
-    small, large = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen), renderer.scene.camera
+    small, large = (
+        prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen),
+        renderer.scene.camera,
+    )
     render_frame(small)
     took = timed(lambda: render_frame(small))[1].seconds
     fraction = (large.width * large.height) / (PROBE[0] * PROBE[1])
@@ -291,7 +327,8 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return None
     return (
         f"not measured: by a frame of {PROBE[0]} x {PROBE[1]} pixels that took {took:.2g} s, "
-        f"{min(took, preparation):.2g} s of these for what it prepares, a frame of {large.width} x {large.height} "
+        f"{min(took, preparation):.2g} s of these for what it prepares, a frame of {large.width} x "
+        f"{large.height} "
         f"would take {expected:.0f} s, {words}"
     )
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of one scene: its reference, the checks of the reference, every configuration, images from elsewhere.
+"""The study of one scene: its reference, the checks of the reference, every
+configuration, images from elsewhere.
 
-Each part is kept on disk as soon as it is there: a study that was killed goes on where it stopped, and one in which
-nothing changed computes nothing. Errors are kept by configuration. Times are kept by scene, those of all of its
-configurations together: they are compared with one another, and are of one run (`validation.study.turns`).
+Each part is kept on disk as soon as it is there: a study that was killed goes on where it stopped,
+and one in which nothing changed computes nothing. Errors are kept by configuration. Times are kept
+by scene, those of all of its configurations together: they are compared with one another, and are
+of one run (`validation.study.turns`).
 """
 
 import time
@@ -55,7 +57,8 @@ Layer = NDArray[np.floating]  # frames are float32
 
 _MULTIPLE = (64, 48)  # size of the image whose fraction of multiple scattering is measured [pixels]
 _LONG = 25e3  # after a longer first frame, compilation included, no larger frame is timed [ms]
-_COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
+# that the kernels of a configuration or an estimator take [s], beside its work on one thread
+_COMPILED = 2.0
 
 
 @dataclass(frozen=True)
@@ -131,15 +134,21 @@ class SceneStudy:
             resize(self.loaded.scene, self.size)
 
     def reference_of(self, pixel: str) -> ReferenceImage:
-        """Return the quadrature reference at pixel centres, or its means over their areas: 'centre' or 'area'."""
-        return self.reference if pixel == "centre" else reference_image(self.loaded.scene, pixel=pixel)
+        """Return the quadrature reference at pixel centres, or its means over their
+        areas: 'centre' or 'area'.
+        """
+        return (
+            self.reference if pixel == "centre" else reference_image(self.loaded.scene, pixel=pixel)
+        )
 
     def cell(self, chosen: Configuration) -> Cell:
         """Return the cell of a configuration."""
         return Cell(self.path, self.size, (), chosen, self.study.measure)
 
     def seconds(self) -> dict[str, float]:
-        """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
+        """Return roughly what each part that is not kept will take on one thread
+        [s], by name and by label.
+        """
         lights, area_lights = len(self.scene.lights), len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
         known = is_kept(self.reference_inputs.key)
@@ -151,10 +160,14 @@ class SceneStudy:
         batches, samples = checks.multiple
         with self.at(_MULTIPLE) as scene:
             known = is_kept(MultipleInputs(scene_content(scene), batches, samples).key)
-        parts["multiple scattering"] = 0.0 if known else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
+        parts["multiple scattering"] = (
+            0.0 if known else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
+        )
         for chosen in self.configurations:
             known = is_kept(self.inputs(chosen).key)
-            parts[chosen.label] = 0.0 if known else _seconds(configuration_work(self.scene, chosen, frames=1))
+            parts[chosen.label] = (
+                0.0 if known else _seconds(configuration_work(self.scene, chosen, frames=1))
+            )
         works = [configuration_work(self.timed, chosen) for chosen in self.configurations]
         known = self.times_inputs is None or is_kept(self.times_inputs.key)
         parts["times"] = 0.0 if known else sum(map(_seconds, works))
@@ -183,7 +196,9 @@ class SceneStudy:
         return TimesInputs(cells, tuple(map(user_code, self.configurations)), self.machine)
 
     def timed_cell(self, chosen: Configuration, scene: str) -> Cell:
-        """Return the cell of a configuration at the size of timed frames; `scene`: its name or identity."""
+        """Return the cell of a configuration at the size of timed frames;
+        `scene`: its name or identity.
+        """
         return replace(self.cell(chosen), scene=scene, size=self.timed_size)
 
 
@@ -257,11 +272,14 @@ def _seconds(work: Work) -> float:
 
 @dataclass(frozen=True)
 class Judged:
-    """A row of a scene, and its image; of one of our methods as it is kept, without what it is compared with."""
+    """A row of a scene, and its image; of one of our methods as it is kept, without
+    what it is compared with.
+    """
 
     row: Row
     image: Image | None = None  #: its layers; None if there is none
-    expected: Any = None  #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
+    #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
+    expected: Any = None
     whole: Any = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
     results: tuple[Kept[Any], ...] = ()  #: that it was made of
 
@@ -269,7 +287,11 @@ class Judged:
     def light(self) -> Array:
         """All light, to look at, (height, width, 3) [W/(m^2 sr)]."""
         assert self.image is not None
-        shown = [self.image.layers[name] for name in ("airlight", "surface", "total") if name in self.image.layers]
+        shown = [
+            self.image.layers[name]
+            for name in ("airlight", "surface", "total")
+            if name in self.image.layers
+        ]
         return np.sum([np.asarray(values, dtype=np.float64) for values in shown], axis=0)
 
 
@@ -303,10 +325,11 @@ def study_scene(
 ) -> SceneResult:
     """Return the results of a study for a scene.
 
-    `images` from elsewhere are judged. `apart` calls a user's method in a separate process; configurations that
-    `ended` such a process before, with how, are not called again. `progress` is called with the name of each part, as
-    of `SceneStudy.seconds`, before it begins. `spread` lets other processes trace the batches that check the reference.
-    `workers` is the number of processes that compute HDR-FLIP at once, each on one processor.
+    `images` from elsewhere are judged. `apart` calls a user's method in a separate process;
+    configurations that `ended` such a process before, with how, are not called again. `progress` is
+    called with the name of each part, as of `SceneStudy.seconds`, before it begins. `spread` lets
+    other processes trace the batches that check the reference. `workers` is the number of processes
+    that compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
     reference, checks = study.kept_reference, study.study.checks
@@ -323,38 +346,55 @@ def study_scene(
     progress("times")
     timings = list[Kept[Any]]()
     if study.times_inputs is not None:
-        timings.append(scene_times(study, study.times_inputs, [judged.row for judged in rows], apart))
+        timings.append(
+            scene_times(study, study.times_inputs, [judged.row for judged in rows], apart)
+        )
         rows = [
-            replace(each, row=with_times(each.row, found)) for each, found in zip(rows, timings[0].value, strict=True)
+            replace(each, row=with_times(each.row, found))
+            for each, found in zip(rows, timings[0].value, strict=True)
         ]
-    # Nothing is timed any more: FLIP, which runs on one processor in a separate process, may have all of them.
+    # Nothing is timed any more: FLIP, which runs on one processor in a separate
+    # process, may have all of them.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
     methods = [result for row in rows for result in row.results]
-    seconds = {"reference": reference.seconds, "agreement": agreement.seconds, "multiple": multiple.seconds}
+    seconds = {
+        "reference": reference.seconds,
+        "agreement": agreement.seconds,
+        "multiple": multiple.seconds,
+    }
     seconds["methods"] = round(sum(result.seconds for result in methods), 3)
     seconds["times"] = round(sum(result.seconds for result in timings), 3)
     results: tuple[Kept[Any], ...] = (reference, agreement, multiple, *methods, *timings)
-    return SceneResult(study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results)
+    return SceneResult(
+        study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results
+    )
 
 
-def configurations_for(scene: Scene, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
+def configurations_for(
+    scene: Scene, configurations: Sequence[Configuration]
+) -> tuple[Configuration, ...]:
     """Return the configurations that differ in this scene from the ones before them.
 
-    Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
-    if the scene has none, or if they do not lie in vacuum, and so are light samples where there is no area light.
+    Variants of the shadows are left out if nothing casts a shadow. The published treatment of
+    bounded media is left out if the scene has none, or if they do not lie in vacuum, and so are
+    light samples where there is no area light.
     """
     without_effect = set() if scene.features.shadows else {"shadow", "order", "map"}
     without_effect |= set() if scene.medium.clear else {"media"}
     without_effect |= set() if scene.area_lights else {"points", "pattern"}
-    return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
+    return tuple(
+        chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters))
+    )
 
 
 def check_reference(
     scene, checks: Checks, points: int | None = None, *, spread: ElsewhereFor | None = None
 ) -> Kept[dict[str, Agreement]]:
-    """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
+    """Compare the reference with the Monte Carlo estimators; see
+    `validation.estimates.agreement.agreements`.
+    """
 
     def compute() -> dict[str, Agreement]:
         return agreements(
@@ -371,7 +411,9 @@ def check_reference(
 
 
 def multiple_scattering(scene, batches: int, samples: int) -> Kept[MultipleScattering]:
-    """Return the fraction of multiple scattering; see `validation.estimates.multiple_scattering`."""
+    """Return the fraction of multiple scattering; see
+    `validation.estimates.multiple_scattering`.
+    """
     inputs = MultipleInputs(scene_content(scene), batches, samples)
     compute = partial(multiple_scattering_fraction, scene, batches=batches, samples=samples)
     return stored(inputs, compute, MultipleScattering)
@@ -383,7 +425,9 @@ def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> K
 
     def compute() -> Judged:
         reference = of_image(study.kept_reference.value, study.kept_reference.spent)
-        row, frame = run(replace(inputs.cell, scene=study.path), study.scene, reference, apart=apart)
+        row, frame = run(
+            replace(inputs.cell, scene=study.path), study.scene, reference, apart=apart
+        )
         row = record_of(row, Row)  # without numbers that are not finite
         return Judged(row, None if frame is None else layered_frame(study.name, chosen, frame))
 
@@ -391,14 +435,18 @@ def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> K
 
 
 def _is_worth(judged: Judged) -> bool:
-    """Return whether a row is to be cached: a fault of the user's method may have gone by the next run."""
+    """Return whether a row is to be cached: a fault of the user's method may
+    have gone by the next run.
+    """
     return judged.row.kind == "built-in" or judged.row.status == "done"
 
 
 def scene_times(
     study: SceneStudy, inputs: TimesInputs, rows: Sequence[Row], apart: Apart | None
 ) -> Kept[list[CellTimes]]:
-    """Return the times of all cells of a scene, of one run; `rows`: what came of them, as not all can be timed."""
+    """Return the times of all cells of a scene, of one run; `rows`: what came of them,
+    as not all can be timed.
+    """
     return stored(inputs, partial(_scene_times, study, rows, apart), list[CellTimes], _all_timed)
 
 
@@ -411,18 +459,33 @@ def _scene_times(study: SceneStudy, rows: Sequence[Row], apart: Apart | None) ->
     for chosen, row in zip(study.configurations, rows, strict=True):
         cell = study.timed_cell(chosen, study.path)
         long = row.cost is not None and row.cost.first_ms > _LONG
-        cells.append(None if row.status != "done" else replace(cell, size=study.size) if long else cell)
-    timings = time_cells(cells, lambda cell: study.timed if cell.size == study.timed_size else study.scene, apart=apart)
+        cells.append(
+            None if row.status != "done" else replace(cell, size=study.size) if long else cell
+        )
+    timings = time_cells(
+        cells,
+        lambda cell: study.timed if cell.size == study.timed_size else study.scene,
+        apart=apart,
+    )
     at = "timed at {} x {}: larger frames take minutes".format(*study.size)
     smaller = [cell is not None and cell.size != study.timed_size for cell in cells]
-    return [replace(found, note=at) if less else found for found, less in zip(timings, smaller, strict=True)]
+    return [
+        replace(found, note=at) if less else found
+        for found, less in zip(timings, smaller, strict=True)
+    ]
 
 
-def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
+def _row(
+    study: SceneStudy,
+    chosen: Configuration,
+    apart: Apart | None,
+    ended: Mapping[Configuration, str],
+) -> Judged:
     if chosen in ended:
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
         return Judged(row, results=(Kept(row, Spent(), time.time(), False),))
-    reference = study.reference  # loaded or computed now: it is no part of the time of a configuration
+    # loaded or computed now: it is no part of the time of a configuration
+    reference = study.reference
     result = measured(study, chosen, apart)
     # The same scene may have been measured under another path.
     here = cell_row(study.cell(chosen))
@@ -441,7 +504,9 @@ def _flip(reference: Array, test: Array) -> tuple[Flip, Layer | None]:
 
 
 def _with_flip(judged: Judged) -> Judged:
-    """Return a row with its HDR-FLIP, whose map is a grey layer of the image, where it is asked for."""
+    """Return a row with its HDR-FLIP, whose map is a grey layer of the
+    image, where it is asked for.
+    """
     if judged.whole is None or judged.image is None:
         return judged
     whole, light = judged.whole, judged.light
@@ -450,8 +515,15 @@ def _with_flip(judged: Judged) -> Judged:
     summary, error_map = result.value
     image = judged.image
     if error_map is not None:
-        image = replace(image, layers=dict(image.layers) | {"flip": np.repeat(error_map[:, :, None], 3, axis=2)})
-    return replace(judged, row=replace(judged.row, flip=summary), image=image, results=(*judged.results, result))
+        image = replace(
+            image, layers=dict(image.layers) | {"flip": np.repeat(error_map[:, :, None], 3, axis=2)}
+        )
+    return replace(
+        judged,
+        row=replace(judged.row, flip=summary),
+        image=image,
+        results=(*judged.results, result),
+    )
 
 
 def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
@@ -459,13 +531,22 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     from airlight.validation.engine.images import image_times
 
     times = image_times(shown.path)
-    inputs = ImageInputs(study.reference_inputs, study.identity, study.size, shown.label, shown.path, times)
+    inputs = ImageInputs(
+        study.reference_inputs, study.identity, study.size, shown.label, shown.path, times
+    )
     result = stored(inputs, lambda: _measured_image(study, shown, times), Judged)
     whole = None if study.study.flip == "none" else result.value.whole
-    return replace(result.value, row=replace(result.value.row, scene=study.path), whole=whole, results=(result,))
+    return replace(
+        result.value,
+        row=replace(result.value.row, scene=study.path),
+        whole=whole,
+        results=(result,),
+    )
 
 
-def _measured_image(study: SceneStudy, shown: "EngineImage", times: tuple[Timing, str] | None) -> Judged:
+def _measured_image(
+    study: SceneStudy, shown: "EngineImage", times: tuple[Timing, str] | None
+) -> Judged:
     """Return the row of an image with its layers."""
     from airlight.validation.engine.images import measure_image, notes_of
 
@@ -489,7 +570,9 @@ def _measured_image(study: SceneStudy, shown: "EngineImage", times: tuple[Timing
         whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
         whole = reference.airlight + reference.surface
-    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name})
+    image = Image(
+        layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name}
+    )
     return Judged(record_of(row, Row), image, judged.reference, whole)
 
 

@@ -1,25 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The errors that a method states for itself: a larger distance from the reference is a fault.
 
-Methods that claim to be exact (the kernel `exact` along whole rays where nothing casts a shadow, and shadow planes in
-exact order) state three errors:
+Methods that claim to be exact (the kernel `exact` along whole rays where nothing casts a shadow,
+and shadow planes in exact order) state three errors:
 
-* **The integral**, `EXACT` of the pixel. That is more than rounding: a pixel is a sum of float32 values that cancel,
-  and beyond what its ends are worth it errs by at most 33 units 2^-24 of itself or of the mean of the image, whichever
-  is larger, in all built-in scenes without area lights and in `random:7` (64 x 48 pixels, 28 November 2026). In bounded
-  media rules with few nodes stand in the place of the kernel: 99 % of the pixels of `random:3` err by less than 4.7e-4.
-* **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a distance x that is
-  known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, this error is x
-  s(x) times `END`. It is small, but the lit length may be small, too: where a ray clips the edge of a medium by 37 um
-  at 0.66 m, an error of 2.6 units changes this length, and all of the airlight, by 4e-3.
+* **The integral**, `EXACT` of the pixel. That is more than rounding: a pixel is a sum of float32
+  values that cancel, and beyond what its ends are worth it errs by at most 33 units 2^-24 of itself
+  or of the mean of the image, whichever is larger, in all built-in scenes without area lights and
+  in `random:7` (64 x 48 pixels, 28 November 2026). In bounded media rules with few nodes stand in
+  the place of the kernel: 99 % of the pixels of `random:3` err by less than 4.7e-4.
+* **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a
+  distance x that is known to some units of float32. With s(x) the radiance that a metre of the ray
+  scatters in full light, this error is x s(x) times `END`. It is small, but the lit length may be
+  small, too: where a ray clips the edge of a medium by 37 um at 0.66 m, an error of 2.6 units
+  changes this length, and all of the airlight, by 4e-3.
 
-  The place where a ray meets the bounds of a medium at a small angle is less accurate. In x = n . (p - o)/(n . d) the
-  direction d is rounded, and so are the three products of the divisor, which are not small where their sum, the cosine
-  c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of its middle from the
-  ray and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.
-* **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function that a tabulated phase
-  function stands for. It departs from the table by an eighth of the second difference of its values, so rule and
-  integral together err by two eighths of the largest second difference over the value.
+  The place where a ray meets the bounds of a medium at a small angle is less accurate. In x = n .
+  (p - o)/(n . d) the direction d is rounded, and so are the three products of the divisor, which
+  are not small where their sum, the cosine c, is: x is known to x `END`/|c|. A sphere of radius r
+  has the same law: with b the distance of its middle from the ray and h = sqrt(r^2 - b^2) half of
+  the chord, dh = b/h db, where b is known to x `END` and c = h/r.
+* **Kinks.** The rules of the kernel have positive weights, and are exact for the smooth function
+  that a tabulated phase function stands for. It departs from the table by an eighth of the second
+  difference of its values, so rule and integral together err by two eighths of the largest second
+  difference over the value.
 """
 
 from collections.abc import Callable
@@ -49,11 +53,12 @@ from airlight.reference.visibility.distances import crossings
 from airlight.validation.arrays import Array, Index
 from airlight.validation.study.configuration import Configuration
 
-#: The error of the integral that methods promise which claim to be exact, relative to the pixel, or to a thousandth of
-#: the mean in the dark: twice the error of their rules in bounded media.
+#: The error of the integral that methods promise which claim to be exact, relative to the pixel, or
+#: to a thousandth of the mean in the dark: twice the error of their rules in bounded media.
 EXACT = 1e-3
 
-END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
+#: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
+END = 8 * 2.0**-24
 
 _SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
 _RAYS = 1024  # at once: so many take some 100 MB
@@ -61,12 +66,15 @@ _BETWEEN = 1.1  # times the largest of these no place scatters
 
 
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
-    """Return the relative error that a method states for itself in a scene, ends left aside [1]; None for none.
+    """Return the relative error that a method states for itself in a scene, ends left
+    aside [1]; None for none.
 
     Points in the place of area lights are an approximation.
     """
     usual_values = defaults(METHODS[chosen.method]) if chosen.method in METHODS else {}
-    usual = all(usual_values.get(name, value) == value for name, value in chosen.parameters if name != "map")
+    usual = all(
+        usual_values.get(name, value) == value for name, value in chosen.parameters if name != "map"
+    )
     plain = usual and chosen.kernel == "exact" and not scene.area_lights
     whole_rays = chosen.method in ("unshadowed", "light-volumes") and not scene.features.shadows
     if not plain or not (chosen.method == "shadow-planes" or whole_rays):
@@ -88,20 +96,28 @@ def _kinks(phase: Any) -> float:
 
 
 def worth_of_ends(scene: Any, pixels: Index) -> Array:
-    """Return the largest error by uncertain ends of lit intervals in an `mi.Scene`, (pixels, 3) [W/(m^2 sr)].
+    """Return the largest error by uncertain ends of lit intervals in an `mi.Scene`,
+    (pixels, 3) [W/(m^2 sr)].
 
-    Valid for lights without extent. The ends may be anywhere: the largest x s(x) along a ray counts, lit or not.
+    Valid for lights without extent. The ends may be anywhere: the largest x s(x) along
+    a ray counts, lit or not.
     """
     whole = read_reference(scene)
     parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
-    return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
+    return np.concatenate(
+        [_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts]
+    )
 
 
 def _worth_of_ends(reference: ReferenceScene) -> Array:
-    """Return the largest error by uncertain ends of lit intervals of all rays of `reference`, (rays, 3)."""
+    """Return the largest error by uncertain ends of lit intervals of all rays
+    of `reference`, (rays, 3).
+    """
     distance = surface_hits(reference).distance
     worth = np.zeros((len(distance), 3))
-    sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in reference.lights]
+    sources: list[tuple[Any, ...]] = [
+        (light, _angles_about, _from_place) for light in reference.lights
+    ]
     sources += [(light, _equal_steps, _from_infinity) for light in reference.directional]
     ends, growth = _ends(reference, distance)
     for light, places_of, incident in sources:
@@ -110,7 +126,9 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
         x = np.clip(places, 0, distance).T
         ray, column = np.nonzero(np.isfinite(x))
         uncertain, x = (uncertain * x)[ray, column], x[ray, column]
-        scattered = uncertain[:, None] * _scattered(reference, partial(incident, reference, light), ray, x, distance)
+        scattered = uncertain[:, None] * _scattered(
+            reference, partial(incident, reference, light), ray, x, distance
+        )
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
@@ -118,9 +136,11 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
 
 
 def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
-    """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
+    """Return distances along rays [m], and what divides their certainty, 1/|c|
+    [1], (places, rays) each.
 
-    They are those of the ends of rays, the middles of segments in media and between them, and where rays cross bounds.
+    They are those of the ends of rays, the middles of segments in media and between them, and
+    where rays cross bounds.
     """
     places = [np.zeros_like(distance), distance]
     if reference.media:
@@ -134,7 +154,8 @@ def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
             points = reference.origin + np.where(met, x, 0)[:, None] * reference.direction
             cosine = np.abs(np.sum(normals_at(medium.bounds, points) * reference.direction, axis=1))
             places.append(np.where(met, x, np.inf))
-            growth.append(1 / np.where(met, np.maximum(cosine, END), 1))  # below it nothing is known of x
+            # below it nothing is known of x
+            growth.append(1 / np.where(met, np.maximum(cosine, END), 1))
     return np.stack(places), np.stack(growth)
 
 
@@ -154,7 +175,9 @@ def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: A
     return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
 
 
-def _from_place(reference: ReferenceScene, light: ReferenceLight, point: Array) -> tuple[Array, Array]:
+def _from_place(
+    reference: ReferenceScene, light: ReferenceLight, point: Array
+) -> tuple[Array, Array]:
     """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
     segment = point - light.position
     r = np.linalg.norm(segment, axis=1)
@@ -163,9 +186,13 @@ def _from_place(reference: ReferenceScene, light: ReferenceLight, point: Array) 
     return segment, light.intensity / (r * r)[:, None] * np.exp(-depth)
 
 
-def _from_infinity(reference: ReferenceScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+def _from_infinity(
+    reference: ReferenceScene, light: DirectionalLight, point: Array
+) -> tuple[Array, Array]:
     """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
-    return np.broadcast_to(light.direction, point.shape), np.broadcast_to(light.irradiance, point.shape)
+    return np.broadcast_to(light.direction, point.shape), np.broadcast_to(
+        light.irradiance, point.shape
+    )
 
 
 def _scattered(
@@ -175,7 +202,9 @@ def _scattered(
     x: Array,
     distance: Array,
 ) -> Array:
-    """Return the light that a metre of rays scatters at distances x, fully lit by one light, (n, 3) [W/(m^3 sr)]."""
+    """Return the light that a metre of rays scatters at distances x, fully lit by one
+    light, (n, 3) [W/(m^3 sr)].
+    """
     direction = reference.direction[ray]
     segment, arriving = incident(reference.origin + x[:, None] * direction)
     from_camera = optical_depth(reference, reference.origin, direction, np.zeros(len(x)), x)
@@ -187,7 +216,9 @@ def _scattered(
     return total
 
 
-def _media(reference: ReferenceScene, ray: Index, x: Array, distance: Array) -> list[tuple[ReferenceMedium, Any]]:
+def _media(
+    reference: ReferenceScene, ray: Index, x: Array, distance: Array
+) -> list[tuple[ReferenceMedium, Any]]:
     """Return media and which places are in them; a place at a bound is on either side of it."""
     if not reference.media:
         return [(homogeneous_around(reference), np.ones(len(x), dtype=bool))]

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A study: which scenes, methods, parameters, media and sizes, as a TOML file says it, and the cells that come of it.
+"""A study: which scenes, methods, parameters, media and sizes, as a TOML file says it, and
+the cells that come of it.
 
-A cell is one combination of all of these; docs/many-scenes.md has the keys of a file. Every mistake is refused by name
-before any work. The measurements of a report are a study too (`validation/study/studies/`), with more keys:
+A cell is one combination of all of these; docs/many-scenes.md has the keys of a file. Every mistake
+is refused by name before any work. The measurements of a report are a study too
+(`validation/study/studies/`), with more keys:
 
     scenes = "all"                                          # every built-in scene of fog
     half = ["fence"]                                        # scenes that are compared at half the width
@@ -64,8 +66,9 @@ from airlight.validation.study.configuration import (
 )
 from airlight.validation.study.settings import Checks, Measure, Settings
 
-#: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on the host; 'alone',
-#: where nothing else of the study runs there; 'stages': all stages, and frames after light, objects or colours changed.
+#: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on
+#: the host; 'alone', where nothing else of the study runs there; 'stages': all stages, and frames
+#: after light, objects or colours changed.
 TIMES = ("none", "with", "alone", "stages")
 
 #: The studies of reports, and the kinds of work by which times may grow.
@@ -89,7 +92,8 @@ class Cell:
     medium: tuple[str, ...]  #: changes of the medium, as `parse_changes` reads them
     chosen: Configuration
     measure: Measure = field(default_factory=Measure)
-    work: tuple[str, float] | None = None  #: kind and amount, of a step of `validation.study.growth`
+    #: kind and amount, of a step of `validation.study.growth`
+    work: tuple[str, float] | None = None
 
     @property
     def image(self) -> "Cell":
@@ -114,7 +118,8 @@ class Study(Settings):
     half: tuple[str, ...] = ()  #: scenes that are compared at half the width
     configurations: tuple[Configuration, ...] = ()
     media: tuple[tuple[str, ...], ...] = ((),)
-    points: int | None = None  #: of area lights in references, see `validation.estimates.quadrature.reference_image`
+    #: of area lights in references, see `validation.estimates.quadrature.reference_image`
+    points: int | None = None
     timed: int | None = None  #: scenes that are timed alone, the first; None for all
     limit: float = 600.0  #: seconds that a cell or a reference may take
     retries: int = 3  #: how often a cell is begun again whose process died
@@ -126,17 +131,26 @@ class Study(Settings):
         return Settings(**asked | {"scenes": tuple(self.scene_names())})
 
     def at(self, size: tuple[int, int] | None) -> "Study":
-        """Return the study with images and timed frames of another size [pixels]; itself for None."""
-        return self if size is None else replace(self, sizes=(size,), measure=replace(self.measure, timed_size=size))
+        """Return the study with images and timed frames of another size
+        [pixels]; itself for None.
+        """
+        return (
+            self
+            if size is None
+            else replace(self, sizes=(size,), measure=replace(self.measure, timed_size=size))
+        )
 
     def of(self, scene: str) -> "Study":
         """Return the study of one scene: those of `half` are compared at half the width.
 
-        A batch of volpath has as many paths there as in others: launches would take all the time of fewer.
+        A batch of volpath has as many paths there as in others: launches would
+        take all the time of fewer.
         """
         if scene not in self.half:
             return self
-        size, checked = ((width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size))
+        size, checked = (
+            (width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size)
+        )
         samples = {**self.checks.samples, "volpath": 4 * self.checks.samples["volpath"]}
         return replace(
             self,
@@ -194,7 +208,9 @@ class Study(Settings):
 
 
 def default_configurations() -> tuple[Configuration, ...]:
-    """Return the configurations of a study without methods: the kinds of the quick report, default area lights."""
+    """Return the configurations of a study without methods: the kinds of the quick
+    report, default area lights.
+    """
     kinds = [each for each in QUICK if "points" not in dict(each.parameters)]
     known = {each.method for each in kinds}
     others = [name for name in FOG_METHODS if name not in known]
@@ -202,9 +218,13 @@ def default_configurations() -> tuple[Configuration, ...]:
 
 
 def default_study(count: int) -> Study:
-    """Return the study without a file: so many random scenes, every method once, 160 x 120 pixels."""
+    """Return the study without a file: so many random scenes, every
+    method once, 160 x 120 pixels.
+    """
     read_number("study", count, 1, _MOST_SCENES)
-    return Study(f"random-{count}", random=RandomScenes(count), configurations=default_configurations())
+    return Study(
+        f"random-{count}", random=RandomScenes(count), configurations=default_configurations()
+    )
 
 
 def read_study(path: Path) -> Study:
@@ -223,12 +243,19 @@ def read_study(path: Path) -> Study:
 
 
 def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "sweep") -> Study:
-    """Return the study that a table describes, as `tomllib` reads it; paths of scenes begin at `folder`."""
+    """Return the study that a table describes, as `tomllib` reads it; paths of
+    scenes begin at `folder`.
+    """
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
-    given, measure = read_named("", data, _STUDY, *_MEASURE, *others), read_named("", data, _MEASURE, *_STUDY, *others)
+    given, measure = (
+        read_named("", data, _STUDY, *_MEASURE, *others),
+        read_named("", data, _MEASURE, *_STUDY, *others),
+    )
     times = measure.get("times", "with")
     if "timed" in given and times != "alone":
-        raise InputError(f'timed: it is of times = "alone", got times = "{times}"; leave one of them out')
+        raise InputError(
+            f'timed: it is of times = "alone", got times = "{times}"; leave one of them out'
+        )
     scenes = data.get("scenes", [])
     one = partial(_scene, folder=folder)
     return Study(
@@ -258,14 +285,22 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
             return standard
         names = list(dict.fromkeys(each.method for each in standard))
     else:
-        names = list(each_once("methods", tuple(read_word("methods", word) for word in read_list("methods", asked))))
+        names = list(
+            each_once(
+                "methods", tuple(read_word("methods", word) for word in read_list("methods", asked))
+            )
+        )
     for method in names:
         configuration(method)  # refuses unknown names
     stray = [method for method in parameters if method not in names]
     if stray:
-        raise InputError(f"parameters.{stray[0]}: the study has no method of that name{nearest(stray[0], names)}")
+        raise InputError(
+            f"parameters.{stray[0]}: the study has no method of that name{nearest(stray[0], names)}"
+        )
     kernels = (
-        [read_word("kernels", word) for word in read_list("kernels", data["kernels"])] if "kernels" in data else [None]
+        [read_word("kernels", word) for word in read_list("kernels", data["kernels"])]
+        if "kernels" in data
+        else [None]
     )
     for kernel in kernels:
         if kernel is not None:
@@ -276,7 +311,9 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     chosen = [
         each
         for method in names
-        for each in _of_method(method, kernels, sides, read_table(f"parameters.{method}", parameters.get(method, {})))
+        for each in _of_method(
+            method, kernels, sides, read_table(f"parameters.{method}", parameters.get(method, {}))
+        )
     ]
     if "kernels" in data and not any(each.kernel for each in chosen):
         raise InputError("kernels: none of the methods calls one; leave them out")
@@ -286,23 +323,33 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
 
 
 def _of_method(
-    method: str, kernels: Sequence[str | None], sides: Sequence[int | None], parameters: Mapping[str, Any]
+    method: str,
+    kernels: Sequence[str | None],
+    sides: Sequence[int | None],
+    parameters: Mapping[str, Any],
 ) -> Iterator[Configuration]:
     """Yield the configurations of a method: kernels, maps and parameters, each with each."""
     if "map" in parameters and sides != [None]:
         raise InputError(f"parameters.{method}.map: `maps` says it too; give one of them")
-    lists = {name: value if isinstance(value, list) else [value] for name, value in parameters.items()}
+    lists = {
+        name: value if isinstance(value, list) else [value] for name, value in parameters.items()
+    }
     for name, values in lists.items():
         if not values:
-            raise InputError(f"parameters.{method}.{name}: got no value; leave it out for the default")
+            raise InputError(
+                f"parameters.{method}.{name}: got no value; leave it out for the default"
+            )
     has_map = "map" in defaults(METHODS[method]) if method in METHODS else False
     if has_map and sides != [None]:
         lists["map"] = list(sides)
     for combination in itertools.product(*lists.values()):
         settings = dict(zip(lists, combination))
         plain = configuration(method, None, settings)
-        if "map" in lists and sides != [None] and map_side(plain) is None:  # parameters do without a map
-            plain = configuration(method, None, {name: value for name, value in settings.items() if name != "map"})
+        # parameters do without a map
+        if "map" in lists and sides != [None] and map_side(plain) is None:
+            plain = configuration(
+                method, None, {name: value for name, value in settings.items() if name != "map"}
+            )
         for kernel in kernels if plain.kernel else [None]:
             yield configuration(method, kernel, dict(plain.parameters))
 
@@ -314,7 +361,9 @@ def seed_of(scene: str) -> int | None:
 
 
 def map_side(chosen: Configuration) -> int | None:
-    """Return the side of the shadow map of a configuration [pixels]; None for a method without one."""
+    """Return the side of the shadow map of a configuration [pixels]; None
+    for a method without one.
+    """
     if chosen.method not in METHODS:
         return None
     known = defaults(METHODS[chosen.method]) | dict(chosen.parameters)
@@ -326,17 +375,22 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
     word = read_word(what, item)
     if word in SCENES:
         if SCENES[word].clouds:
-            raise InputError(f"scenes: {word} scatters light many times; a sweep is of single scattering, leave it out")
+            raise InputError(
+                f"scenes: {word} scatters light many times; a sweep is of single scattering, leave "
+                "it out"
+            )
         return word
     if is_random(word):
         if seed_of(word) is None:
-            raise InputError(f"scenes: got {word!r}, expected random:SEED with a whole number from 0 on")
+            raise InputError(
+                f"scenes: got {word!r}, expected random:SEED with a whole number from 0 on"
+            )
         return word
     path = folder / word
     if not path.is_file():
         raise InputError(
-            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML file beside the study"
-            + nearest(word, SCENES)
+            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML file "
+            "beside the study" + nearest(word, SCENES)
         )
     return str(path.resolve())
 
@@ -353,10 +407,15 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
     changes: dict[str, tuple[float, ...]] = {}
     for name, value in read_table(what, item).items():
         if not name.partition(".")[0].startswith("medium"):
-            raise InputError(f"media: got {name!r}, expected medium.sigma_t, medium.albedo or medium.g; quote the name")
+            raise InputError(
+                f"media: got {name!r}, expected medium.sigma_t, medium.albedo or medium.g; quote "
+                "the name"
+            )
         numbers = value if isinstance(value, list) else [value]
         if not numbers or not all(type(number) in (int, float) for number in numbers):
-            raise InputError(f"media: got {value!r} for {name}, expected a number or a list of numbers")
+            raise InputError(
+                f"media: got {value!r} for {name}, expected a number or a list of numbers"
+            )
         changes[name] = tuple(float(number) for number in numbers)
     return tuple(change_words(changes))
 
@@ -364,7 +423,10 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
 def _size(what: str, value: Any) -> tuple[int, int]:
     size = parse_size(read_word(what, value))
     if not all(1 <= side <= 16384 for side in size):
-        raise InputError(f"{what}: got {size[0]}x{size[1]}, expected at least 1x1 and at most 16384 pixels on a side")
+        raise InputError(
+            f"{what}: got {size[0]}x{size[1]}, expected at least 1x1 and at most 16384 pixels on a "
+            "side"
+        )
     return size
 
 
@@ -382,14 +444,17 @@ def _pair(what: str, value: Any) -> tuple[int, ...]:
 def _checks(what: str, value: Any) -> Checks:
     checks = Checks(**read_named(f"{what}.", read_table(what, value), _CHECKS))
     if checks.margins.keys() != checks.samples.keys():
-        raise InputError(f"{what}: margins and samples name other estimators; name the same in both")
+        raise InputError(
+            f"{what}: margins and samples name other estimators; name the same in both"
+        )
     return checks
 
 
 _seconds = partial(read_number, least=0, most=_LONGEST, whole=False)
 _count = partial(read_number, least=0, most=_MOST_SCENES)
 
-#: Readers of the values of a study file: of the study, its measurements, and the checks of its references.
+#: Readers of the values of a study file: of the study, its measurements, and the
+#: checks of its references.
 _STUDY: Mapping[str, Reader] = {
     "name": read_word,
     "half": several(read_word, 0),
@@ -425,4 +490,5 @@ _CHECKS: Mapping[str, Reader] = {
     "multiple": _pair,
     "patience": _seconds,
 }
-_FIELDS = {"frame_limit": "limit", "metrics": "every_metric"}  # of `Measure`, where they are not as in the file
+# of `Measure`, where they are not as in the file
+_FIELDS = {"frame_limit": "limit", "metrics": "every_metric"}

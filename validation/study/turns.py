@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times of cells that are compared: all of one scene, measured in one run, in turns.
 
-Before the run every method compiles, records and renders a frame for its memory. Then they take turns, in rounds
-(`validation.clock.in_turns`), with the anchor of the run at both ends of each round (`validation.timing.anchored`). A
-method keeps its recorded functions between its turns, and prepares its shadow maps, planes or volumes again in each:
-those of all methods at once are never in memory. A slow method takes part in fewer rounds, evenly among all.
+Before the run every method compiles, records and renders a frame for its memory. Then they take
+turns, in rounds (`validation.clock.in_turns`), with the anchor of the run at both ends of each
+round (`validation.timing.anchored`). A method keeps its recorded functions between its turns, and
+prepares its shadow maps, planes or volumes again in each: those of all methods at once are never in
+memory. A slow method takes part in fewer rounds, evenly among all.
 
-A user's method may be in a separate process. It takes its turns as the others do: its process waits meanwhile.
+A user's method may be in a separate process. It takes its turns as the others do: its
+process waits meanwhile.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -41,24 +43,29 @@ from airlight.validation.study.reference import load_cell
 from airlight.validation.study.study import Cell, Measure
 from airlight.validation.timing import ANCHORS, FrameTimes, TimingRun, anchored
 
-#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``. Values
-#: that a function yields are yielded here, as they are asked for.
+#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the
+#: method's)``. Values that a function yields are yielded here, as they are asked for.
 Apart = Callable[..., Any]
 
 #: What `turns_of` yields: `Ready`, then lists of `FrameSpent`.
 Turns = Generator[Any, None, None]
 
 
-#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
-#: or more frames would take minutes.
+#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little,
+#: and the usual thirty or more frames would take minutes.
 SLOW = 8.0
 _PATIENCE = 1.5  # approximate time for the turns of a slow method; one is the least [s]
-_SHARE = 5.0  # times of which `Measure.seconds` is one: frame, surface and airlight, and half as long for each of four
+# times of which `Measure.seconds` is one: frame, surface and airlight, and half
+# as long for each of four
+_SHARE = 5.0
 _BRIEF = 0.2  # on the turns of a method that is timed briefly [s]
 _BRIEF_MOST = 9  # of these turns
-_RECORDED = 1.0  # in a frame that takes less, its recording takes a part of the time that counts [s]
+# in a frame that takes less, its recording takes a part of the time that counts [s]
+_RECORDED = 1.0
 _ANCHORS = (
-    25  # repetitions of an anchor at an end of a round: 24 tell a change from scatter (`validation.timing.anchored`)
+    # repetitions of an anchor at an end of a round: 24 tell a change from scatter
+    # (`validation.timing.anchored`)
+    25
 )
 
 
@@ -67,7 +74,8 @@ class CellTimes:
     """The times of a cell, and the memory that its frame takes."""
 
     times: FrameTimes | None = None
-    prepare_ms: float | None = None  #: for the state of the method, where nothing else is done meanwhile
+    #: for the state of the method, where nothing else is done meanwhile
+    prepare_ms: float | None = None
     memory: float | None = None  #: as of a row [MiB]
     device: str | None = None  #: that draws a shader
     note: str | None = None  #: how they differ from those of others
@@ -93,9 +101,10 @@ def time_cells(
 ) -> list[CellTimes]:
     """Time frames of cells of one scene, in one run.
 
-    `cells`: at the size of the frames that are timed; None for what is not timed; `scene_of`: returns the scene of a
-    cell at that size; `apart`: calls a user's method in a separate process; `anchor`: camera rays of the first cell by
-    default; `progress`: called with the fraction of methods that are ready.
+    `cells`: at the size of the frames that are timed; None for what is not timed; `scene_of`:
+    returns the scene of a cell at that size; `apart`: calls a user's method in a separate process;
+    `anchor`: camera rays of the first cell by default; `progress`: called with the fraction of
+    methods that are ready.
     """
     times = [CellTimes() for _ in cells]
     with ExitStack() as stack:
@@ -125,18 +134,24 @@ def time_cells(
     return times
 
 
-def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
-    """Return the times of the frames of one renderer, in a run of its own; parameters as of `time_alone`."""
+def time_frame(
+    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
+) -> FrameTimes:
+    """Return the times of the frames of one renderer, in a run of its own;
+    parameters as of `time_alone`.
+    """
     times = time_alone(renderer, seconds=seconds, slow=slow).times
     assert times is not None
     return times
 
 
-def time_alone(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> CellTimes:
+def time_alone(
+    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
+) -> CellTimes:
     """Time the frames of one renderer, in a run of its own.
 
-    `seconds`: as of `Measure`; `slow`: a frame that takes longer with its preparation is timed stage by stage, in few
-    frames [s], `SLOW` by default.
+    `seconds`: as of `Measure`; `slow`: a frame that takes longer with its preparation is timed
+    stage by stage, in few frames [s], `SLOW` by default.
     """
     measure = Measure("stages", seconds, slow=slow)
     with closing(turns_of(renderer, measure)) as turns:
@@ -148,7 +163,9 @@ def time_alone(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
 
 def brief_times(renderer: FrameRenderer) -> CellTimes:
-    """Time a frame and its airlight for some tenths of a second, whatever else runs; the frame was rendered before."""
+    """Time a frame and its airlight for some tenths of a second, whatever else runs; the
+    frame was rendered before.
+    """
     started, device, seconds = date(), None, _BRIEF
     if is_shader(renderer.method.name):
         device, turn = shader_turn(renderer, _BRIEF)
@@ -156,7 +173,9 @@ def brief_times(renderer: FrameRenderer) -> CellTimes:
     else:
         turn = brief_turn(renderer)
     ((repetitions,),) = in_turns([Piece(turn, seconds)], rounds=1, most=_BRIEF_MOST)
-    return _cell_times(CellTimes(device=device), list(chain(*repetitions)), [], TimingRun(started, 1))
+    return _cell_times(
+        CellTimes(device=device), list(chain(*repetitions)), [], TimingRun(started, 1)
+    )
 
 
 def turns_of_cell(cell: Cell) -> Turns:
@@ -165,7 +184,9 @@ def turns_of_cell(cell: Cell) -> Turns:
 
 
 def turns_of(renderer: FrameRenderer, measure: Measure) -> Turns:
-    """Yield a `Ready`, then what the frames of a turn took, a list of `FrameSpent`, as often as anybody asks."""
+    """Yield a `Ready`, then what the frames of a turn took, a list of `FrameSpent`,
+    as often as anybody asks.
+    """
     if not is_shader(renderer.method.name):
         yield from _turns(renderer, measure)
         return
@@ -189,7 +210,8 @@ def _turns(renderer: FrameRenderer, measure: Measure) -> Turns:
     def frame() -> None:
         took.append(timed(lambda: render_frame(renderer))[1].seconds)
 
-    # The first frame compiles. The second one says what a frame takes, and its memory; of a slow one the first does.
+    # The first frame compiles. The second one says what a frame takes, and its memory; of a
+    # slow one the first does.
     slow = SLOW if measure.slow is None else measure.slow
     memory = peak_memory(frame)
     if took[-1] < slow:
@@ -207,7 +229,9 @@ def _turns(renderer: FrameRenderer, measure: Measure) -> Turns:
 def _piece(
     turns: Iterator[Any], ready: Ready, measure: Measure, lose: Callable[[Exception], None]
 ) -> Piece[list[FrameSpent]]:
-    """Return the turns of a method as a piece of work; a method that fails in a turn is lost and has no more."""
+    """Return the turns of a method as a piece of work; a method that fails in a turn
+    is lost and has no more.
+    """
 
     def turn() -> list[FrameSpent]:
         try:
@@ -253,8 +277,12 @@ def _run(
     started, end = date(), Piece(anchors, 0.0)
     turned: list[Piece[Any]] = [end, Piece(move, 0.0), *pieces.values(), end]
     first, moved, *of_pieces, last = in_turns(turned)
-    ends = [repetition for of_end in (first, last) for of_round in of_end for repetition in of_round]
-    run = anchored(started, ROUNDS, [timing_of(each) for each in ends], timing_of(list(chain(*ends))))
+    ends = [
+        repetition for of_end in (first, last) for of_round in of_end for repetition in of_round
+    ]
+    run = anchored(
+        started, ROUNDS, [timing_of(each) for each in ends], timing_of(list(chain(*ends)))
+    )
     spent_moving = [spent for of_round in moved for repetition in of_round for spent in repetition]
     for place, rounds in zip(pieces, of_pieces, strict=True):
         spent = [each for of_round in rounds for repetition in of_round for each in repetition]
@@ -262,7 +290,9 @@ def _run(
             times[place] = _cell_times(times[place], spent, spent_moving, run)
 
 
-def _cell_times(known: CellTimes, spent: list[FrameSpent], moves: list[Spent], run: TimingRun) -> CellTimes:
+def _cell_times(
+    known: CellTimes, spent: list[FrameSpent], moves: list[Spent], run: TimingRun
+) -> CellTimes:
     prepares = [each.prepare for each in spent if each.prepare is not None]
     prepare_ms = timing_of(prepares).median_ms if prepares else None
     return replace(known, times=times_of(spent, moves, run), prepare_ms=prepare_ms)

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors that vary: of independent runs of one frame, and of the frames under a light that moves.
 
-*Runs.* The reference has no noise: the error of runs is bias and noise apart. Methods that draw no random numbers are
-rendered once, and stand beside the others: all of their error is bias.
+*Runs.* The reference has no noise: the error of runs is bias and noise apart. Methods that draw no
+random numbers are rendered once, and stand beside the others: all of their error is bias.
 
-*Frames.* Each is held against its own reference. In a sweep the lights circle as in the animation of the scene; in a
-step they stand for `BEFORE` frames, then jump. A method that keeps something of its last frames gets it, as in
-`airlight render --frames`. Methods that draw random numbers are rendered in several runs: their numbers are means over
-these, with errors from the spread of the runs.
+*Frames.* Each is held against its own reference. In a sweep the lights circle as in the animation
+of the scene; in a step they stand for `BEFORE` frames, then jump. A method that keeps something of
+its last frames gets it, as in `airlight render --frames`. Methods that draw random numbers are
+rendered in several runs: their numbers are means over these, with errors from the spread of the
+runs.
 """
 
 import math
@@ -62,9 +63,9 @@ def method_noise(
 ) -> list[MethodNoise]:
     """Return the noise of each configuration's airlight.
 
-    `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at least two. The time of a
-    frame is a median while nothing moves, of one run of all methods in turns. Raises InputError for fewer runs and a
-    dark reference.
+    `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at
+    least two. The time of a frame is a median while nothing moves, of one run of all methods in
+    turns. Raises InputError for fewer runs and a dark reference.
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
@@ -77,19 +78,30 @@ def method_noise(
         for run in range(count):
             if progress is not None:
                 progress(number * runs + run, len(configurations) * runs, chosen.label)
-            images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
+            images.append(
+                np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64)
+            )
         turns.append(brief_turn(renderer))
         if all(np.array_equal(each, images[0]) for each in images[1:]):
             images = images[:1]
-        mean, deviation = np.mean(images, axis=0), np.std(images, axis=0, ddof=min(1, len(images) - 1))
+        mean, deviation = (
+            np.mean(images, axis=0),
+            np.std(images, axis=0, ddof=min(1, len(images) - 1)),
+        )
         told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
         rendered.append((images, np.where(told, mean, reference), deviation))
     # All methods take turns: their times are compared.
     spent = in_turns([Piece(turn, _SECONDS) for turn in turns])
-    seconds = [float(np.median([turn[0].frame.seconds for turn in chain(*rounds)])) for rounds in spent]
+    seconds = [
+        float(np.median([turn[0].frame.seconds for turn in chain(*rounds)])) for rounds in spent
+    ]
     return [
-        MethodNoise(chosen.label, measure_noise(reference, images, took), reference, shown, deviation)
-        for chosen, (images, shown, deviation), took in zip(configurations, rendered, seconds, strict=True)
+        MethodNoise(
+            chosen.label, measure_noise(reference, images, took), reference, shown, deviation
+        )
+        for chosen, (images, shown, deviation), took in zip(
+            configurations, rendered, seconds, strict=True
+        )
     ]
 
 
@@ -115,9 +127,9 @@ def method_motion(
 ) -> list[MethodMotion]:
     """Return the quality of each configuration.
 
-    `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights move; `turn`: frames
-    of a whole turn of a sweep; `runs`: of a method that draws random numbers. Raises InputError for a scene whose
-    lights do not move, and too few frames or runs.
+    `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights
+    move; `turn`: frames of a whole turn of a sweep; `runs`: of a method that draws random numbers.
+    Raises InputError for a scene whose lights do not move, and too few frames or runs.
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
@@ -126,7 +138,11 @@ def method_motion(
         raise InputError(f"frames: got {frames}, expected at least {least} for a {stimulus}")
     read = read_scene(scene)
     moves = Animation(moves=("light",), about=animation.about)
-    places = list(islice(animate(read, moves, turn), frames)) if stimulus == "sweep" else _step(read, moves, frames)
+    places = (
+        list(islice(animate(read, moves, turn), frames))
+        if stimulus == "sweep"
+        else _step(read, moves, frames)
+    )
     total = frames * (1 + len(configurations))
     tell = None if progress is None else lambda number, what: progress(number, total, what)
     references = light_references(scene, places, moves, tell)
@@ -139,7 +155,11 @@ def method_motion(
         several = []
         for run in range(runs if renderer.method.noisy else 1):
             images = method_frames(replace(renderer, run=run), places)
-            several.append(measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)))
+            several.append(
+                measure(
+                    Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)
+                )
+            )
         found = [each for each in several if each is not None]
         words = motion_verdict(found[0]).words if found else "the reference is dark"
         rows.append(MethodMotion(chosen.label, mean_measures(found) if found else None, words))
@@ -147,19 +167,28 @@ def method_motion(
 
 
 def light_references(
-    scene: Any, places: Sequence[Scene], moves: Animation, progress: Callable[[int, str], None] | None = None
+    scene: Any,
+    places: Sequence[Scene],
+    moves: Animation,
+    progress: Callable[[int, str], None] | None = None,
 ) -> list[Array]:
-    """Return the airlight of the reference of each frame, (height, width, 3); in the end the scene is as it was.
+    """Return the airlight of the reference of each frame, (height, width, 3); in the
+    end the scene is as it was.
 
-    `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves, the first as it is
-    now; `progress`: called with the number of a frame and what. Raises InputError for area lights, and where
-    nothing moves.
+    `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves,
+    the first as it is now; `progress`: called with the number of a frame and what. Raises
+    InputError for area lights, and where nothing moves.
     """
     if places[0].area_lights:
-        raise InputError("the scene has area lights, which its references cannot follow; expected a scene without")
+        raise InputError(
+            "the scene has area lights, which its references cannot follow; expected a scene "
+            "without"
+        )
     changes = [frame_changes(each, moves) or {} for each in places]
     if not changes[0]:
-        raise InputError("the scene has no light that could circle; expected a point, spot or directional light")
+        raise InputError(
+            "the scene has no light that could circle; expected a point, spot or directional light"
+        )
     references: list[Array] = []
     for number, change in enumerate([*changes, changes[0]]):
         change_scene(scene, change)
@@ -171,7 +200,9 @@ def light_references(
 
 
 def method_frames(renderer: FrameRenderer, places: Sequence[Scene]) -> list[Array]:
-    """Return the airlight of a method in each frame, which gets what the frame before leaves, (height, width, 3)."""
+    """Return the airlight of a method in each frame, which gets what the frame before
+    leaves, (height, width, 3).
+    """
     kept, images = None, []
     for place, last in zip(places, (None, *places), strict=False):
         moved = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The coordinates of the canonical transport, and which factors of the light of a slab its grid leaves out.
+"""The coordinates of the canonical transport, and which factors of the light of a
+slab its grid leaves out.
 
-**The eight sets of orders of Bouthors 2008, section 5.1**, and the layers of images by set; order 1 stands apart.
+**The eight sets of orders of Bouthors 2008, section 5.1**, and the layers of images by
+set; order 1 stands apart.
 
 **The phase function scattered n times**, P_s: the mean over the orders of a set.
 
@@ -13,21 +15,23 @@
     direction    asin(mu)/pi + 1/2
     azimuth      phi/pi
 
-**The effect of an order by itself.** With n the first order of a set and m the mean of its orders, each less 1,
+**The effect of an order by itself.** With n the first order of a set and m the mean of
+its orders, each less 1,
 
     r = n log(t/(t + 0.02)) + m log(1 + d/m) - d        (31-inf: the first term alone):
 
-thin slabs scatter with the power n of their thickness, and deep in thick ones the light of an order is d^m exp(-d), as
-in Poisson's distribution.
+thin slabs scatter with the power n of their thickness, and deep in thick ones the light of an order
+is d^m exp(-d), as in Poisson's distribution.
 
 **Interpolation on simplices:** the entries around a place of a regular grid, and what each counts.
 
-With the fractions f of the place in its cell sorted so that f_1 >= f_2 >= .., and the strides s_i in that order,
+With the fractions f of the place in its cell sorted so that f_1 >= f_2 >= .., and the
+strides s_i in that order,
 
     v = v_0 (1 - f_1) + v_1 (f_1 - f_2) + .. + v_n f_n,     v_i the entry at base + s_1 + .. + s_i,
 
-linear within each of the simplices of a cell, and continuous: n + 1 entries, where products of pairs of weights take
-2^n. A function without mixed second derivatives has the same error in both.
+linear within each of the simplices of a cell, and continuous: n + 1 entries, where products of
+pairs of weights take 2^n. A function without mixed second derivatives has the same error in both.
 
 **The phase function of a scene**, as the computation of slabs needs it.
 """
@@ -68,10 +72,15 @@ def set_name(number: int) -> str:
     return f"{first}-{int(last)}" if math.isfinite(last) else f"{first}-inf"
 
 
-#: The first order of each layer of an image by order of scattering: order n is light that was scattered n times.
+#: The first order of each layer of an image by order of scattering: order n is light
+#: that was scattered n times.
 FIRST_ORDERS = (1, *(int(first) for first, _ in SETS))
-#: The layers, 'airlight_1', 'airlight_2', 'airlight_3_4', .. 'airlight_31_inf'; the airlight is their sum.
-ORDER_LAYERS = ("airlight_1", *("airlight_" + set_name(number).replace("-", "_") for number in range(len(SETS))))
+#: The layers, 'airlight_1', 'airlight_2', 'airlight_3_4', .. 'airlight_31_inf';
+#: the airlight is their sum.
+ORDER_LAYERS = (
+    "airlight_1",
+    *("airlight_" + set_name(number).replace("-", "_") for number in range(len(SETS))),
+)
 OPACITY = "opacity"  #: 1 less the transmittance of the clouds up to the surface, or to infinity
 
 
@@ -90,8 +99,8 @@ _LEAST = 1e-3  #: of the mean, below which nothing is divided by it
 def repeated_scattering(phase: SlabPhase) -> Array:
     """Return P_s at even angles, (sets, ENTRIES).
 
-    n scatterings of a beam without a boundary multiply Legendre moments: the mean over the orders of a set of
-    sum (2 l + 1) chi_l^n P_l. The set without end counts as isotropic.
+    n scatterings of a beam without a boundary multiply Legendre moments: the mean over the orders
+    of a set of sum (2 l + 1) chi_l^n P_l. The set without end counts as isotropic.
     """
     cosines = np.cos(np.linspace(0.0, np.pi, ENTRIES))
     moments = phase.moments(_DEGREES)
@@ -112,7 +121,9 @@ def repeated_scattering(phase: SlabPhase) -> Array:
 
 def at_angle(table: Array, cosines: Array) -> Array:
     """Return values of one set at cosines, linear in the angle between entries."""
-    return np.interp(np.arccos(np.clip(cosines, -1.0, 1.0)), np.linspace(0.0, np.pi, ENTRIES), table)
+    return np.interp(
+        np.arccos(np.clip(cosines, -1.0, 1.0)), np.linspace(0.0, np.pi, ENTRIES), table
+    )
 
 
 THINNEST, THICKEST = 0.01, 200.0
@@ -149,7 +160,9 @@ def depth_coordinate(d: Array, t: float) -> Array:
 
 
 def depths(count: int, t: float) -> Array:
-    """Return depths at even steps of their coordinate; the ends are just inside, where the source has its limit."""
+    """Return depths at even steps of their coordinate; the ends are just inside, where
+    the source has its limit.
+    """
     wanted = np.linspace(0.0, 1.0, count)
     low, high = np.zeros(count), np.full(count, t)
     for _ in range(80):
@@ -172,12 +185,16 @@ def steep_powers(number: int, t: float, d: Array) -> Array:
 
 
 def way_behind(d: Array, t: float, mu: Array) -> Array:
-    """Return the way L from points back to where the line of sight enters the slab [mean free paths]."""
+    """Return the way L from points back to where the line of sight enters
+    the slab [mean free paths].
+    """
     return np.where(mu < 0, d, t - d) / np.maximum(np.abs(mu), 1e-9)
 
 
 def place_fractions(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
-    """Return the coordinates of thickness, depth and the cosine of the sun's zenith angle, from 0 to 1."""
+    """Return the coordinates of thickness, depth and the cosine of the sun's
+    zenith angle, from 0 to 1.
+    """
     low, high = (math.log(end + THICKNESS_SHIFT) for end in (THINNEST, THICKEST))
     upper, lower = (dr.log(1 + length / DEPTH_SCALE) for length in (d, t - d))
     low_sun = lowest_sun_coordinate()
@@ -196,11 +213,13 @@ _NETWORKS = {
 }
 
 
-def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> list[tuple[Any, Any]]:
+def around(
+    places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0
+) -> list[tuple[Any, Any]]:
     """Return indices and weights of the entries around places.
 
-    `places`: coordinates from 0 to 1; two, three or five; `sides`: entries along each, the last of which lie side by
-    side; `first`: index of the first entry.
+    `places`: coordinates from 0 to 1; two, three or five; `sides`: entries along each, the last of
+    which lie side by side; `first`: index of the first entry.
     """
     base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []
@@ -224,8 +243,9 @@ def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> l
 def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> AnglePhase:
     """Return the phase function of a scene by its values.
 
-    `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below `CUT` is cut to zero:
-    then lengths are those of the medium whose density is lowered by `fraction_of_peak`.
+    `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below
+    `CUT` is cut to zero: then lengths are those of the medium whose density is lowered by
+    `fraction_of_peak`.
     """
     edge = np.deg2rad(CUT)
 

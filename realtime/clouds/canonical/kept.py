@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers of slabs kept on disk, whole or not at all, in the folder and under the names that `airlight doctor` lists.
+"""Numbers of slabs kept on disk, whole or not at all, in the folder and under the names that
+`airlight doctor` lists.
 
-The folder is that of `reference/storage/cache.py`, which this side does not import: AIRLIGHT_CACHE_DIR, or `airlight`
-in the user's cache folder. A file that is damaged, which the checksums of its archive tell, or from elsewhere counts as
-none. With AIRLIGHT_CACHE_SIZE=0 nothing is kept, and nothing read.
+The folder is that of `reference/storage/cache.py`, which this side does not import:
+AIRLIGHT_CACHE_DIR, or `airlight` in the user's cache folder. A file that is damaged, which the
+checksums of its archive tell, or from elsewhere counts as none. With AIRLIGHT_CACHE_SIZE=0 nothing
+is kept, and nothing read.
 
 The name of a file tells how numbers were made, and of which medium: by the moments of its phase
 function and its albedo, to the last bit. With the numbers of a medium that is nearly the same an
@@ -28,7 +30,8 @@ from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]
 
-_MOMENTS = 300  #: those that tell phase functions apart: as many as the quadrature of `AnglePhase` resolves
+#: those that tell phase functions apart: as many as the quadrature of `AnglePhase` resolves
+_MOMENTS = 300
 
 
 def _folder() -> Path:
@@ -43,7 +46,8 @@ def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
 
 
 def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
-    """Return the arrays under a digest of a medium, None where there are none or the file is damaged.
+    """Return the arrays under a digest of a medium, None where there are
+    none or the file is damaged.
 
     `digest`: of how numbers were made; `medium`: from `medium_numbers`.
     """
@@ -65,11 +69,15 @@ def _keeps() -> bool:
 
 
 def _path(digest: str, medium: Array) -> Path:
-    return _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
+    return (
+        _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
+    )
 
 
 def keep(digest: str, medium: Array, arrays: Mapping[str, Any]) -> None:
-    """Write arrays under a digest of a medium; where the folder cannot be written, nothing is kept."""
+    """Write arrays under a digest of a medium; where the folder cannot be
+    written, nothing is kept.
+    """
     if not _keeps():
         return
     buffer = BytesIO()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light along straight lines through a slab: exact exponentials, with the source a polynomial on each panel of depth.
+"""Light along straight lines through a slab: exact exponentials, with the source a
+polynomial on each panel of depth.
 
 Along a direction of cosine mu, the radiance I obeys, z the optical depth from the top,
 
@@ -9,11 +10,12 @@ so that over a panel of depth h, with s the depth from the side where light ente
 
     I(s) = I(0) exp(-s/|mu|) + int_0^s exp(-(s - s')/|mu|) Q(s') ds'/|mu|.
 
-Q is the polynomial through its values at the Gauss-Legendre nodes of the panel. With y = (s - s')/|mu| the integral is
-int_0^Y exp(-y) Q(s - |mu| y) dy, Y = s/|mu|: Gauss-Legendre over y up to 60, where exp(-y) is below rounding.
+Q is the polynomial through its values at the Gauss-Legendre nodes of the panel. With y = (s -
+s')/|mu| the integral is int_0^Y exp(-y) Q(s - |mu| y) dy, Y = s/|mu|: Gauss-Legendre over y up to
+60, where exp(-y) is below rounding.
 
-Panels are narrow at both boundaries, where radiance changes over the smallest cosine, and grow with the distance from
-them (the source of isotropic light has a term z log z there).
+Panels are narrow at both boundaries, where radiance changes over the smallest cosine, and grow with
+the distance from them (the source of isotropic light has a term z log z there).
 """
 
 from collections.abc import Sequence
@@ -26,7 +28,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _GROWTH = 0.7  #: width of a panel over its distance from the boundary
-_WIDEST = 1.25  #: of a panel, in mean free paths, where the distance from the boundaries is not over _DEEP
+#: of a panel, in mean free paths, where the distance from the boundaries is not over _DEEP
+_WIDEST = 1.25
 _DEEP, _DEEP_GROWTH = 50.0, 0.03
 _NEGLIGIBLE = 60.0  #: exp(-60) is below the rounding of 1
 _CONVOLUTION_NODES = 48
@@ -46,20 +49,28 @@ class DepthPanels:
 
 
 def depth_panels(
-    tau: float, narrowest: float, *, depths: Sequence[float] = (), count: int = 8, widest: float = _WIDEST
+    tau: float,
+    narrowest: float,
+    *,
+    depths: Sequence[float] = (),
+    count: int = 8,
+    widest: float = _WIDEST,
 ) -> DepthPanels:
     """Return panels for a slab.
 
-    `tau`: thickness [mean free paths]; `narrowest`: width of the panels at both boundaries, where the slab is thicker
-    than that; `depths`: depths in [0, tau] that become edges, so that results are known there; `count`: nodes of each
-    panel; `widest`: width of a panel at most, where the distance from the boundaries is not over 50 [mean free paths].
+    `tau`: thickness [mean free paths]; `narrowest`: width of the panels at both boundaries, where
+    the slab is thicker than that; `depths`: depths in [0, tau] that become edges, so that results
+    are known there; `count`: nodes of each panel; `widest`: width of a panel at most, where the
+    distance from the boundaries is not over 50 [mean free paths].
     """
     half = [0.0]
     while half[-1] < tau / 2:
         limit = max(widest, _DEEP_GROWTH * (half[-1] - _DEEP))
         half.append(half[-1] + min(max(narrowest, _GROWTH * half[-1]), limit))
     upper = np.array(half) * (tau / 2 / half[-1])
-    edges = np.unique(np.concatenate([upper, tau - upper, np.asarray(depths, dtype=np.float64), [0.0, tau]]))
+    edges = np.unique(
+        np.concatenate([upper, tau - upper, np.asarray(depths, dtype=np.float64), [0.0, tau]])
+    )
     # An edge that rounding put beside another, not a depth that was asked for, is left out.
     keep = [0.0]
     wanted = {0.0, float(tau), *map(float, depths)}
@@ -71,13 +82,17 @@ def depth_panels(
     edges = np.array(keep)
     edges[0], edges[-1] = 0.0, tau
     nodes, _ = leggauss(count)
-    return DepthPanels(edges=edges, nodes=edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2)
+    return DepthPanels(
+        edges=edges, nodes=edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2
+    )
 
 
 class Transport:
-    """Light from sources to all depths of a slab along some directions, in arrays whose numbers are of type `number`.
+    """Light from sources to all depths of a slab along some directions, in arrays whose
+    numbers are of type `number`.
 
-    `panels`: the grid; `mu`: (J,) cosines, positive upwards, none of them 0. No light enters from outside.
+    `panels`: the grid; `mu`: (J,) cosines, positive upwards, none of them 0. No
+    light enters from outside.
     """
 
     def __init__(self, panels: DepthPanels, mu: Array, number: type = np.float64):
@@ -90,15 +105,19 @@ class Transport:
             if side.start == side.stop:
                 continue
             cosines = np.abs(mu[self._order[side]])
-            weights, fade = panel_weights(np.diff(panels.edges)[::-sign], cosines, panels.nodes.shape[1])
-            # The weights of the sources, and in the last row those of light that enters: (P, J, K + 1, K + 1).
+            weights, fade = panel_weights(
+                np.diff(panels.edges)[::-sign], cosines, panels.nodes.shape[1]
+            )
+            # The weights of the sources, and in the last row those of light that
+            # enters: (P, J, K + 1, K + 1).
             both = np.moveaxis(np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1)
             self._sides.append((sign, side, np.ascontiguousarray(both.astype(number))))
 
     def __call__(self, source: Array) -> tuple[Array, Array]:
         """Return the radiance of a source, at nodes and edges.
 
-        `source`: (F, Z, J): F fields at the Z = P K nodes. Returns `nodes`, `edges`: (F, Z, J) and (F, P + 1, J).
+        `source`: (F, Z, J): F fields at the Z = P K nodes. Returns `nodes`, `edges`: (F,
+        Z, J) and (F, P + 1, J).
         """
         fields, depths, directions = source.shape
         shape = *self.panels.nodes.shape, directions, fields
@@ -110,7 +129,8 @@ class Transport:
     def sweep(self, source: Array, places: Sequence[int], *, inside: bool) -> tuple[Array, Array]:
         """Return the radiance of a source (P, K, J, F) at its nodes, and at edges, (D, J, F).
 
-        Directions are those that go up, and then the others. `inside` says whether the nodes are wanted.
+        Directions are those that go up, and then the others. `inside` says
+        whether the nodes are wanted.
         """
         panels, nodes, directions, count = source.shape
         radiance = np.empty_like(source) if inside else source[:0]
@@ -134,7 +154,9 @@ class Transport:
 
 
 def panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:
-    """Return (P, K + 1, K, J) weights of the source, and (P, K + 1, J) exponentials, at the nodes and the far edge."""
+    """Return (P, K + 1, K, J) weights of the source, and (P, K + 1, J) exponentials, at
+    the nodes and the far edge.
+    """
     widths, index = np.unique(all_widths, return_inverse=True)
     reference, _ = leggauss(count)
     places = np.append((reference + 1) / 2, 1.0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Phase functions as the slab needs them: values and Legendre moments, mean 1 over the sphere.
 
-Moments are chi_l = (1/2) int_{-1}^{1} P(c) P_l(c) dc, chi_0 = 1, chi_1 the mean cosine g; P(c) = sum (2 l + 1) chi_l
-P_l(c). Henyey and Greenstein's function has chi_l = g^l.
+Moments are chi_l = (1/2) int_{-1}^{1} P(c) P_l(c) dc, chi_0 = 1, chi_1 the mean cosine g; P(c) =
+sum (2 l + 1) chi_l P_l(c). Henyey and Greenstein's function has chi_l = g^l.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_PANEL, _PANEL_NODES = np.deg2rad(0.5), 8  #: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
+#: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
+_PANEL, _PANEL_NODES = np.deg2rad(0.5), 8
 
 
 class SlabPhase(Protocol):
@@ -51,12 +52,16 @@ class HenyeyGreensteinPhase:
 class AnglePhase:
     """A function of the scattering angle, divided by its mean."""
 
-    heights: Callable[[Array], Array]  #: takes angles [rad], (A,); values are not negative, in any unit
-    breaks: Array  #: angles in [0, pi] where the function has a jump or a kink [rad], the ends among them
+    #: takes angles [rad], (A,); values are not negative, in any unit
+    heights: Callable[[Array], Array]
+    #: angles in [0, pi] where the function has a jump or a kink [rad], the ends among them
+    breaks: Array
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
-        """Cosines of angles by Gauss nodes between the breaks, and weights of the mean of P over the sphere."""
+        """Cosines of angles by Gauss nodes between the breaks, and weights of the
+        mean of P over the sphere.
+        """
         nodes, weights = leggauss(_PANEL_NODES)
         parts = [
             np.linspace(low, high, max(2, int(np.ceil((high - low) / _PANEL)) + 1))[:-1]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Epipolar sampling with one-dimensional min/max trees: the peer of the two methods at the centre.
 
-All rays of a slice see one line of the shadow map. A tree over that line tells a ray of long lit and dark intervals;
-airlight is computed at samples of the slices and interpolated to the pixels.
+All rays of a slice see one line of the shadow map. A tree over that line tells a ray of long lit
+and dark intervals; airlight is computed at samples of the slices and interpolated to the pixels.
 
 Read in this order:
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One-dimensional min/max mipmaps in epipolar slices: lit intervals by steps of 2^k texels of a shadow map.
+"""One-dimensional min/max mipmaps in epipolar slices: lit intervals by steps of
+2^k texels of a shadow map.
 
-All rays of an epipolar slice see the same line of the shadow map. A binary tree of the bounds along this line, one for
-each slice, finds long intervals that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011). Airlight is
-computed at samples of the slices, at regular distances and at breaks of the depth, and interpolated to the pixels
-(Engelhardt and Dachsbacher 2010; Yusov 2013).
+All rays of an epipolar slice see the same line of the shadow map. A binary tree of the bounds along
+this line, one for each slice, finds long intervals that are lit or dark as a whole (Chen, Baran,
+Durand, Jarosz 2011). Airlight is computed at samples of the slices, at regular distances and at
+breaks of the depth, and interpolated to the pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
 
-Three things differ from the publications, all in favour of the method. A kernel integrates each lit interval, with no
-marching. A leaf of the tree is linear instead of constant, see `realtime.methods.epipolar.min_max_tree`. And pixels
-interpolate the lit fraction of the airlight instead of the airlight: the published scenes are lit by the sun, but near
-a point light the airlight varies as 1 / distance and with the phase function. A fraction lies between 0 and 1, so no
+Three things differ from the publications, all in favour of the method. A kernel integrates each lit
+interval, with no marching. A leaf of the tree is linear instead of constant, see
+`realtime.methods.epipolar.min_max_tree`. And pixels interpolate the lit fraction of the airlight
+instead of the airlight: the published scenes are lit by the sun, but near a point light the
+airlight varies as 1 / distance and with the phase function. A fraction lies between 0 and 1, so no
 pixel between samples is brighter than without shadows.
 """
 
@@ -46,7 +48,13 @@ from airlight.realtime.scene.camera import Camera
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.shadow_maps.projection import light_faces
-from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
+from airlight.realtime.shadow_maps.shadow_map import (
+    ShadowMap,
+    cast_shadow_map,
+    inverse_depth,
+    map_memory,
+    map_size,
+)
 
 _MOST = 65536  # slices, and samples of a slice
 
@@ -65,13 +73,14 @@ class EpipolarMap:
 class MinMax(Method):
     """The airlight by one-dimensional min/max mipmaps.
 
-    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
-    accurate. Shadows are those of the map, sampled once more along the slices.
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light
+    are the least accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
-    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*, I3D. Yusov 2013,
-    *Practical implementation of light scattering effects using epipolar sampling and 1D min/max binary trees*, GDC.
+    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*, I3D.
+    Yusov 2013, *Practical implementation of light scattering effects using epipolar sampling and 1D
+    min/max binary trees*, GDC.
     """
 
     name = "min-max"
@@ -81,7 +90,8 @@ class MinMax(Method):
 
     map: int = map_size(
         512,
-        "texels on a side of a face of the shadow map, and of a slice's line for an edge of the cube or the cone "
+        "texels on a side of a face of the shadow map, and of a slice's line for an edge of the "
+        "cube or the cone "
         "of a spot",
     )
     slices: int = parameter(
@@ -98,10 +108,13 @@ class MinMax(Method):
         most=_MOST,
         wanted=f"up to {_MOST}, or 0 for as many as the image needs",
     )
-    step: int = parameter(16, "every N-th sample is computed, besides those at breaks of the depth", choices=STEPS)
+    step: int = parameter(
+        16, "every N-th sample is computed, besides those at breaks of the depth", choices=STEPS
+    )
     sampling: str = parameter(
         "slices",
-        "interpolate, or compute every pixel in its nearest slice: then `samples` and `step` have no effect",
+        "interpolate, or compute every pixel in its nearest slice: then `samples` and `step` have "
+        "no effect",
         choices=("slices", "pixels"),
     )
 
@@ -111,10 +124,14 @@ class MinMax(Method):
             return
         map, slices, samples = self.map, self.slices, self.samples
         held = sum(2 * map_memory(light, map) for light in scene.lights)
-        drawn = (_memory_of_slices(scene.camera, light, map, slices, samples) for light in scene.lights)
+        drawn = (
+            _memory_of_slices(scene.camera, light, map, slices, samples) for light in scene.lights
+        )
         what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
         advice = "use a smaller map, or fewer slices"
-        check_memory(f"{what} for {len(scene.lights)} light(s)", held + max(drawn, default=0), advice)
+        check_memory(
+            f"{what} for {len(scene.lights)} light(s)", held + max(drawn, default=0), advice
+        )
 
     def prepare(self, scene, light):
         """Return the shadow map of a light."""
@@ -155,7 +172,9 @@ def _whole_words(samples: int, camera: Camera) -> int:
 
 
 def _memory_of_slices(camera: Camera, light: Light, size: int, slices: int, samples: int) -> int:
-    """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
+    """Return about how much the slices of a light take [bytes]: per leaf its value, two
+    bounds, four of the tree.
+    """
     number = bytes_of(type(light.position.x))
     leaves = size if light_faces(light) == 1 else 2 * size
     lanes = _whole_words(samples, camera)
@@ -196,8 +215,12 @@ def _sampled_fractions(view: View, light: Light, kernel, samples: Samples, heigh
         rays = view.medium.rays(view.origin, direction)
         seen = replace(view, **vars(rays), distance=depth)
         airlight = seen.lit_by(light, kernel)
-        fraction = _lit_integral(airlight, heights, slice_number) / airlight.gamma(airlight.rays.distance)
-        dr.scatter(fractions, dr.select(dr.isfinite(fraction), fraction, no_value(fraction)), sample)
+        fraction = _lit_integral(airlight, heights, slice_number) / airlight.gamma(
+            airlight.rays.distance
+        )
+        dr.scatter(
+            fractions, dr.select(dr.isfinite(fraction), fraction, no_value(fraction)), sample
+        )
         return lane
 
     lane = spread(dr.width(marked))
@@ -208,10 +231,12 @@ def _sampled_fractions(view: View, light: Light, kernel, samples: Samples, heigh
 
 
 def _interpolated(airlight: LitRays, samples: Samples, fractions, heights: SliceHeights, point):
-    """Return the integral of every pixel: the fraction of the samples around it, or its own where they do not fit."""
+    """Return the integral of every pixel: the fraction of the samples around it, or its
+    own where they do not fit.
+    """
     fraction, fits = between_samples(samples, fractions, point, airlight.rays.distance)
-    # Next to a light, samples gather most of their airlight at other places than the pixel, and where it lies on a
-    # surface they end before it, or beyond.
+    # Next to a light, samples gather most of their airlight at other places than the pixel, and
+    # where it lies on a surface they end before it, or beyond.
     pixel = dr.norm(airlight.rays.camera.left)
     fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The surfaces that a light sees in epipolar slices: one-dimensional height maps, and binary trees of their bounds.
+"""The surfaces that a light sees in epipolar slices: one-dimensional height maps, and
+binary trees of their bounds.
 
-In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the origin, the camera at (D, 0). The
-directions from the light are taken along a polygonal line k(q): for a point light the one with the corners (1, 0), (0,
-1), (-1, 0), which goes all round; for a spot the chord between the two ends of its cone in the slice. A point is P = k
-/ s; with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
+In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the origin, the camera
+at (D, 0). The directions from the light are taken along a polygonal line k(q): for a point light
+the one with the corners (1, 0), (0, 1), (-1, 0), which goes all round; for a spot the chord between
+the two ends of its cone in the slice. A point is P = k / s; with k linear along an edge of the
+line, (q, s) are projective coordinates and a camera ray is straight in them
 (`realtime.shadow_maps.projection` has the same with one dimension more).
 
-For a light at infinity a slice holds parallel rays at distances Y from the axis e1 through the camera, between Y0 and
-Y1, where the slice enters and leaves the rectangle of the shadow map. With s_O the height of the camera in the map, the
-point (X, Y) has s = s_O - X. Here k(q) = (s_O, Y) with Y linear in q, and everything below is the same.
+For a light at infinity a slice holds parallel rays at distances Y from the axis e1 through the
+camera, between Y0 and Y1, where the slice enters and leaves the rectangle of the shadow map. With
+s_O the height of the camera in the map, the point (X, Y) has s = s_O - X. Here k(q) = (s_O, Y) with
+Y linear in q, and everything below is the same.
 
-The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of the shadow map. A
-leaf lies between two samples, and a node of 2^l leaves holds the least and the greatest S over it. The publications
-have one depth for a leaf (Chen et al. 2011, Yusov 2013); here S is linear between the ends of a leaf, like the height
-field of the light volume, and a shadow ends where the linear S says, not at the end of a texel.
+The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of
+the shadow map. A leaf lies between two samples, and a node of 2^l leaves holds the least and the
+greatest S over it. The publications have one depth for a leaf (Chen et al. 2011, Yusov 2013); here
+S is linear between the ends of a leaf, like the height field of the light volume, and a shadow ends
+where the linear S says, not at the end of a texel.
 """
 
 from dataclasses import dataclass, replace
@@ -37,9 +41,12 @@ class SliceHeights:
     size: int  #: leaves of an edge of k(q), a power of two
     edges: int  #: 2 of a point light, 1 of others
     slices: Slices
-    chord: tuple[Any, Any, Any, Any] | None  #: of a spot or directional light: k at both ends, by slice
+    #: of a spot or directional light: k at both ends, by slice
+    chord: tuple[Any, Any, Any, Any] | None
     tree: (
-        Any  #: by slice a heap of pairs: 2 nodes of 2^(m-1) leaves from the second place on, ..., the leaves at the end
+        #: by slice a heap of pairs: 2 nodes of 2^(m-1) leaves from the second place on,
+        #: ..., the leaves at the end
+        Any
     )
 
     @property
@@ -57,7 +64,8 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     """Return the height maps of slices.
 
     `shadow_map`: of the light; `heights`: its inverse planar depths at the corners of the texels
-    (`realtime.shadow_maps.shadow_map.inverse_depth`) [1/m]; `slices`: the slices of the image; `light`: the light.
+    (`realtime.shadow_maps.shadow_map.inverse_depth`) [1/m]; `slices`: the slices of the image;
+    `light`: the light.
 
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
@@ -115,7 +123,8 @@ def _tree(heights: SliceHeights, at_begin, at_end):
 def _height(shadow_map: ShadowMap, heights, direction):
     """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|].
 
-    For a light at infinity k is a point less the light's position [m], and s the height of the surface on its ray [m].
+    For a light at infinity k is a point less the light's position [m], and s the height of
+    the surface on its ray [m].
     """
     size, projection = shadow_map.size, shadow_map.projection
     if projection.basis:
@@ -123,7 +132,9 @@ def _height(shadow_map: ShadowMap, heights, direction):
         face, u, v = mi.UInt32(0), a / depth, b / depth
     else:
         face, u, v = cube_coordinates(direction)
-        depth = dr.maximum(dr.maximum(dr.abs(direction.x), dr.abs(direction.y)), dr.abs(direction.z))
+        depth = dr.maximum(
+            dr.maximum(dr.abs(direction.x), dr.abs(direction.y)), dr.abs(direction.z)
+        )
     u, v = (dr.clip(dr.fma(0.5 * size, coordinate, 0.5 * size), 0, size) for coordinate in (u, v))
     column, row = (dr.minimum(mi.UInt32(coordinate), size - 1) for coordinate in (u, v))
     x, y = u - type(u)(column), v - type(v)(row)
@@ -137,8 +148,9 @@ def _height(shadow_map: ShadowMap, heights, direction):
 def _chord(slices: Slices, light: Light, size: int):
     """Return k at the ends of the cone of a spot in the slices.
 
-    A direction at the angle phi has the cosine p cos phi + q sin phi = R cos(phi - middle) with the axis, (p, q) the
-    axis in the slice. The chord is a texel wider on both sides, for the rays of pixels beside the slice.
+    A direction at the angle phi has the cosine p cos phi + q sin phi = R cos(phi - middle) with the
+    axis, (p, q) the axis in the slice. The chord is a texel wider on both sides, for the rays of
+    pixels beside the slice.
     """
     p, q = dr.dot(light.axis, slices.towards), dr.dot(light.axis, slices.across)
     middle = dr.atan2(q, p)
@@ -152,7 +164,8 @@ def _chord(slices: Slices, light: Light, size: int):
 
 
 def _band(slices: Slices, shadow_map: ShadowMap):
-    """Return k at both ends of where slices lie in the map of a directional light, a texel wider on both sides.
+    """Return k at both ends of where slices lie in the map of a directional light, a
+    texel wider on both sides.
 
     In a slice u and v are linear in Y, and the map holds -1 to 1 of both.
     """
@@ -173,7 +186,11 @@ def _band(slices: Slices, shadow_map: ShadowMap):
 
 
 def node_pair(heights: SliceHeights, number, place, level):
-    """Return the pair [1/m] of the node of a level that begins at the leaf `place`, of the slices of a `number`."""
+    """Return the pair [1/m] of the node of a level that begins at the leaf `place`, of
+    the slices of a `number`.
+    """
     heap = (mi.UInt32(heights.leaves) + place) >> level
-    pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
+    pair = dr.gather(
+        two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap
+    )
     return pair.x, pair.y

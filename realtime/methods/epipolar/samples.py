@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Samples along epipolar slices: which of them to compute, and what lies between them.
 
-A slice has a fixed number of samples at equal steps from where it enters the image to where it leaves. One in `step` is
-computed, and both sides of every break of the depth between two of them; the others are interpolated along the slice
-(Yusov 2013). Which are computed is a bit each, 32 to a word, so the nearest on either side is found by counting bits.
+A slice has a fixed number of samples at equal steps from where it enters the image to where it
+leaves. One in `step` is computed, and both sides of every break of the depth between two of them;
+the others are interpolated along the slice (Yusov 2013). Which are computed is a bit each, 32 to a
+word, so the nearest on either side is found by counting bits.
 
-A pixel lies between two slices and on each between two samples. It takes the mean of the four, weighted by their
-nearness and by how well their depths agree with its own. Where none agrees it has to be computed by itself.
+A pixel lies between two slices and on each between two samples. It takes the mean of the four,
+weighted by their nearness and by how well their depths agree with its own. Where none agrees it has
+to be computed by itself.
 """
 
 from dataclasses import dataclass
@@ -15,7 +17,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
+from airlight.realtime.methods.epipolar.slices import (
+    Slices,
+    neighbour,
+    pixel_number,
+    slice_coordinate,
+)
 from airlight.realtime.numerics.array_types import four_numbers
 from airlight.realtime.numerics.functions import cell_of
 
@@ -41,8 +48,9 @@ class Samples:
 def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
     """Return samples, with those to be computed marked.
 
-    `slices`: the slices; `depth`: distances of the visible surface, pixel by pixel, row by row; may be infinite [m];
-    `count`: samples of a slice, a multiple of 32; `step`: one in so many is computed: a power of two up to 32.
+    `slices`: the slices; `depth`: distances of the visible surface, pixel by pixel, row by row; may
+    be infinite [m]; `count`: samples of a slice, a multiple of 32; `step`: one in so many is
+    computed: a power of two up to 32.
     """
     words = count // WORD
     index = dr.arange(mi.UInt32, slices.count * words)
@@ -63,7 +71,12 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
     initial = sum(1 << b for b in range(0, WORD, step))
     bits = dr.select(first + WORD == count, mi.UInt32(initial | 1 << (WORD - 1)), initial)
     _, bits, _, _ = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, dr.width(index)), bits, depth_at(first), depth_at(mi.Int32(first) - 1)),
+        state=(
+            dr.zeros(mi.UInt32, dr.width(index)),
+            bits,
+            depth_at(first),
+            depth_at(mi.Int32(first) - 1),
+        ),
         cond=lambda b, bits, here, before: b < WORD,
         body=body,
         labels=("b", "bits", "here", "before"),
@@ -75,8 +88,8 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
 def marked_samples(samples: Samples):
     """Return the marked samples, slice times count plus sample, and how many there are.
 
-    They come word by word, and slice by slice within a word: what is next to each other in the list then is so in the
-    image too.
+    They come word by word, and slice by slice within a word: what is next to each other in the list
+    then is so in the image too.
     """
     slices = samples.slices.count
     number = dr.popcnt(samples.bits)
@@ -90,16 +103,23 @@ def marked_samples(samples: Samples):
         dr.scatter(marked, first + dr.tzcnt(bits), place)
         return bits & (bits - 1), place + 1
 
-    dr.while_loop(state=(+samples.bits, place), cond=lambda bits, place: bits != 0, body=body, labels=("bits", "place"))
+    dr.while_loop(
+        state=(+samples.bits, place),
+        cond=lambda bits, place: bits != 0,
+        body=body,
+        labels=("bits", "place"),
+    )
     total = dr.sum(number)
     dr.eval(marked, total)
     return marked, total
 
 
 def spread(width: int):
-    """Return the numbers below `width`, and a few more, in an order that deals packets of 16 out evenly.
+    """Return the numbers below `width`, and a few more, in an order that deals
+    packets of 16 out evenly.
 
-    A list fills only the first part of its room. Threads take contiguous parts of it, and one would get all the work.
+    A list fills only the first part of its room. Threads take contiguous parts of it, and
+    one would get all the work.
     """
     row = width // (_PACKET * _HANDS) + 1
     lane = dr.arange(mi.UInt32, row * _PACKET * _HANDS)
@@ -116,16 +136,18 @@ def sample_ray(samples: Samples, sample):
 
 
 def no_value(like):
-    """Return the mark in place of a value for a sample whose ray meets no light, an array `like` the values."""
+    """Return the mark in place of a value for a sample whose ray meets no light, an
+    array `like` the values.
+    """
     return type(like)(_BESIDE)
 
 
 def between_samples(samples: Samples, values, point, depth):
     """Return the values of pixels from those of samples.
 
-    `samples`, `values`: the samples; by sample the values of those that are marked; `point`: image points (i, j) of the
-    pixels; `depth`: their distances [m]. Returns `value`: the weighted mean; `fits`: whether enough of the samples
-    agree in their depth.
+    `samples`, `values`: the samples; by sample the values of those that are marked; `point`: image
+    points (i, j) of the pixels; `depth`: their distances [m]. Returns `value`: the weighted mean;
+    `fits`: whether enough of the samples agree in their depth.
     """
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)
@@ -146,7 +168,9 @@ def _on_slice(samples: Samples, values, number, point, depth):
     along = ((point[0] - ends.x) * i + (point[1] - ends.y) * j) * ((samples.count - 1) / length)
     k, fraction = cell_of(along, samples.count)
     left, right = _marked_about(samples, number, k)
-    left_value, right_value = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
+    left_value, right_value = (
+        dr.gather(type(values), values, number * samples.count + at) for at in (left, right)
+    )
     has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
     left_value, right_value = (
         dr.select(has_left, left_value, right_value),
@@ -166,7 +190,9 @@ def _marked_about(samples: Samples, number, k):
     word, behind = k // WORD, (k + 1) // WORD
     slices = samples.slices.count
     bits = dr.gather(mi.UInt32, samples.bits, word * slices + number)
-    left = word * WORD + (WORD - 1) - dr.lzcnt(bits & (mi.UInt32(0xFFFFFFFF) >> (WORD - 1 - k % WORD)))
+    left = (
+        word * WORD + (WORD - 1) - dr.lzcnt(bits & (mi.UInt32(0xFFFFFFFF) >> (WORD - 1 - k % WORD)))
+    )
     rest = dr.gather(mi.UInt32, samples.bits, behind * slices + number) >> ((k + 1) % WORD)
     # The first sample of a word is always marked.
     return left, dr.select(rest != 0, k + 1 + dr.tzcnt(rest), (behind + 1) * WORD)

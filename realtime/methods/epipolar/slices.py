@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Epipolar slices: half planes bounded by the line through camera and light, which cut the image in straight lines.
+"""Epipolar slices: half planes bounded by the line through camera and light, which cut the
+image in straight lines.
 
-With (i, j) counted in pixels to the left and up from the centre of the image, the ray through (i, j) has the direction
-forward + i left + j up. The light, at v = l - w O from the camera O (`realtime.scene.lights`: for w = 0 the direction
-to a light at infinity), has the homogeneous image point
+With (i, j) counted in pixels to the left and up from the centre of the image, the ray through (i,
+j) has the direction forward + i left + j up. The light, at v = l - w O from the camera O
+(`realtime.scene.lights`: for w = 0 the direction to a light at infinity), has the homogeneous image
+point
 
     (a, b, c) = (v . left / |left|^2,  v . up / |up|^2,  v . forward),
 
-and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 that of the point opposite.
-From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so that E may lie at infinity. A side of the
-image "faces away" from E if E lies on the inner side of it. The sides that do are a connected part of the border: all
-four where E is in the image, one to three otherwise. Slices leave the image at equal steps of length along them (Yusov
-2013), and so each pixel lies on one half line from E, which leaves the image at a place along the border.
+and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 that of the
+point opposite. From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so that E may
+lie at infinity. A side of the image "faces away" from E if E lies on the inner side of it. The
+sides that do are a connected part of the border: all four where E is in the image, one to three
+otherwise. Slices leave the image at equal steps of length along them (Yusov 2013), and so each
+pixel lies on one half line from E, which leaves the image at a place along the border.
 
-In a slice e1 = -v/|v| leads from the light to the camera, or along the light, and e2 is at right angles to it, on the
-side of the rays. With the light at the origin the rays of a slice start at (D, 0), D = |v|, and the angle of their
-points about the light grows from 0 to less than pi. Where the light is at infinity the camera is the origin, D = 1, and
-the distance of their points from the axis e1 grows from 0.
+In a slice e1 = -v/|v| leads from the light to the camera, or along the light, and e2 is at right
+angles to it, on the side of the rays. With the light at the origin the rays of a slice start at (D,
+0), D = |v|, and the angle of their points about the light grows from 0 to less than pi. Where the
+light is at infinity the camera is the origin, D = 1, and the distance of their points from the axis
+e1 grows from 0.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +42,8 @@ class Slices:
     width: int  #: of the image [pixels]
     height: int  #: of the image [pixels]
     epipole: tuple[Any, Any, Any]  #: a, b, c, and all times -1 where c < 0; one entry each
-    sides: tuple[tuple[Any, Any], ...]  #: of the border: where it begins along those that face away, and if it does
+    #: of the border: where it begins along those that face away, and if it does
+    sides: tuple[tuple[Any, Any], ...]
     length: Any  #: of those sides [pixels], one entry
     closed: Any  #: whether they are all four: after the last slice comes the first; one entry
     towards: Any  #: e1, one entry
@@ -46,18 +51,19 @@ class Slices:
     away: Any  #: w = 0: from the position that stands for the light's to the camera [m], one entry
     w: int  #: last coordinate of the light's homogeneous position
     across: Any  #: e2
-    ends: Any  #: i and j where a slice enters, or of E, and where it leaves: four numbers a slice [pixels]
+    #: i and j where a slice enters, or of E, and where it leaves: four numbers a slice [pixels]
+    ends: Any
 
 
 def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     """Return the slices of an image.
 
-    `camera`: the camera. `light`: any light, anywhere. Where it is in the pinhole, all half planes hold it; E is then
-    the centre of the image. `count`: how many slices.
+    `camera`: the camera. `light`: any light, anywhere. Where it is in the pinhole, all half planes
+    hold it; E is then the centre of the image. `count`: how many slices.
 
-    Engelhardt, Dachsbacher 2010, *Epipolar sampling for shadows and crepuscular rays in participating media with
-    single scattering*. Yusov 2013, *Practical implementation of light scattering effects using epipolar sampling and
-    1D min/max binary trees*.
+    Engelhardt, Dachsbacher 2010, *Epipolar sampling for shadows and crepuscular rays in
+    participating media with single scattering*. Yusov 2013, *Practical implementation of light
+    scattering effects using epipolar sampling and 1D min/max binary trees*.
     """
     Float = type(camera.origin.x)
     v = light.toward(camera.origin)
@@ -97,7 +103,9 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
 
 
 def pixel_number(slices: Slices, i, j):
-    """Return the number, row times width plus column, of the pixel that holds a point (i, j), or of the nearest."""
+    """Return the number, row times width plus column, of the pixel that holds a point
+    (i, j), or of the nearest.
+    """
     # The upper bounds are those of whole numbers: NaN becomes the largest of them.
     column = dr.minimum(mi.UInt32(dr.maximum(0.5 * slices.width - i, 0)), slices.width - 1)
     row = dr.minimum(mi.UInt32(dr.maximum(0.5 * slices.height - j, 0)), slices.height - 1)
@@ -105,9 +113,11 @@ def pixel_number(slices: Slices, i, j):
 
 
 def slice_coordinate(slices: Slices, i, j):
-    """Return the place of image points (i, j) [pixels] among the slices: 0 on the first, 1 on the second, and so on.
+    """Return the place of image points (i, j) [pixels] among the slices: 0 on the first, 1
+    on the second, and so on.
 
-    Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides face away round the circle.
+    Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides
+    face away round the circle.
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
@@ -128,7 +138,9 @@ def slice_coordinate(slices: Slices, i, j):
 def neighbour(slices: Slices, number):
     """Return the slice of a whole number that may lie beyond the first or the last."""
     last = slices.count - 1
-    round_ = dr.select(number < 0, number + slices.count, dr.select(number > last, number - slices.count, number))
+    round_ = dr.select(
+        number < 0, number + slices.count, dr.select(number > last, number - slices.count, number)
+    )
     return dr.minimum(mi.UInt32(dr.maximum(dr.select(slices.closed, round_, number), 0)), last)
 
 
@@ -138,7 +150,8 @@ def _towards_epipole(epipole, i, j):
 
 
 def _border(width: int, height: int, epipole):
-    """Return where the sides left, top, right, bottom begin along those that face away, their length, and if all do.
+    """Return where the sides left, top, right, bottom begin along those that face away,
+    their length, and if all do.
 
     The border is gone round from the lower left corner, (i, j) = (W/2, -H/2).
     """
@@ -146,7 +159,9 @@ def _border(width: int, height: int, epipole):
     left, top = _towards_epipole(epipole, x, y)
     right, bottom = _towards_epipole(epipole, -x, -y)
     faces = (left < 0, top < 0, right > 0, bottom > 0)
-    lengths = [type(left)(dr.select(side, float(n), 0)) for side, n in zip(faces, 2 * (height, width))]
+    lengths = [
+        type(left)(dr.select(side, float(n), 0)) for side, n in zip(faces, 2 * (height, width))
+    ]
     closed = faces[0] & faces[1] & faces[2] & faces[3]
     # The first of the connected sides, where they do not close.
     first = [faces[k] & ~faces[k - 1] for k in range(4)]
@@ -171,7 +186,9 @@ def _at_border(slices: Slices, place):
         lambda r: (r - x, -y),
     )
     i = j = type(place)(0)
-    for (begin, faces), point, length in zip(slices.sides, points, 2 * (slices.height, slices.width)):
+    for (begin, faces), point, length in zip(
+        slices.sides, points, 2 * (slices.height, slices.width)
+    ):
         inside = faces & (place >= begin) & (place < begin + length)
         at_i, at_j = point(place - begin)
         i, j = dr.select(inside, at_i, i), dr.select(inside, at_j, j)
@@ -179,7 +196,9 @@ def _at_border(slices: Slices, place):
 
 
 def _entry(slices: Slices, i, j):
-    """Return where the half line from E to a point of the border enters the image: E itself if that is inside."""
+    """Return where the half line from E to a point of the border enters the image: E
+    itself if that is inside.
+    """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
     to_i = dr.select(di > 0, x - i, x + i) / dr.abs(di)
@@ -191,7 +210,9 @@ def _entry(slices: Slices, i, j):
 
 
 def _at_right_angles(vector, axis, camera: Camera):
-    """Return the unit vector across `axis` on the side of `vector`; any across it where the two are parallel."""
+    """Return the unit vector across `axis` on the side of `vector`; any across it
+    where the two are parallel.
+    """
 
     def across(side):
         normal = dr.cross(axis, side)
@@ -199,5 +220,9 @@ def _at_right_angles(vector, axis, camera: Camera):
 
     across_vector = across(vector)
     flat = dr.squared_norm(across_vector) <= 1e-12 * dr.squared_norm(vector)
-    other = dr.select(dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left), camera.left, camera.up)
+    other = dr.select(
+        dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left),
+        camera.left,
+        camera.up,
+    )
     return dr.normalize(dr.select(flat, across(other), across_vector))

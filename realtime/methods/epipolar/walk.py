@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lit intervals of rays in the height maps of epipolar slices.
 
-In a slice (`realtime.methods.epipolar.min_max_tree`) let t and h be foot and height of a ray. From cross(k, direction)
-= s cross(P, direction) = s h and D direction = (-t, h),
+In a slice (`realtime.methods.epipolar.min_max_tree`) let t and h be foot and height of a ray. From
+cross(k, direction) = s cross(P, direction) = s h and D direction = (-t, h),
 
     D h s(q) = G(q) := h k_x + t k_y,      x = D^2 k_y / G.
 
@@ -10,16 +10,17 @@ With S = D times the height of the map the point is lit where
 
     G(q) >= h S(q),
 
-without a quotient. At a crossing G = h S, thus x = D^2 k_y / (h S); between the ends of a leaf, with the differences d0
-= G - h S at one and d1 at the other, k and S are those at the ends in the ratio |d1| : |d0|. Nothing cancels, wherever
-the ray goes.
+without a quotient. At a crossing G = h S, thus x = D^2 k_y / (h S); between the ends of a leaf,
+with the differences d0 = G - h S at one and d1 at the other, k and S are those at the ends in the
+ratio |d1| : |d0|. Nothing cancels, wherever the ray goes.
 
-With a light at infinity foot and height are the cosine and the sine of the ray's angle with it, D = 1 and k = (s_O, Y).
-The point of the ray over Y is x = Y / h = k_y / h, and the height of the ray less S is G / h - S: G(q) >= h S(q) again.
-Only x has another divisor: at a crossing within a leaf h (|d1| + d0) instead of h (S |d1| + ...).
+With a light at infinity foot and height are the cosine and the sine of the ray's angle with it, D =
+1 and k = (s_O, Y). The point of the ray over Y is x = Y / h = k_y / h, and the height of the ray
+less S is G / h - S: G(q) >= h S(q) again. Only x has another divisor: at a crossing within a leaf h
+(|d1| + d0) instead of h (S |d1| + ...).
 
-A ray that at both ends of a node is above its greatest S is lit all over it, one that is below the least is dark (Chen
-et al. 2011): a long step.
+A ray that at both ends of a node is above its greatest S is lit all over it, one that is below the
+least is dark (Chen et al. 2011): a long step.
 """
 
 from collections.abc import Callable
@@ -29,7 +30,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, open_interval
+from airlight.realtime.intervals import (
+    LitIntervals,
+    add_waiting,
+    close_interval,
+    no_intervals,
+    open_interval,
+)
 from airlight.realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
 from airlight.realtime.rays import RayGeometry
 
@@ -46,14 +53,19 @@ class _Walk:
 
 
 def sum_lit_intervals(
-    heights: SliceHeights, number, geometry: RayGeometry, segment, integral: Callable[[Any, Any], Any], zero
+    heights: SliceHeights,
+    number,
+    geometry: RayGeometry,
+    segment,
+    integral: Callable[[Any, Any], Any],
+    zero,
 ):
     """Add up an integral over the lit intervals of rays.
 
-    `heights`: the maps; `number`: the slice that stands for each ray: the ray is turned into it about the line of
-    camera and light; `geometry`: the rays and the light; `segment`: distances (x0, x1) between which to look; `x1` may
-    be infinite, and x1 <= x0 for rays to leave out [m]; function (x0, x1) -> value of one interval; `zero`: the value
-    of no interval, one for each ray.
+    `heights`: the maps; `number`: the slice that stands for each ray: the ray is turned into it
+    about the line of camera and light; `geometry`: the rays and the light; `segment`: distances
+    (x0, x1) between which to look; `x1` may be infinite, and x1 <= x0 for rays to leave out [m];
+    function (x0, x1) -> value of one interval; `zero`: the value of no interval, one for each ray.
     """
     x0, x1 = segment
     width = dr.width(zero)
@@ -89,7 +101,9 @@ def sum_lit_intervals(
         walk.intervals = add_waiting(walk.intervals, between)
         return (walk,)
 
-    (walk,) = dr.while_loop(state=(start,), cond=lambda walk: ~walk.done, body=body, labels=("walk",))
+    (walk,) = dr.while_loop(
+        state=(start,), cond=lambda walk: ~walk.done, body=body, labels=("walk",)
+    )
     return walk.intervals.total
 
 
@@ -113,7 +127,8 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     lit = dr.select(whole, all_lit, d1 >= 0)
     passed = whole | leaf
     lit = dr.select(passed, lit, walk.lit)
-    # Where a whole node differs from what was before it, by rounding, the change is at its beginning.
+    # Where a whole node differs from what was before it, by rounding, the
+    # change is at its beginning.
     ky = dr.select(whole, ky0, ky0 * dr.abs(d1) + ky1 * d0)
     if heights.slices.w:
         divisor = dr.select(whole, g0, height * (s0 * dr.abs(d1) + s1 * d0))
@@ -124,7 +139,9 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     over = passed & (after > last)
     changed, remains = lit != walk.lit, over & lit
     intervals = open_interval(walk.intervals, x, changed & lit)
-    intervals = close_interval(intervals, dr.select(remains, segment[1], x), remains | (changed & walk.lit))
+    intervals = close_interval(
+        intervals, dr.select(remains, segment[1], x), remains | (changed & walk.lit)
+    )
     step_up = passed & (dr.tzcnt(after) > walk.level) & (walk.level < heights.top)
     level = dr.select(passed, dr.select(step_up, walk.level + 1, walk.level), walk.level - 1)
     return _Walk(dr.select(passed, after, walk.place), level, lit, intervals, over)

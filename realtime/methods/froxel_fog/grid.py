@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The grid of a view: columns of froxels behind equal rectangles of the image, cut by planes across its axis.
+"""The grid of a view: columns of froxels behind equal rectangles of the image, cut
+by planes across its axis.
 
-A place is (u, v, s), all from 0 to 1: u and v across the image from its upper left corner, s in depth. With the camera
-of `realtime.scene.camera`, W x H pixels, it is the point
+A place is (u, v, s), all from 0 to 1: u and v across the image from its upper left corner, s in
+depth. With the camera of `realtime.scene.camera`, W x H pixels, it is the point
 
     origin + z(s) (forward + W (1/2 - u) left + H (1/2 - v) up),
 
@@ -10,14 +11,14 @@ z the distance along the axis. Slices are equal steps of s. Their distribution i
 
     z(s) = near ((1 + far/near)^s - 1),        s(z) = log(1 + z/near) / log(1 + far/near),        near = far/8,
 
-which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in proportion to their
-depth. Media beyond `far` scatter nothing.
+which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in
+proportion to their depth. Media beyond `far` scatter nothing.
 
 **The airlight from the camera to the end of each slice, and from there to any depth.**
 
-Along a ray the airlight is L(x) = int_0^x S(y) exp(-tau(y)) dy, with S the scattered light and tau the optical depth
-from the camera, tau' = sigma. Let S and sigma be constant in a slice [x_k, x_k + D]. There tau(y) = tau_k + sigma (y -
-x_k), and
+Along a ray the airlight is L(x) = int_0^x S(y) exp(-tau(y)) dy, with S the scattered light and tau
+the optical depth from the camera, tau' = sigma. Let S and sigma be constant in a slice [x_k, x_k +
+D]. There tau(y) = tau_k + sigma (y - x_k), and
 
     int_{x_k}^{x_k + D} S exp(-tau(y)) dy = S exp(-tau_k) (1 - exp(-sigma D)) / sigma,
 
@@ -25,16 +26,17 @@ which goes to S exp(-tau_k) D with sigma. Front to back, with T_k = exp(-tau_k):
 
     L_{k+1} = L_k + T_k S_k D_k (1 - exp(-z))/z,    T_{k+1} = T_k exp(-z),    z = sigma_k D_k;    L_0 = 0, T_0 = 1.
 
-The slices of a constant medium in constant light therefore add up to S (1 - exp(-sigma x)) / sigma for any number and
-depths of slices. Multiplying S D by T_k instead is too bright by a factor of 1 + z/2, and by T_{k+1} too dark by as
-much (Hillaire 2015). Where z is small, 1 - exp(-z) cancels, and its series takes over.
+The slices of a constant medium in constant light therefore add up to S (1 - exp(-sigma x)) / sigma
+for any number and depths of slices. Multiplying S D by T_k instead is too bright by a factor of 1 +
+z/2, and by T_{k+1} too dark by as much (Hillaire 2015). Where z is small, 1 - exp(-z) cancels, and
+its series takes over.
 
 Between the ends of slices, and between columns, a pixel interpolates linearly in (u, v, s).
 
 References
 ----------
-Hillaire 2015, *Physically-based and unified volumetric rendering in Frostbite* (the integral within a slice). Wronski
-2014 (the grid, and its sum front to back).
+Hillaire 2015, *Physically-based and unified volumetric rendering in Frostbite* (the integral within
+a slice). Wronski 2014 (the grid, and its sum front to back).
 """
 
 import math
@@ -51,7 +53,8 @@ from airlight.realtime.scene.camera import Camera, row_and_column
 from airlight.realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
-_OPTICAL_REACH = 3.0  # optical depth behind a light that deserves slices: e^-6 = 0.25 % of the light comes back from it
+# optical depth behind a light that deserves slices: e^-6 = 0.25 % of the light comes back from it
+_OPTICAL_REACH = 3.0
 _REACH = 32.0  # the same in distances of the light: the airlight beyond x falls like 1/x
 
 
@@ -79,24 +82,36 @@ class Grid:
         return dr.log(1 + depth / self.far * _RATIO) / math.log(1 + _RATIO)
 
     def column_ray(self, column: PerRay, shift: tuple[Any, Any] = (0, 0)) -> PerRay:
-        """Return the vector from the camera to depth 1 in columns, `shift` parts of a froxel beside their middle."""
+        """Return the vector from the camera to depth 1 in columns, `shift` parts of a
+        froxel beside their middle.
+        """
         Float = type(self.far)
         row = column // self.width
         u = (Float(column - row * self.width) + (0.5 + shift[0])) / self.width
         v = (Float(row) + (0.5 + shift[1])) / self.height
         camera = self.camera
-        return camera.forward + camera.left * (camera.width * (0.5 - u)) + camera.up * (camera.height * (0.5 - v))
+        return (
+            camera.forward
+            + camera.left * (camera.width * (0.5 - u))
+            + camera.up * (camera.height * (0.5 - v))
+        )
 
     def place(self, point: Any) -> tuple[Any, Any, Any]:
-        """Return u, v and the depth [m] of points [m]; u and v mean nothing where that is not above 0."""
+        """Return u, v and the depth [m] of points [m]; u and v mean nothing
+        where that is not above 0.
+        """
         camera = self.camera
         across, upward, depth = camera.project(point - camera.origin)
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 
 def view_grid(view: View, *, size: tuple[int, int, int], far: float) -> Grid:
-    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame."""
-    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view))
+    """Return the grid of a view: froxels across, down and in depth, up to a depth [m];
+    0: chosen for the frame.
+    """
+    return Grid(
+        *size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view)
+    )
 
 
 def column_rays(view: View, grid: Grid) -> Rays:
@@ -108,7 +123,8 @@ def column_rays(view: View, grid: Grid) -> Rays:
 
 
 def _frame_depth(view: View) -> Metres:
-    """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
+    """Return the depth of the farthest surface, or where rays meet none, where too little
+    light comes from to matter.
 
     Grids, and media in vacuum, end by themselves.
     """
@@ -137,10 +153,11 @@ _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 
 
 def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
-    """Return the airlight up to the begin and the end of each slice, (slices + 1) values a column, four numbers each.
+    """Return the airlight up to the begin and the end of each slice, (slices + 1) values a
+    column, four numbers each.
 
-    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `scattered`: by froxel, a colour
-    [W/(m^3 sr)], evaluated.
+    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `scattered`: by
+    froxel, a colour [W/(m^3 sr)], evaluated.
     """
     Float, Color, medium = type(view.distance), type(scattered), view.medium
     column = dr.arange(mi.UInt32, grid.columns)
@@ -154,7 +171,8 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
         source = dr.gather(Color, scattered, number * grid.columns + column)
         passed = [dr.exp(-depth) for depth in depths]
         weights = [
-            fraction * thickness * _mean_transmittance(depth, end) for fraction, depth, end in zip(kept, depths, passed)
+            fraction * thickness * _mean_transmittance(depth, end)
+            for fraction, depth, end in zip(kept, depths, passed)
         ]
         total = total + source * (weights[0] if len(weights) == 1 else Color(*weights))
         kept = [fraction * end for fraction, end in zip(kept, passed)]
@@ -185,12 +203,16 @@ def _mean_transmittance(depth: Any, passed: Any) -> Any:
 
 
 def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
-    """Return the airlight of every ray of a view from what `accumulated` returned, a colour [W/(m^2 sr)]."""
+    """Return the airlight of every ray of a view from what `accumulated`
+    returned, a colour [W/(m^2 sr)].
+    """
     Float, camera = type(view.distance), view.camera
     row, column = row_and_column(camera, view.pixel)
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)
     across = [(v / (grid.height - 1), grid.height), (u / (grid.width - 1), grid.width)]
-    red, green, blue, _ = between_entries(volume, [(grid.fraction(depth), grid.slices + 1), *across], 4)
+    red, green, blue, _ = between_entries(
+        volume, [(grid.fraction(depth), grid.slices + 1), *across], 4
+    )
     return type(view.medium.albedo)(red, green, blue)

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light that reaches a point of each froxel and is scattered there towards the camera.
 
-With P that point, r its distance from the light, T the transmittance from there and V the visibility, a froxel holds
+With P that point, r its distance from the light, T the transmittance from there and V the
+visibility, a froxel holds
 
     S = 1/(4 pi) sum_lights I V T / max(r^2, b^2)  sum_media c albedo sigma_t p        [W/(m^3 sr)],
 
-c the fraction of the froxel that the medium fills. For a directional light, I / r^2 is the irradiance.
+c the fraction of the froxel that the medium fills. For a directional light,
+I / r^2 is the irradiance.
 
-About a light 1/r^2 has no bound, though its mean over a froxel has. With a half the diagonal of the froxel, the mean of
-1/r^2 over a ball of the radius a about the light is
+About a light 1/r^2 has no bound, though its mean over a froxel has. With a half the diagonal of the
+froxel, the mean of 1/r^2 over a ball of the radius a about the light is
 
     3/(4 pi a^3) int_0^a (1/r^2) 4 pi r^2 dr = 3/a^2.
 
-Hence b^2 = a^2/3: a froxel that holds the light has about the mean, froxels away from the light hardly change, and b
-vanishes with the size of the froxels.
+Hence b^2 = a^2/3: a froxel that holds the light has about the mean, froxels away from the light
+hardly change, and b vanishes with the size of the froxels.
 
-With `jitter=frames` frame n samples at the middle of a froxel plus a place from -1/2 to 1/2 on each of three sides, n
-times the additive recurrence of Roberts in three dimensions, 1/g, 1/g^2, 1/g^3 with g^4 = g + 1, from a random place of
-the run on, modulo 1.
+With `jitter=frames` frame n samples at the middle of a froxel plus a place from -1/2 to 1/2 on each
+of three sides, n times the additive recurrence of Roberts in three dimensions, 1/g, 1/g^2, 1/g^3
+with g^4 = g + 1, from a random place of the run on, modulo 1.
 
 References
 ----------
@@ -38,7 +40,8 @@ from airlight.realtime.rays import profile
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Rays
 
-#: (point, number of a table) -> function (light, its number in the table) -> whether it reaches the point.
+#: (point, number of a table) -> function (light, its number in the table) ->
+#: whether it reaches the point.
 Visibility = Callable[[Any, int], Callable[[Light, Any], Any]]
 
 _GROWTH = 1.2207440846057596  # g^4 = g + 1
@@ -57,7 +60,9 @@ class FroxelPoints:
 
 
 def frame_shift(view: View) -> tuple[Any, Any, Any]:
-    """Return by how much the samples of a frame are moved from the middles of froxels, in parts of a froxel."""
+    """Return by how much the samples of a frame are moved from the middles of
+    froxels, in parts of a froxel.
+    """
     Float, begin = type(view.distance), view.random.of_run()
     across, down, deep = (
         Float(mi.Int32(word + view.frame * mi.UInt32(step))) * 2.0**-32
@@ -76,8 +81,9 @@ def scattered_light(
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
 
-    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `shift`: of the points from the
-    middles of the froxels, in parts of a froxel across, down and in depth; `visible`: which light reaches which point.
+    `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `shift`: of the
+    points from the middles of the froxels, in parts of a froxel across, down and in depth;
+    `visible`: which light reaches which point.
     """
     points = _froxel_points(view, grid, rays, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
@@ -99,14 +105,19 @@ def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, An
     number = lane // grid.columns
     column = lane - number * grid.columns
     ray = grid.column_ray(column, shift[:2])
-    begin, end = grid.depth(Float(number) / grid.slices), grid.depth((Float(number) + 1) / grid.slices)
+    begin, end = (
+        grid.depth(Float(number) / grid.slices),
+        grid.depth((Float(number) + 1) / grid.slices),
+    )
     point = dr.fma(ray, dr.lerp(begin, end, 0.5 + shift[2]), view.origin)
     middle = grid.column_ray(column)
     length = dr.norm(middle)
     direction = middle / length
     rays = Rays(view.origin, direction, direction, dr.gather(tuple, rays.crossed, column))
     unit = ray * dr.rsqrt(dr.squared_norm(ray))
-    return FroxelPoints(point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length))
+    return FroxelPoints(
+        point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length)
+    )
 
 
 def _least_square(grid: Grid, begin: Any, end: Any) -> Any:

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Froxel fog as a method: volumetric light as in game engines, with their parameters.
 
-A frame injects the scattered light into a grid along the view, sums it front to back, and looks the sum up at the depth
-of every pixel. Three kernels: over froxels, columns and pixels. The cost of the first two does not depend on the image.
+A frame injects the scattered light into a grid along the view, sums it front to back, and looks the
+sum up at the depth of every pixel. Three kernels: over froxels, columns and pixels. The cost of the
+first two does not depend on the image.
 
 References
 ----------
-Wronski 2014, *Volumetric fog: unified, compute shader based solution to atmospheric scattering*. Hillaire 2015,
-*Physically-based and unified volumetric rendering in Frostbite*.
+Wronski 2014, *Volumetric fog: unified, compute shader based solution to atmospheric scattering*.
+Hillaire 2015, *Physically-based and unified volumetric rendering in Frostbite*.
 """
 
 from dataclasses import dataclass
@@ -15,14 +16,23 @@ from dataclasses import dataclass
 import drjit as dr
 
 from airlight.realtime.memory import check_memory
-from airlight.realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
+from airlight.realtime.methods.froxel_fog.grid import (
+    accumulated,
+    airlight_at_pixels,
+    column_rays,
+    view_grid,
+)
 from airlight.realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.numerics.array_types import bytes_of
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.light_table import light_tables
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps, maps_memory
+from airlight.realtime.shadow_maps.hemisphere_map import (
+    HemisphereMaps,
+    cast_hemisphere_maps,
+    maps_memory,
+)
 from airlight.realtime.shadow_maps.shadow_map import (
     ShadowMaps,
     cast_shadow_maps,
@@ -49,20 +59,30 @@ class FroxelFog(Method):
     height: int = parameter(90, "froxels down the image", least=2, most=4096)
     slices: int = parameter(64, "froxels in depth", least=1, most=4096)
     far: float = parameter(
-        0.0, "depth where the grid ends; 0: at the farthest surface, or where light fades", least=0, unit="m"
+        0.0,
+        "depth where the grid ends; 0: at the farthest surface, or where light fades",
+        least=0,
+        unit="m",
     )
     jitter: str = parameter(
-        "none", "samples in the middle of froxels, or moved from frame to frame", choices=("none", "frames")
+        "none",
+        "samples in the middle of froxels, or moved from frame to frame",
+        choices=("none", "frames"),
     )
-    shadow: str = parameter("map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray"))
+    shadow: str = parameter(
+        "map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray")
+    )
     map: int = map_size(
         512,
-        "texels on a side of a face of the map, with `shadow=map`; half as many for each point of an area light",
+        "texels on a side of a face of the map, with `shadow=map`; half as many for each point of "
+        "an area light",
     )
 
     @property
     def point_map(self) -> int:
-        """Texels on a side of the map of a light sample: errors of many maps average, and a froxel is no smaller."""
+        """Texels on a side of the map of a light sample: errors of many maps average,
+        and a froxel is no smaller.
+        """
         return max(self.map // 2, 4)
 
     @property
@@ -78,11 +98,17 @@ class FroxelFog(Method):
         check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
         if self.shadow == "map" and scene.features.shadows:
             samples = sum(light.source is not None for light in scene.lights)
-            maps = sum(map_memory(light, self.map) for light in scene.lights if light.source is None)
-            check_maps(scene.lights, self.map, froxels + maps + maps_memory(Float, samples, self.point_map))
+            maps = sum(
+                map_memory(light, self.map) for light in scene.lights if light.source is None
+            )
+            check_maps(
+                scene.lights, self.map, froxels + maps + maps_memory(Float, samples, self.point_map)
+            )
 
     def preparation(self, scene):
-        """Return a function that casts the shadow maps of each table of lights, if they are asked for."""
+        """Return a function that casts the shadow maps of each table of
+        lights, if they are asked for.
+        """
         if self.shadow != "map" or not scene.features.shadows:
             return no_state
 
@@ -106,12 +132,19 @@ class FroxelFog(Method):
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.
 
-        With a column a pixel nothing is left of the columns' error; then what is left is that of the slices.
+        With a column a pixel nothing is left of the columns' error; then what is
+        left is that of the slices.
         """
-        return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
+        return (
+            ("map", {"shadow": "ray"}),
+            ("resolution", {"width": size[0], "height": size[1]}),
+            ("steps", None),
+        )
 
 
-def _visibility(view: View, states: tuple[ShadowMaps | HemisphereMaps, ...], shadow: str) -> Visibility:
+def _visibility(
+    view: View, states: tuple[ShadowMaps | HemisphereMaps, ...], shadow: str
+) -> Visibility:
     def visible(point, place):
         def reaches(light: Light, number):
             if shadow == "ray":

@@ -7,11 +7,12 @@ Equi-angular steps are a change of variables, for any h > 0:
 
     x = foot + h tan theta,    dx/r^2 = (h^2 + (x - foot)^2) / (h r^2) dtheta,    r^2 = height^2 + (x - foot)^2.
 
-With h = height the weight is 1/h, and the peak is gone. A ray that leads straight away from the light has height 0, and
-all its angles are pi/2; next to it the angles differ by less than their rounding. But where the light stands before or
-behind the whole segment, at the distance g, there is no peak that h = height must take away: h is then at least g/1024.
-The angles of the segment differ by about h/g, which float32 resolves to 1e-4. As h/g goes to 0 the steps are equal in
-1/r, the limit of equal angles.
+With h = height the weight is 1/h, and the peak is gone. A ray that leads straight away from the
+light has height 0, and all its angles are pi/2; next to it the angles differ by less than their
+rounding. But where the light stands before or behind the whole segment, at the distance g, there is
+no peak that h = height must take away: h is then at least g/1024. The angles of the segment differ
+by about h/g, which float32 resolves to 1e-4. As h/g goes to 0 the steps are equal in 1/r, the limit
+of equal angles.
 """
 
 from collections.abc import Callable
@@ -51,8 +52,8 @@ class Steps:
 def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = None) -> Steps:
     """Return equal steps from `x0` to `x1` [m].
 
-    `light` is the foot [m] and the height [m] of one at whose angle the steps are to be equal; then `x1` may be
-    infinite.
+    `light` is the foot [m] and the height [m] of one at whose angle the steps are to be equal;
+    then `x1` may be infinite.
     """
     if light is None:
         begin, end, place = x0, x1, (None, None)
@@ -63,7 +64,9 @@ def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = 
         end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
         begin, place = dr.atan2(x0 - foot, height), (foot, height)
     walks = x1 > x0
-    return Steps(x0, x1, dr.select(walks, begin, 0), dr.select(walks, (end - begin) / steps, 0), *place)
+    return Steps(
+        x0, x1, dr.select(walks, begin, 0), dr.select(walks, (end - begin) / steps, 0), *place
+    )
 
 
 def marched_integral(
@@ -85,14 +88,17 @@ def marched_integral(
     steps
         The number of steps on every ray.
     spacing
-        'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at infinity both are uniform.
+        'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at
+        infinity both are uniform.
     lit
         Says whether the light reaches the rays at distances [m].
     running
-        Whether the camera's optical depth is the midpoint sum over the steps, as in engines, instead of the medium's
-        exact depth. Where densities vary, the sum is wrong by a term in the square of the step.
+        Whether the camera's optical depth is the midpoint sum over the steps, as in engines,
+        instead of the medium's exact depth. Where densities vary, the sum is wrong by a term in the
+        square of the step.
     shift
-        The place of the sample in a step, from 0 to 1: with a uniform random number the mean is the integral.
+        The place of the sample in a step, from 0 to 1: with a uniform random number
+        the mean is the integral.
 
     Returns
     -------
@@ -111,7 +117,8 @@ def marched_integral(
         length = between.width * between.stretch(x)
         camera = None
         if summed:
-            # The medium's exact depth, from the sample before this one: no part of the ray is walked twice.
+            # The medium's exact depth, from the sample before this one: no part of
+            # the ray is walked twice.
             added = airlight.medium.optical_depth(airlight.rays, before, x)
             camera = depths = [depth + more for depth, more in zip(depths, added, strict=True)]
             before = x
@@ -120,7 +127,12 @@ def marched_integral(
             camera = [depth + shift * more for depth, more in zip(depths, added, strict=True)]
             depths = [depth + more for depth, more in zip(depths, added, strict=True)]
         reached = (between.width > 0) & lit(x)
-        return index + 1, before, depths, total + dr.select(reached, airlight.source(x, camera), 0) * length
+        return (
+            index + 1,
+            before,
+            depths,
+            total + dr.select(reached, airlight.source(x, camera), 0) * length,
+        )
 
     first = airlight.medium.optical_depth(airlight.rays, 0, between.x0) if running or summed else ()
     depths = [depth + dr.zeros(Float, lanes) for depth in first]
@@ -136,7 +148,9 @@ def marched_integral(
 def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) -> Steps:
     """Return the steps of rays where a light could reach them and something scatters."""
     light, geometry = airlight.light, airlight.geometry
-    x0, x1 = airlight.medium.part(airlight.rays, type(distance)(0), distance, uniform=spacing == "uniform")
+    x0, x1 = airlight.medium.part(
+        airlight.rays, type(distance)(0), distance, uniform=spacing == "uniform"
+    )
     x0, x1 = geometry.lit_segment(x0, x1) if light.w else (x0, x1)
     at_light = (geometry.foot, geometry.height) if spacing == "equiangular" and light.w else None
     return steps_between(x0, x1, steps, at_light)

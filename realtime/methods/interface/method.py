@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A method: its parameters, what it makes of a scene, and the airlight of a light.
 
-A method is a frozen dataclass derived from `Method`; its fields are its parameters. It has two functions, each for one
-light: `prepare` makes the state that a scene needs once, such as a shadow map, and `airlight` returns the radiance that
-the lit media scatter into each camera ray. Everything else that a frame must know is a class attribute or property with
-a default, so a method states only what differs. A user's plain function becomes such a class too
-(`realtime.methods.user_method`).
+A method is a frozen dataclass derived from `Method`; its fields are its parameters. It has two
+functions, each for one light: `prepare` makes the state that a scene needs once, such as a shadow
+map, and `airlight` returns the radiance that the lit media scatter into each camera ray. Everything
+else that a frame must know is a class attribute or property with a default, so a method states only
+what differs. A user's plain function becomes such a class too (`realtime.methods.user_method`).
 
 A frame shows
 
     surface * visibility * transmittance + in_scattered + transmittance * background,
 
-in which `surface` is the light of a lamp that the visible surface reflects to the camera, through the medium of the
-scene and without shadows, summed over the lamps.
+in which `surface` is the light of a lamp that the visible surface reflects to the camera, through
+the medium of the scene and without shadows, summed over the lamps.
 
 A method is given a view: the camera rays of a frame, the lights and the media.
 """
@@ -38,7 +38,9 @@ from airlight.realtime.scene.read_scene import Scene, SceneFeatures
 
 @dataclass(frozen=True)
 class View(Rays):
-    """The rays of a frame and all that scatters light into them, as Dr.Jit arrays with one entry per pixel."""
+    """The rays of a frame and all that scatters light into them, as Dr.Jit arrays
+    with one entry per pixel.
+    """
 
     distance: Metres  #: to the visible surface, infinite where there is none [m]
     tables: tuple[LightTable, ...]  #: the lights, a table for each structure and area light
@@ -46,16 +48,21 @@ class View(Rays):
     features: SceneFeatures  #: what the scene needs; a method leaves out the rest
     camera: Camera
     pixel: PerRay  #: pixel number of every ray: row times width plus column
-    scene: Any = None  #: the Mitsuba scene, for casting rays; None where the method says that it casts none
-    surfaces: tuple[PerRay, ...] | None = None  #: by light, what the visible surface sends back unshadowed
+    #: the Mitsuba scene, for casting rays; None where the method says that it casts none
+    scene: Any = None
+    #: by light, what the visible surface sends back unshadowed
+    surfaces: tuple[PerRay, ...] | None = None
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
     extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
-    noise: Noise | None = None  #: what draws random numbers; None for a method that does not say that it is `noisy`
+    #: what draws random numbers; None for a method that does not say that it is `noisy`
+    noise: Noise | None = None
 
     @property
     def lights(self) -> tuple[Light, ...]:
-        """The lights one by one, for code that does not loop over tables: a kernel then grows with them."""
+        """The lights one by one, for code that does not loop over tables: a
+        kernel then grows with them.
+        """
         return tuple(table[number] for table in self.tables for number in range(table.count))
 
     @property
@@ -71,11 +78,14 @@ class View(Rays):
 
     @property
     def frame(self) -> Any:
-        """The number of the frame in its run, an opaque `mi.UInt32`: a frozen method draws new numbers in each."""
+        """The number of the frame in its run, an opaque `mi.UInt32`: a frozen method
+        draws new numbers in each.
+        """
         return self.random.frame
 
     def uniform(self, stream: int = 0) -> tuple[Any, Any, Any, Any]:
-        """Return four independent numbers for each ray, evenly distributed in [0, 1), other ones in each frame and run.
+        """Return four independent numbers for each ray, evenly distributed in [0, 1), other
+        ones in each frame and run.
 
         Numbers of two streams are independent.
 
@@ -84,11 +94,14 @@ class View(Rays):
         InputError
             For a method that does not say that it is noisy.
         """
-        first, second, third, fourth = map(type(self.distance), self.random.uniform(self.pixel, stream))
+        first, second, third, fourth = map(
+            type(self.distance), self.random.uniform(self.pixel, stream)
+        )
         return first, second, third, fourth
 
     def pattern(self, kind: str, *, golden: bool = False, stream: int = 0) -> PerRay:
-        """Return a number from 0 to 1 for each ray by which samples are shifted, evenly distributed over the runs.
+        """Return a number from 0 to 1 for each ray by which samples are shifted, evenly
+        distributed over the runs.
 
         Parameters
         ----------
@@ -112,11 +125,15 @@ class View(Rays):
     def random(self) -> Noise:
         """The random numbers of this frame of this run."""
         if self.noise is None:
-            raise InputError("noise: the method draws random numbers and does not say so; expected `noisy` = True")
+            raise InputError(
+                "noise: the method draws random numbers and does not say so; expected `noisy` = "
+                "True"
+            )
         return self.noise
 
     def visible(self, point, light: Any, asked=True):
-        """Return whether a light, or what else has a `shadow_ray`, reaches points [m], by rays where they are `asked`.
+        """Return whether a light, or what else has a `shadow_ray`, reaches points [m], by
+        rays where they are `asked`.
 
         Raises
         ------
@@ -124,7 +141,10 @@ class View(Rays):
             For a method that says that it casts no rays.
         """
         if self.scene is None:
-            raise InputError("visible: the method says that it casts no rays, and asks for some; expected `casts_rays`")
+            raise InputError(
+                "visible: the method says that it casts no rays, and asks for some; expected "
+                "`casts_rays`"
+            )
         return ~self.scene.ray_test(light.shadow_ray(point), asked)
 
     def geometry(self, light: Light) -> RayGeometry:
@@ -142,13 +162,22 @@ class View(Rays):
         return self.medium.lit(self, light, self.geometry(light), kernel)
 
     def of_pixels(self, pixel: PerRay, distance: Metres) -> "View":
-        """Return the view of other pixels of the image; `distance` [m] is that to their visible surfaces."""
+        """Return the view of other pixels of the image; `distance` [m] is that
+        to their visible surfaces.
+        """
         rays = self.medium.rays(self.origin, *ray_directions(self.camera, pixel))
         return replace(self, **vars(rays), distance=distance, pixel=pixel)
 
 
 def camera_view(
-    camera: Camera, pixel: PerRay, distance: Metres, *, features: SceneFeatures, scene, medium: Medium, tables
+    camera: Camera,
+    pixel: PerRay,
+    distance: Metres,
+    *,
+    features: SceneFeatures,
+    scene,
+    medium: Medium,
+    tables,
 ) -> View:
     """Return the view of some pixels; `distance`: to the visible surface [m]."""
     rays = medium.rays(camera.origin, *ray_directions(camera, pixel))
@@ -156,13 +185,16 @@ def camera_view(
     return View(**vars(rays), distance=distance, tables=tables, medium=medium, **own)
 
 
-#: Parts of a scene that may change between frames; `look` is all without motion: the medium and the lights' colours.
+#: Parts of a scene that may change between frames; `look` is all without motion: the medium
+#: and the lights' colours.
 MOVABLE = ("camera", "geometry", "light", "look")
 
-#: Preparation of a frame when things moved: a function of the present scene that returns the method's state.
+#: Preparation of a frame when things moved: a function of the present scene that
+#: returns the method's state.
 Preparation = Callable[[Scene], Any]
 
-#: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.
+#: A cause of errors, and the values of parameters with which it is gone; None: all
+#: that the method has left.
 ErrorCause = tuple[str, Mapping[str, Any] | None]
 
 
@@ -171,12 +203,15 @@ class Layers:
     """The results of a method for every ray. Layers that it leaves out cost nothing."""
 
     in_scattered: PerRay  #: radiance that the media scatter into the ray, a colour [W/(m^2 sr)]
-    #: By light, or by source (`Method.by_source`), which fraction of it reaches the surface: 0 to 1, or a mask; None:
-    #: shadow rays say it.
+    #: By light, or by source (`Method.by_source`), which fraction of it reaches the surface: 0 to
+    #: 1, or a mask; None: shadow rays say it.
     visibility: tuple[PerRay, ...] | None = None
-    transmittance: PerRay | None = None  #: of what the method adds to the scene's media; None: all passes
-    background: PerRay | None = None  #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
-    #: Further layers of the image by their names, radiance [W/(m^2 sr)] or fractions, only where the view asks for them
+    #: of what the method adds to the scene's media; None: all passes
+    transmittance: PerRay | None = None
+    #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
+    background: PerRay | None = None
+    #: Further layers of the image by their names, radiance [W/(m^2 sr)] or fractions, only
+    #: where the view asks for them
     extra: Mapping[str, PerRay] | None = None
     carried: Any = None  #: arrays that the next frame finds in its view; see `Method.carries`
 
@@ -185,36 +220,46 @@ class Layers:
 class Method(Parameters):
     """A method with the values of its parameters.
 
-    Most methods have `prepare` and `airlight`. One that looks at all lights together overrides `preparation` and
-    `render` instead.
+    Most methods have `prepare` and `airlight`. One that looks at all lights together overrides
+    `preparation` and `render` instead.
     """
 
     name: ClassVar[str] = ""
     summary: ClassVar[str] = "a user method"  #: what it does, for tables
     source: ClassVar[str] = "the user"  #: the paper
     as_published: ClassVar[str] = ""  #: the method that does what the paper does
-    shadows: ClassVar[bool] = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces, and has
-    #: `Layers.extra` by order of scattering.
+    #: whether it knows shadows; one that does not is wrong where there are occluders
+    shadows: ClassVar[bool] = True
+    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate
+    #: the surfaces, and has `Layers.extra` by order of scattering.
     renders_clouds: ClassVar[bool] = False
     light_samples: ClassVar[LightSamples] = LightSamples()  #: how it renders area lights by default
 
     # Facts for the frame. Each may be a property that follows from the parameters.
-    prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)  #: what `prepare` looks at; else its state is kept
+    #: what `prepare` looks at; else its state is kept
+    prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)
     provides_visibility: ClassVar[bool] = False  #: whether it says which surfaces its lights reach
-    by_rays: ClassVar[bool] = False  #: whether each ray is computed by itself, so that any pixels can be rendered alone
+    #: whether each ray is computed by itself, so that any pixels can be rendered alone
+    by_rays: ClassVar[bool] = False
     frozen: ClassVar[bool] = True  #: whether Dr.Jit can record it once and replay it
-    at_once: ClassVar[bool] = False  #: whether it is given all lights and light samples of a frame at once
-    by_table: ClassVar[bool] = False  #: whether `airlight` has no state: lights that are alike are then one loop
-    by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
-    carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
-    history: ClassVar[Any] = None  #: how frames are averaged (`realtime.methods.history.History`); None: not at all
+    #: whether it is given all lights and light samples of a frame at once
+    at_once: ClassVar[bool] = False
+    #: whether `airlight` has no state: lights that are alike are then one loop
+    by_table: ClassVar[bool] = False
+    #: whether its visibility has one entry for all samples of an area light
+    by_source: ClassVar[bool] = False
+    #: whether it hands arrays on to the next frame, as `Layers.carried`
+    carries: ClassVar[bool] = False
+    #: how frames are averaged (`realtime.methods.history.History`); None: not at all
+    history: ClassVar[Any] = None
 
     def check(self, scene: Scene) -> None:
         """Refuse a scene, by `InputError`, that the method with these parameters cannot render."""
 
     def prepare(self, scene: Scene, light: Light) -> Any:
-        """Return the state for `airlight` of a scene and one light; called only where something casts a shadow."""
+        """Return the state for `airlight` of a scene and one light; called only where
+        something casts a shadow.
+        """
 
     def airlight(self, view: View, light: Light, state: Any, kernel: Any) -> Any:
         """Return the radiance that one light has scattered into every ray [W/(m^2 sr)].
@@ -233,12 +278,15 @@ class Method(Parameters):
         Returns
         -------
         radiance
-            A colour. Where `provides_visibility`, a pair: that, and which fraction of the light reaches the surface.
+            A colour. Where `provides_visibility`, a pair: that, and which fraction of the
+            light reaches the surface.
         """
         raise NotImplementedError
 
     def preparation(self, scene: Scene) -> Preparation:
-        """Return a function that makes the state of all lights; constant data of the scene are read here."""
+        """Return a function that makes the state of all lights; constant data of
+        the scene are read here.
+        """
         if self.by_table or not scene.features.shadows:
             return no_state
         return lambda now: tuple(self.prepare(now, light) for light in now.lights)
@@ -266,19 +314,24 @@ class Method(Parameters):
 
     @property
     def casts_rays(self) -> bool:
-        """Whether it asks `View.visible` or the geometry: by default, with the parameter shadow=ray."""
+        """Whether it asks `View.visible` or the geometry: by default, with
+        the parameter shadow=ray.
+        """
         return getattr(self, "shadow", "") == "ray"
 
     @property
     def noisy(self) -> bool:
-        """Whether its image depends on the number of the run, as `View.run`: by default, by the word `jitter`."""
+        """Whether its image depends on the number of the run, as `View.run`: by
+        default, by the word `jitter`.
+        """
         jitter = getattr(self, "jitter", "none")
         return isinstance(jitter, str) and jitter != "none"
 
     def error_causes(self, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
         """Return the causes of its errors in an image of that size [pixels].
 
-        They come in the order in which `airlight study decomposition` takes them away, one on top of the other.
+        They come in the order in which `airlight study decomposition` takes them away,
+        one on top of the other.
         """
         return ()
 
@@ -292,22 +345,29 @@ def jitter() -> Any:
     """Return the field of the parameter by which the samples of rays are shifted."""
     return parameter(
         "none",
-        "shift of the samples of a ray: none, white noise, a mask of blue noise, or interleaved gradient noise",
+        "shift of the samples of a ray: none, white noise, a mask of blue noise, or interleaved "
+        "gradient noise",
         choices=("none", *PATTERNS),
     )
 
 
 def animate() -> Any:
-    """Return the field of the parameter by which the pattern of `jitter` changes from frame to frame."""
+    """Return the field of the parameter by which the pattern of `jitter`
+    changes from frame to frame.
+    """
     return parameter(
         "none",
-        "a new pattern in every frame, or that of frame 0 plus the frame's number times the golden ratio",
+        "a new pattern in every frame, or that of frame 0 plus the frame's number times the golden "
+        "ratio",
         choices=("none", "golden"),
     )
 
 
-def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[Method, LightSamples]:
-    """Return a method with its parameters, and those of area lights, which all methods have in common.
+def method_parameters(
+    method: type[Method], given: Mapping[str, Any]
+) -> tuple[Method, LightSamples]:
+    """Return a method with its parameters, and those of area lights, which
+    all methods have in common.
 
     `given` are values by name; a word is converted to the type of the default.
 

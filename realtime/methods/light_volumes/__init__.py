@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light volumes: what a light reaches, bounded by the height field of its shadow map, crossed without marching.
+"""Light volumes: what a light reaches, bounded by the height field of its shadow map,
+crossed without marching.
 
-A ray is a straight line over each face of the map. It descends into a pyramid of heights to the texels over which it
-crosses the height field, and adds up the lit intervals between them.
+A ray is a straight line over each face of the map. It descends into a pyramid of heights to the
+texels over which it crosses the height field, and adds up the lit intervals between them.
 
 Read in this order:
 

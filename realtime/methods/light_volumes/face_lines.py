@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera rays over a face of a shadow map: in its projective coordinates, and their lines over its texels.
+"""Camera rays over a face of a shadow map: in its projective coordinates, and
+their lines over its texels.
 
-With the camera at a0 across + b0 up + c0 axis from the light and the direction (da, db, dc) likewise, the point at x
-has
+With the camera at a0 across + b0 up + c0 axis from the light and the direction (da, db, dc)
+likewise, the point at x has
 
     u = (a0 + x da) / c,   v = (b0 + x db) / c,   s = 1 / c,   c = c0 + x dc,
 
-and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
-(1 - t) its value at one and t its value at the other, and x = y / s. At the end of an unbounded ray s = 0 and y = 1 /
-dc.
+and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points
+of the ray, each is (1 - t) its value at one and t its value at the other, and x = y / s. At the end
+of an unbounded ray s = 0 and y = 1 / dc.
 
-On the face of a directional light u, v and s are linear in x itself, so y = x with weight 1 in place of s; the ray is
-cut where s = 0, and all before the largest height is lit.
+On the face of a directional light u, v and s are linear in x itself, so y = x with weight 1 in
+place of s; the ray is cut where s = 0, and all before the largest height is lit.
 
-The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
-border of two faces is in one of them, that of the first axis: neighbours compute the same numbers there, with opposite
-signs. The line t goes over the part of it beyond the nearest height of the face: all before that is lit.
+The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray
+that stays on the border of two faces is in one of them, that of the first axis: neighbours compute
+the same numbers there, with opposite signs. The line t goes over the part of it beyond the nearest
+height of the face: all before that is lit.
 """
 
 from dataclasses import dataclass
@@ -25,7 +27,12 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.methods.light_volumes.texel_walls import height_in, parts_of
-from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds, texel_heights, texel_walls
+from airlight.realtime.shadow_maps.inverse_depth_field import (
+    InverseDepthField,
+    node_bounds,
+    texel_heights,
+    texel_walls,
+)
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
 _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
@@ -60,8 +67,8 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
     begin, end = segment
     if not heights.projection.w:
         begin, end = _cut(begin, end, s0, ds)
-    # The neighbours across come later in the order of axes, except for the last axis; those above only for the first
-    # one.
+    # The neighbours across come later in the order of axes, except for the last axis; those
+    # above only for the first one.
     for start, slope, is_first in (
         (c0 + a0, dc + da, face < 4),
         (c0 - a0, dc - da, face < 4),
@@ -76,8 +83,9 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
 def face_ray(heights: InverseDepthField, face, away, direction, segment) -> FaceRay:
     """Return rays in a face.
 
-    `heights`: the height field; `face`: number of the face; `away`: the camera less the light [m]; `direction`: unit
-    directions; `segment`: the distances (x0, x1) of the part in the face; `x1` may be infinite.
+    `heights`: the height field; `face`: number of the face; `away`: the camera less the light [m];
+    `direction`: unit directions; `segment`: the distances (x0, x1) of the part in the face; `x1`
+    may be infinite.
     """
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
@@ -85,10 +93,16 @@ def face_ray(heights: InverseDepthField, face, away, direction, segment) -> Face
     zero = mi.UInt32(0)
     _, highest = node_bounds(heights, face, zero, zero, zero)
     if not heights.projection.w:
-        (*_, c0), (*_, dc) = (heights.projection.products(face, vector) for vector in (away, direction))  # -s
+        # -s
+        (*_, c0), (*_, dc) = (
+            heights.projection.products(face, vector) for vector in (away, direction)
+        )
         t0, t1 = _cut(begin, end, highest / _NEARER + c0, dc)
         walks = (t0 < t1) & (highest > 0)
-        ends = [_parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, ds), walks) for x in (t0, t1)]
+        ends = [
+            _parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, ds), walks)
+            for x in (t0, t1)
+        ]
         return _face_ray(begin, end, walks, ends, parallel=True)
     nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)
@@ -126,7 +140,9 @@ def _coordinates(size: int, x, origin, direction, nearest):
 
 
 def _parallel_coordinates(size: int, x, origin, direction, walks):
-    """Return u, v [texels], s and x of the point at x, or of any point where the line does not walk."""
+    """Return u, v [texels], s and x of the point at x, or of any point
+    where the line does not walk.
+    """
     at = dr.select(walks, x, 0)
     a, b, s = (dr.fma(at, d, o) for o, d in zip(origin, direction))
     half = 0.5 * size
@@ -158,11 +174,14 @@ class Line:
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
     cells: tuple[tuple[Any, Any], tuple[Any, Any]]  #: column and row of the texels that they lie in
-    slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
+    #: how far below the height field a point at t = 1 may seem that lies on what it samples
+    slack: Any
 
 
 def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
-    """Return the line of a ray in a face; D at its ends is that of the texel whose borders lie about them."""
+    """Return the line of a ray in a face; D at its ends is that of the texel
+    whose borders lie about them.
+    """
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
@@ -181,10 +200,12 @@ def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
 
 
 def _height_in(heights, texel, four, x, y):
-    """Return the height at a point of a texel with four heights, and how far below it a lit surface may seem to be.
+    """Return the height at a point of a texel with four heights, and how far below it a
+    lit surface may seem to be.
 
-    That distance is the range of the heights, as the surface may do anything between the samples. Next to a wall it is
-    half the range: there the only question is on which of two surfaces the point lies.
+    That distance is the range of the heights, as the surface may do anything between the samples.
+    Next to a wall it is half the range: there the only question is on which of two surfaces the
+    point lies.
     """
     s00, s10, s01, s11 = four
     below = x >= y
@@ -201,14 +222,19 @@ def _height_in(heights, texel, four, x, y):
 def cell_at(pair, per, t, low, side):
     """Return the column (or row) of a strip of texels whose own borders are on either side of t.
 
-    The strip begins at texel `low`; `pair` is the coordinate at the ends of the line and `per` its inverse change.
+    The strip begins at texel `low`; `pair` is the coordinate at the ends of the line and
+    `per` its inverse change.
     """
     first, last = mi.Int32(low), mi.Int32(low + side) - 1
     cell = dr.clip(mi.Int32(dr.floor(at_line(pair, t))), first, last)
     # Rounding may have put it one too far, or not far enough.
     begin, end = borders(type(t)(cell), pair[0], per)
     step = dr.select(per > 0, mi.Int32(1), mi.Int32(-1))
-    return mi.UInt32(dr.clip(dr.select(t >= end, cell + step, dr.select(t < begin, cell - step, cell)), first, last))
+    return mi.UInt32(
+        dr.clip(
+            dr.select(t >= end, cell + step, dr.select(t < begin, cell - step, cell)), first, last
+        )
+    )
 
 
 def borders(low, start, per):

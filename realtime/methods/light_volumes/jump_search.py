@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Upright walls of a light volume: where between two samples of a shadow map its depth jumps.
 
-As published (Billeter, Sintorn, Assarsson 2010), a silhouette of what the light sees is joined to what lies behind it
-by triangles across one texel: next to its occluder the shadow begins at the occluder's last sample, far behind it at
-the first sample of the background. The real surface of the shadow is upright there, in a plane through the light,
-and stands somewhere between the two samples. The same error stands along the whole ray, so it does not average out.
+As published (Billeter, Sintorn, Assarsson 2010), a silhouette of what the light sees is joined to
+what lies behind it by triangles across one texel: next to its occluder the shadow begins at the
+occluder's last sample, far behind it at the first sample of the background. The real surface of the
+shadow is upright there, in a plane through the light, and stands somewhere between the two samples.
+The same error stands along the whole ray, so it does not average out.
 
-Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of the larger one, rays
-from the light halve the interval between the samples `_HALVINGS` times, each time keeping the half with the larger
-change of height. The last interval holds a small part of the change of a slope, and the side stays as it is; it holds
-the whole change of a jump, and a wall is put in its middle. That is the idea of silhouette maps (Sen, Cammarano,
-Hanrahan 2003), for volumes; the map itself stays as it was.
+Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of
+the larger one, rays from the light halve the interval between the samples `_HALVINGS` times, each
+time keeping the half with the larger change of height. The last interval holds a small part of the
+change of a slope, and the side stays as it is; it holds the whole change of a jump, and a wall is
+put in its middle. That is the idea of silhouette maps (Sen, Cammarano, Hanrahan 2003), for volumes;
+the map itself stays as it was.
 """
 
 from dataclasses import dataclass
@@ -19,7 +21,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
+from airlight.realtime.methods.light_volumes.texel_walls import (
+    BOTTOM,
+    LEFT,
+    PLACES,
+    RIGHT,
+    TOP,
+    walled_heights,
+)
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start
 from airlight.realtime.shadow_maps.shadow_map import cast_map_rays
@@ -27,15 +36,16 @@ from airlight.realtime.shadow_maps.shadow_map import cast_map_rays
 _HALVINGS = PLACES.bit_length() - 1
 _JUMP = 0.05  # of the larger height: walls lower than that are left slanted
 _KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
-LEAF = 4  #: texels on a side of the nodes in which sides are looked for, those two levels above the texels
+#: texels on a side of the nodes in which sides are looked for, those two levels above the texels
+LEAF = 4
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
 
 
 def with_walls(heights: InverseDepthField, scene, light: Light) -> InverseDepthField:
     """Return a height field with upright walls where the map of a light jumps.
 
-    `heights`: the height field of the light's map; `scene`: the Mitsuba scene that the map was cast in; `light`: the
-    light.
+    `heights`: the height field of the light's map; `scene`: the Mitsuba scene that the map was
+    cast in; `light`: the light.
     """
     walls = dr.zeros(mi.UInt32, heights.faces * heights.size**2)
     leaf, side = _jumping_sides(heights)
@@ -71,7 +81,9 @@ def _jumping_sides(heights: InverseDepthField):
     leaf = dr.arange(mi.UInt32, heights.faces * per_face)
     face = leaf // per_face
     node = face * heights.nodes + level_start(heights.finest - 2) + (leaf - face * per_face)
-    low, high = (dr.gather(type(heights.bounds), heights.bounds, 2 * node + which) for which in (0, 1))
+    low, high = (
+        dr.gather(type(heights.bounds), heights.bounds, 2 * node + which) for which in (0, 1)
+    )
     leaf = dr.compress(high - low > _JUMP * high)
     if not dr.width(leaf):
         return leaf, leaf
@@ -82,7 +94,9 @@ def _jumping_sides(heights: InverseDepthField):
     # The far border of a leaf belongs to the next one, except for the last.
     outer = dr.select(edge.upright, edge.i, edge.j)
     own = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
-    some = dr.compress(own & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height)))
+    some = dr.compress(
+        own & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height))
+    )
     return dr.gather(mi.UInt32, of_leaf, some), dr.gather(mi.UInt32, side, some)
 
 
@@ -94,11 +108,15 @@ def _ends(heights: InverseDepthField, edge: _Edge):
     # The corners of a texel: 0, 1, 2 and 3 at (0, 0), (1, 0), (0, 1) and (1, 1).
     first = 4 * texel + (edge.i - i) + 2 * (edge.j - j)
     step = dr.select(edge.upright, mi.UInt32(2), mi.UInt32(1))
-    return tuple(dr.gather(type(heights.texels), heights.texels, place) for place in (first, first + step))
+    return tuple(
+        dr.gather(type(heights.texels), heights.texels, place) for place in (first, first + step)
+    )
 
 
 def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
-    """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
+    """Find the walls on sides and write them to both texels of each; return the
+    numbers of these texels.
+    """
     edge = _edge_of(heights, *sides)
     begin_height, end_height = _ends(heights, edge)
     Double, size = mi.Float64, heights.size
@@ -109,10 +127,17 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
         u = dr.fma(dr.select(edge.upright, column, column + middle), 2.0 / size, -1.0)
         v = dr.fma(dr.select(edge.upright, row + middle, row), 2.0 / size, -1.0)
         distance = cast_map_rays(scene, light, (edge.face, u, v))
-        height = heights.projection.inverse_depth((type(begin_height)(u), type(begin_height)(v)), distance)
+        height = heights.projection.inverse_depth(
+            (type(begin_height)(u), type(begin_height)(v)), distance
+        )
         far = dr.abs(height - begin_height) < dr.abs(height - end_height)
         number = (number << 1) + dr.select(far, mi.UInt32(1), mi.UInt32(0))
-        return step + 1, number, dr.select(far, height, begin_height), dr.select(far, end_height, height)
+        return (
+            step + 1,
+            number,
+            dr.select(far, height, begin_height),
+            dr.select(far, end_height, height),
+        )
 
     step = dr.zeros(mi.UInt32, dr.width(begin_height))
     _, number, low, high = dr.while_loop(
@@ -125,13 +150,17 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
     behind = (edge.face * size + edge.j) * size + edge.i
     before = behind - dr.select(edge.upright, mi.UInt32(1), mi.UInt32(size))
     place = dr.select(edge.upright, edge.i, edge.j)
-    for shifts, texel, active in (((BOTTOM, LEFT), behind, place < size), ((TOP, RIGHT), before, place > 0)):
+    for shifts, texel, active in (
+        ((BOTTOM, LEFT), behind, place < size),
+        ((TOP, RIGHT), before, place > 0),
+    ):
         level, upright = (mi.UInt32(8 * side) for side in shifts)
         number_there = (number + 1) << dr.select(edge.upright, upright, level)
         dr.scatter_reduce(dr.ReduceOp.Or, walls, number_there, texel, jumps & active)
     pair = dr.select(place < size, behind, before), dr.select(place > 0, before, behind)
     dr.eval(walls, pair)
-    # Not `dr.concat`: it would put the number of sides into a kernel, which each light that moves would compile again.
+    # Not `dr.concat`: it would put the number of sides into a kernel, which each light that
+    # moves would compile again.
     lane = dr.arange(mi.UInt32, 2 * dr.width(place))
     first, second = (dr.gather(mi.UInt32, texels, lane >> 1) for texels in pair)
     return dr.select((lane & 1) == 0, first, second)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light volumes: volumetric shadows from a shadow map, without marching (Billeter, Sintorn, Assarsson 2010).
+"""Light volumes: volumetric shadows from a shadow map, without marching (Billeter,
+Sintorn, Assarsson 2010).
 
-A light reaches directly the volume between itself and the surface that its shadow map samples. A camera
-ray enters and leaves this volume at crossings with its boundary, the height field of
-`realtime.shadow_maps.inverse_depth_field`. Each ray descends into a pyramid of heights to the texels that
-it may cross (`realtime.methods.light_volumes.walk`); the intervals between crossings are integrated one
-by one, which keeps the digits that a difference of two Gammas, the paper's eq. 3, loses. Where the map
-jumps the boundary stands upright, at a place that rays from the light find
+A light reaches directly the volume between itself and the surface that its shadow map samples. A
+camera ray enters and leaves this volume at crossings with its boundary, the height field of
+`realtime.shadow_maps.inverse_depth_field`. Each ray descends into a pyramid of heights to the
+texels that it may cross (`realtime.methods.light_volumes.walk`); the intervals between crossings
+are integrated one by one, which keeps the digits that a difference of two Gammas, the paper's eq.
+3, loses. Where the map jumps the boundary stands upright, at a place that rays from the light find
 (`realtime.methods.light_volumes.jump_search`). `realtime.methods.published.billeter2010` draws the
 boundary as a mesh.
 """
@@ -23,22 +24,27 @@ from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field, level_start
 from airlight.realtime.shadow_maps.projection import light_faces
-from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
+from airlight.realtime.shadow_maps.shadow_map import (
+    cast_shadow_map,
+    check_maps,
+    map_memory,
+    map_size,
+)
 
 
 @dataclass(frozen=True)
 class LightVolumes(Method):
     """The airlight in light volumes.
 
-    Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
-    and its shadows on surfaces always come from rays. Exact with respect to the shadow map: what it misses of the scene
-    falls as the size of a texel. A map without hits lights everything; a light inside a closed occluder lights nothing
-    outside it.
+    Valid for all lights and any shapes that rays can be cast against; the map of a directional
+    light covers the media, and its shadows on surfaces always come from rays. Exact with respect to
+    the shadow map: what it misses of the scene falls as the size of a texel. A map without hits
+    lights everything; a light inside a closed occluder lights nothing outside it.
 
     References
     ----------
-    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
-    Graphics.
+    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*,
+    High Performance Graphics.
     """
 
     name = "light-volumes"
@@ -59,7 +65,9 @@ class LightVolumes(Method):
     def check(self, scene):
         """Refuse more memory than the machine has."""
         if scene.features.shadows:
-            check_maps(scene.lights, self.map, sum(_memory_of(light, self.map) for light in scene.lights))
+            check_maps(
+                scene.lights, self.map, sum(_memory_of(light, self.map) for light in scene.lights)
+            )
 
     def prepare(self, scene, light):
         """Return the height field of a light."""
@@ -79,7 +87,8 @@ class LightVolumes(Method):
             integral=rays.airlight,
             zero=rays.nothing(dr.width(view.distance)),
         )
-        # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
+        # A surface may be beside the map of a directional light, whose shadows on
+        # surfaces come from rays.
         return rays.radiance(total), reached if light.w else True
 
     def error_causes(self, size):

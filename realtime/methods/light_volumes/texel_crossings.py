@@ -3,7 +3,8 @@
 
 This is one step of `realtime.methods.light_volumes.walk`.
 
-With D = s of the ray - height, a ray is lit where D > 0. On the borders of texels, D is the same number for both.
+With D = s of the ray - height, a ray is lit where D > 0. On the borders of texels, D is
+the same number for both.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,8 @@ class Passage:
 
     place: tuple[Any, Any]  #: column and row of the texel [texels]
     four: Any  #: its heights s00, s10, s01, s11 [1/m]
-    walls: Any  #: its walls, see `realtime.methods.light_volumes.jump_search`; None where no texel has any
+    #: its walls, see `realtime.methods.light_volumes.jump_search`; None where no texel has any
+    walls: Any
     t: tuple[Any, Any]  #: where the line enters and leaves the texel, or begins and ends in it
     excess: tuple[Any, Any]  #: D there
     ends: Any  #: whether the ray ends in the texel
@@ -70,28 +72,38 @@ def passage(heights, face, line: Line, texel) -> Passage:
     walls = None if heights.walls is None else texel_walls(heights, face, *texel)
     near_near, near_far, far_near, far_far = _as_seen(line, four)
     pair = near_near, dr.select(by_u, near_far, far_near)
-    d0 = _excess_on_border(line, place, begin, by_u, pair, _wall_on_border(line, walls, by_u, False))
+    d0 = _excess_on_border(
+        line, place, begin, by_u, pair, _wall_on_border(line, walls, by_u, False)
+    )
     d0 = dr.select(starts, line.excess[0], d0)
     pair = dr.select(out_by_u, far_near, near_far), far_far
-    d1 = _excess_on_border(line, place, end, out_by_u, pair, _wall_on_border(line, walls, out_by_u, True))
+    d1 = _excess_on_border(
+        line, place, end, out_by_u, pair, _wall_on_border(line, walls, out_by_u, True)
+    )
     d1 = dr.select(ends, line.excess[1], d1)
     return Passage(place, four, walls, (begin, end), (d0, d1), ray.stops & ends)
 
 
 def texel_crossings(line: Line, over: Passage) -> TexelCrossings:
-    """Return where a ray crosses the height field in a texel: over its two triangles, or its two parts at a wall.
+    """Return where a ray crosses the height field in a texel: over its two triangles, or
+    its two parts at a wall.
 
-    In a texel with a wall, a ray that is lit at one end only crosses once, at the first change: from the border to the
-    part, over it, at the wall, over the other part, or from there to the border. If the ray ends in the texel, rounding
-    may decide the sign of D at its end, as the surface is the height field: the first two changes count.
+    In a texel with a wall, a ray that is lit at one end only crosses once, at the first change:
+    from the border to the part, over it, at the wall, over the other part, or from there to the
+    border. If the ray ends in the texel, rounding may decide the sign of D at its end, as the
+    surface is the height field: the first two changes count.
     """
     (begin, end), (from_light, to_light) = over.t, over.lit
     middle, before = _on_diagonal(line, over)
     if over.walls is None:
         first, last = (before > 0) != from_light, (before > 0) != to_light
-        early, late = _zeros((begin, middle, end), (over.excess[0], before), (before, over.excess[1]))
+        early, late = _zeros(
+            (begin, middle, end), (over.excess[0], before), (before, over.excess[1])
+        )
         there = begin < end
-        return TexelCrossings(there & (first | last), dr.select(first, early, late), there & first & last, late)
+        return TexelCrossings(
+            there & (first | last), dr.select(first, early, late), there & first & last, late
+        )
     walled = over.walls != 0
     plain = middle, over.excess[0], before, before, over.excess[1]
     middle, *excess = (dr.select(walled, *pair) for pair in zip(_on_wall(line, over), plain))
@@ -121,7 +133,9 @@ def _zero_between(t, excess):
 
 
 def _on_diagonal(line: Line, over: Passage):
-    """Return where the line crosses the diagonal of a texel, and D there; its end where it does not."""
+    """Return where the line crosses the diagonal of a texel, and D there;
+    its end where it does not.
+    """
     ray, (column, row), (begin, end), four = line.ray, over.place, over.t, over.four
     middle = ((ray.u[0] - column) - (ray.v[0] - row)) * ray.per_diagonal
     bends = (middle > begin) & (middle < end)
@@ -131,13 +145,16 @@ def _on_diagonal(line: Line, over: Passage):
 
 
 def _on_wall(line: Line, over: Passage):
-    """Return where the line crosses that between the parts of a texel, or its end, and D as the parts have it.
+    """Return where the line crosses that between the parts of a texel, or its end,
+    and D as the parts have it.
 
     Where the line enters, before and behind the wall, and where it leaves.
     """
     ray, (begin, end) = line.ray, over.t
     parts = parts_of(over.four, over.walls, type(ray.begin))
-    x, y = ([at_line(pair, t) - low for t in over.t] for pair, low in zip((ray.u, ray.v), over.place))
+    x, y = (
+        [at_line(pair, t) - low for t in over.t] for pair, low in zip((ray.u, ray.v), over.place)
+    )
     at_begin, at_end = (value_at(parts.line, *point) for point in zip(x, y))
     from_second, to_second = at_begin > 0, at_end > 0
     fraction = dr.select(from_second ^ to_second, at_begin / (at_begin - at_end), 1)
@@ -149,11 +166,19 @@ def _on_wall(line: Line, over: Passage):
     def excess(place, second):
         return s[place] - height_at(parts, second, x[place], y[place])
 
-    return middle, excess(0, from_second), excess(1, from_second), excess(1, to_second), excess(2, to_second)
+    return (
+        middle,
+        excess(0, from_second),
+        excess(1, from_second),
+        excess(1, to_second),
+        excess(2, to_second),
+    )
 
 
 def _as_seen(line: Line, four):
-    """Return the heights of a texel's corners near or far in u, then near or far in v, as the line goes."""
+    """Return the heights of a texel's corners near or far in u, then near or
+    far in v, as the line goes.
+    """
     s00, s10, s01, s11 = four
     low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
     high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
@@ -170,7 +195,9 @@ def _wall_on_border(line: Line, walls, on_u, behind: bool) -> Side | None:
     bottom, top, left, right = (mi.UInt32(side) for side in (BOTTOM, TOP, LEFT, RIGHT))
     side = dr.select(on_u, dr.select(across, left, right), dr.select(upward, bottom, top))
     wall = side_of(walls, side, type(line.ray.begin))
-    return Side(wall.stands, dr.select(dr.select(on_u, line.up, line.right), wall.place, 1 - wall.place))
+    return Side(
+        wall.stands, dr.select(dr.select(on_u, line.up, line.right), wall.place, 1 - wall.place)
+    )
 
 
 def _excess_on_border(line: Line, texel, t, on_u, pair, wall: Side | None):

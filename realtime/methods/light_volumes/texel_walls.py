@@ -1,24 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The height field over a texel on whose sides upright walls stand: see `realtime.methods.light_volumes.jump_search`.
+"""The height field over a texel on whose sides upright walls stand: see
+`realtime.methods.light_volumes.jump_search`.
 
-A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
-texels of a side hold the same byte. On a side with a wall the height jumps at the wall from the height of one corner to
-the height of the other; on a side without, it is linear. A side looks the same from both of its texels, so the rule for
-crossings in `realtime.methods.light_volumes.walk` still holds: the number of changes of sign between two ends of a ray
-says whether both are lit.
+A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where
+the wall stands. Both texels of a side hold the same byte. On a side with a wall the height jumps at
+the wall from the height of one corner to the height of the other; on a side without, it is linear.
+A side looks the same from both of its texels, so the rule for crossings in
+`realtime.methods.light_volumes.walk` still holds: the number of changes of sign between two ends of
+a ray says whether both are lit.
 
-One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
+One straight line divides the texel into two parts, each under a plane; where these differ a
+wall stands on the line:
 
-* where walls on two sides that meet cut a corner off, the line joins them. The corner's part has its height, the other
-  the plane through the other three corners;
-* where walls stand on two sides across from each other, the line joins them. Each part has the heights of the side that
-  lies in it;
+* where walls on two sides that meet cut a corner off, the line joins them. The corner's part has
+  its height, the other the plane through the other three corners;
+* where walls stand on two sides across from each other, the line joins them. Each part has the
+  heights of the side that lies in it;
 * else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
 
-A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that rays go
-by. Next to a corner that is cut off, the border and the plane differ by the slope over a part of a texel. If three or
-four sides have walls, one or two walls end at the border: there a step stands on the border itself, and the border says
-which side of it is lit.
+A plane through three corners may leave their range towards the fourth: `walled_heights` widens the
+bounds that rays go by. Next to a corner that is cut off, the border and the plane differ by the
+slope over a part of a texel. If three or four sides have walls, one or two walls end at the border:
+there a step stands on the border itself, and the border says which side of it is lit.
 """
 
 from dataclasses import dataclass, replace
@@ -27,10 +30,17 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start, texel_heights
+from airlight.realtime.shadow_maps.inverse_depth_field import (
+    InverseDepthField,
+    level_start,
+    texel_heights,
+)
 
-PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
-BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
+#: on a side, where a wall may stand: what is smaller costs rays, and outlines
+#: between two sides are bent
+PLACES = 64
+#: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
+BOTTOM, TOP, LEFT, RIGHT = range(4)
 
 
 Numbers = tuple[Any, Any, Any]
@@ -45,7 +55,9 @@ class Side:
 
 
 def side_of(walls, side, Float) -> Side:
-    """Return the wall on one side of a texel with the numbers `walls`; `side` may depend on the lane."""
+    """Return the wall on one side of a texel with the numbers `walls`;
+    `side` may depend on the lane.
+    """
     number = (walls >> (8 * side)) & 0xFF
     return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
 
@@ -73,7 +85,9 @@ def parts_of(four, walls, Float) -> Parts:
     line = _select(level, (-left.place, left.place - right.place, unit), line)
     line = _select(cut, _cut_line(bottom, top, left, right), line)
     below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
-    corner = dr.select(right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00))
+    corner = dr.select(
+        right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00)
+    )
     first = (
         dr.select(cut, corner, s00),
         dr.select(cut | upright, zero, dr.select(level, below, above)),
@@ -100,9 +114,14 @@ def _cuts_corner(sides: list[Side]):
 
 
 def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
-    """Return the line through the walls of two sides that meet, below 0 at the corner between them."""
+    """Return the line through the walls of two sides that meet, below 0 at
+    the corner between them.
+    """
     Float = type(bottom.place)
-    x, y = dr.select(bottom.stands, bottom.place, top.place), dr.select(left.stands, left.place, right.place)
+    x, y = (
+        dr.select(bottom.stands, bottom.place, top.place),
+        dr.select(left.stands, left.place, right.place),
+    )
     corner_x, corner_y = dr.select(right.stands, Float(1), 0), dr.select(top.stands, Float(1), 0)
     # Distances from the corner over those of the walls from it: their sum is 1 on the line.
     per_x, per_y = dr.rcp(x - corner_x), dr.rcp(y - corner_y)
@@ -130,10 +149,11 @@ def height_in(parts: Parts, x, y):
 
 
 def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthField:
-    """Return a height field with walls in its texels, and the bounds of its nodes as these need them.
+    """Return a height field with walls in its texels, and the bounds of its
+    nodes as these need them.
 
-    `heights`: the height field; `walls`: the number of each texel; `texels`: those that may have walls; some may be
-    there more than once.
+    `heights`: the height field; `walls`: the number of each texel; `texels`: those that may have
+    walls; some may be there more than once.
     """
     bounds = heights.bounds + 0
     if dr.width(texels):
@@ -154,7 +174,9 @@ def _widen(heights: InverseDepthField, bounds, texel, walls) -> None:
     cut, (_, top, _, right) = _cuts_corner(sides), (side.stands for side in sides)
     # The plane at the corner that is cut off, the farthest that it can come to.
     ends = dr.select(right == top, four[1] + four[2], four[0] + four[3])
-    value = ends - dr.select(right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3]))
+    value = ends - dr.select(
+        right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3])
+    )
     value = dr.maximum(value, 0)  # no ray comes below
     low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
     for level in range(heights.finest + 1):

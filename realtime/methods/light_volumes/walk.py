@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lit intervals of camera rays in a light volume, by a descent into the pyramid of its heights.
 
-A ray goes over the faces of the map in the order in which it passes them. Over a face its line in (u, v) goes from node
-to node of the pyramid of bounds (`realtime.shadow_maps.inverse_depth_field`). With D(t) = s of the ray - height, a node
-over which the ray is above the largest height is lit as a whole, one over which it is below the least is dark; the ray
-steps to its neighbour, one level up where the border is that of the parent too. Into any other node it descends, down
-to the texels. In a texel it crosses the height field not at all, once, or twice
-(`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a whole
-(`realtime.intervals`). Crossings therefore come in the order of the ray.
+A ray goes over the faces of the map in the order in which it passes them. Over a face its line in
+(u, v) goes from node to node of the pyramid of bounds (`realtime.shadow_maps.inverse_depth_field`).
+With D(t) = s of the ray - height, a node over which the ray is above the largest height is lit as a
+whole, one over which it is below the least is dark; the ray steps to its neighbour, one level up
+where the border is that of the parent too. Into any other node it descends, down to the texels. In
+a texel it crosses the height field not at all, once, or twice
+(`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a
+whole (`realtime.intervals`). Crossings therefore come in the order of the ray.
 
-The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from these four borders
-alone. Two neighbours therefore see the same number t between them and, if they are texels, the same two heights: the
-sign of D, lit or not, is the same for both. A whole node says by itself whether it is lit; where rounding makes this
-differ from the ray before the node, the change is at the beginning of the node.
+The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from
+these four borders alone. Two neighbours therefore see the same number t between them and, if they
+are texels, the same two heights: the sign of D, lit or not, is the same for both. A whole node says
+by itself whether it is lit; where rounding makes this differ from the ray before the node, the
+change is at the beginning of the node.
 
 Lit intervals that meet at the border of two faces are one interval.
 """
@@ -24,8 +26,21 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
-from airlight.realtime.methods.light_volumes.face_lines import Line, at_line, distance_at, face_ray, in_face, line_of
+from airlight.realtime.intervals import (
+    LitIntervals,
+    add_waiting,
+    close_interval,
+    no_intervals,
+    sum_at_end,
+)
+from airlight.realtime.methods.light_volumes.face_lines import (
+    Line,
+    at_line,
+    distance_at,
+    face_ray,
+    in_face,
+    line_of,
+)
 from airlight.realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
 from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
@@ -49,15 +64,22 @@ class _Walk:
 
 
 def sum_lit_intervals(
-    heights: InverseDepthField, *, away, direction, segment, integral: Callable[[Any, Any], Any], zero
+    heights: InverseDepthField,
+    *,
+    away,
+    direction,
+    segment,
+    integral: Callable[[Any, Any], Any],
+    zero,
 ):
     """Add up an integral over the lit intervals of every ray.
 
-    `heights`: the height field; `away`: the camera less the light [m]; `direction`: unit directions of the rays;
-    `segment`: distances (x0, x1) between which to look; `x1` may be infinite [m]; function (x0, x1) -> value of one
-    interval; `zero`: the value of no interval, one for each ray. Returns `total`: sum over the lit intervals; `lit`:
-    whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of the
-    heights over a texel as its bias.
+    `heights`: the height field; `away`: the camera less the light [m]; `direction`: unit directions
+    of the rays; `segment`: distances (x0, x1) between which to look; `x1` may be infinite [m];
+    function (x0, x1) -> value of one interval; `zero`: the value of no interval, one for each ray.
+    Returns `total`: sum over the lit intervals; `lit`: whether the light reaches what is at the end
+    of the segment: a hard shadow by the shadow map, with the range of the heights over a texel as
+    its bias.
     """
     x0, x1 = segment
     width = dr.width(direction, zero)
@@ -114,7 +136,9 @@ def sum_lit_intervals(
 
 
 def _faces_in_order(heights: InverseDepthField, away, direction, segment):
-    """Return the faces that rays pass in the order of their beginnings, three bits each, the first in the lowest."""
+    """Return the faces that rays pass in the order of their beginnings, three bits each,
+    the first in the lowest.
+    """
     begins = []
     for face in range(heights.faces):
         begin, end = in_face(heights, mi.UInt32(face), away, direction, segment)
@@ -133,21 +157,27 @@ def _faces_in_order(heights: InverseDepthField, away, direction, segment):
 
 @dataclass
 class _Way:
-    """The line of a ray over a face, counted from where it comes from: columns and rows rise along it."""
+    """The line of a ray over a face, counted from where it comes from:
+    columns and rows rise along it.
+    """
 
     heights: InverseDepthField
     face: Any
     line: Line
-    mirror: tuple[Any, Any]  #: columns and rows of the face are these numbers with those bits the other way round
+    #: columns and rows of the face are these numbers with those bits the other way round
+    mirror: tuple[Any, Any]
     start: tuple[Any, Any]  #: columns and rows of the line at t = 0 [texels]
     per: tuple[Any, Any]  #: dt a column and a row
 
 
 def _way(heights: InverseDepthField, face, line: Line) -> _Way:
     ray, last = line.ray, heights.size - 1
-    mirror = tuple(dr.select(rises, mi.UInt32(0), mi.UInt32(last)) for rises in (line.right, line.up))
+    mirror = tuple(
+        dr.select(rises, mi.UInt32(0), mi.UInt32(last)) for rises in (line.right, line.up)
+    )
     start = tuple(
-        dr.select(rises, pair[0], heights.size - pair[0]) for rises, pair in ((line.right, ray.u), (line.up, ray.v))
+        dr.select(rises, pair[0], heights.size - pair[0])
+        for rises, pair in ((line.right, ray.u), (line.up, ray.v))
     )
     return _Way(heights, face, line, mirror, start, (dr.abs(ray.per_u), dr.abs(ray.per_v)))
 
@@ -155,7 +185,8 @@ def _way(heights: InverseDepthField, face, line: Line) -> _Way:
 def _next_interval(way: _Way, walk: _Walk, integral) -> _Walk:
     """Go on to the end of a lit interval, or of the line, and integrate.
 
-    Rays whose intervals end at different places wait for one another here: an integral costs as much as many steps.
+    Rays whose intervals end at different places wait for one another here: an integral
+    costs as much as many steps.
     """
     (walk,) = dr.while_loop(
         state=(walk,),
@@ -168,7 +199,9 @@ def _next_interval(way: _Way, walk: _Walk, integral) -> _Walk:
 
 
 def _next_texel(way: _Way, walk: _Walk) -> _Walk:
-    """Go over nodes up to one that has to be looked at, and look at it: a texel, or one that is not as before it."""
+    """Go over nodes up to one that has to be looked at, and look at it: a texel, or one
+    that is not as before it.
+    """
     none = walk.done & False
 
     def step(i, j, t, shift, done, found, whole):
@@ -185,16 +218,24 @@ def _next_texel(way: _Way, walk: _Walk) -> _Walk:
     here = texel_crossings(line, over)
     crosses = found & (whole | here.crosses)
     twice = found & ~whole & here.crosses & here.twice
-    x, second = distance_at(line.ray, dr.select(whole, t, here.t)), distance_at(line.ray, here.second)
-    intervals, opened = _changed(walk.intervals, (x, second), walk.opened, walk.lit, (crosses, twice))
+    x, second = (
+        distance_at(line.ray, dr.select(whole, t, here.t)),
+        distance_at(line.ray, here.second),
+    )
+    intervals, opened = _changed(
+        walk.intervals, (x, second), walk.opened, walk.lit, (crosses, twice)
+    )
     ahead, end, there = _neighbour(way, i, j, shift)
     goes_on = found & there
     i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
-    return _Walk(i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (found & ~there))
+    return _Walk(
+        i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (found & ~there)
+    )
 
 
 def _changed(intervals: LitIntervals, x, opened, lit, changes):
-    """Return the intervals, and where the last one opened, behind a place `x` [m] where the light comes or ends.
+    """Return the intervals, and where the last one opened, behind a place `x` [m] where
+    the light comes or ends.
 
     If there are two places, one closes an interval and the other opens one; nothing may wait.
     """
@@ -220,21 +261,28 @@ def _step(way: _Way, node, was_lit, found, whole):
     # One level up where the neighbour is beyond the parent too.
     up = over & (shift < heights.finest) & ((((i ^ ahead[0]) | (j ^ ahead[1])) >> shift) > 1)
     shift = dr.select(down, shift - 1, dr.select(up, shift + 1, shift))
-    # A ray at the end of its line stays in its last node: it is looked at with the others, and must be in the map.
+    # A ray at the end of its line stays in its last node: it is looked at with the
+    # others, and must be in the map.
     goes_on = over & there
     i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
     return i, j, t, shift, over & ~there, ~over & ~down, whole
 
 
 def _neighbour(way: _Way, i, j, shift):
-    """Return the texel at which a line comes into the neighbour of a node, where, and whether there is one."""
+    """Return the texel at which a line comes into the neighbour of a node, where,
+    and whether there is one.
+    """
     ray, size = way.line.ray, way.heights.size
     Float = type(ray.begin)
     rest = (mi.UInt32(1) << shift) - 1
     next_i, next_j = (i | rest) + 1, (j | rest) + 1
-    out_u, out_v = ((Float(n) - start) * per for n, start, per in zip((next_i, next_j), way.start, way.per))
+    out_u, out_v = (
+        (Float(n) - start) * per for n, start, per in zip((next_i, next_j), way.start, way.per)
+    )
     by_u, end = out_u <= out_v, dr.minimum(dr.minimum(out_u, out_v), 1)
-    along_u, along_v = (dr.abs(pair[1] - pair[0]) * end + start for pair, start in zip((ray.u, ray.v), way.start))
+    along_u, along_v = (
+        dr.abs(pair[1] - pair[0]) * end + start for pair, start in zip((ray.u, ray.v), way.start)
+    )
     ahead_i = dr.select(by_u, next_i, dr.clip(mi.UInt32(along_u), i, next_i - 1))
     ahead_j = dr.select(by_u, dr.clip(mi.UInt32(along_v), j, next_j - 1), next_j)
     return (ahead_i, ahead_j), end, (end < 1) & (ahead_i < size) & (ahead_j < size)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Published methods as their papers have them: with their orders, buffers and misprints, to judge what they claim.
+"""Published methods as their papers have them: with their orders, buffers and misprints,
+to judge what they claim.
 
 Nothing else imports this room. The exact form of a method has a room of its own.
 

@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Clouds by collectors as Bouthors 2008 has them, also with its equations as they are printed.
 
-Slabs are as thick as the cloud is along the light (`thickness=light`), the density is half (`peak=half`), and a sky is
-a beam from above (`sky=beams`). Two equations can be had as printed.
+Slabs are as thick as the cloud is along the light (`thickness=light`), the density is half
+(`peak=half`), and a sky is a beam from above (`sky=beams`). Two equations can be had as printed.
 
-**The opacity of clouds along a ray**, eq. 2, with the extinctions kappa_i of the stretches in clouds:
+**The opacity of clouds along a ray**, eq. 2, with the extinctions kappa_i of
+the stretches in clouds:
 
     opacity = sum (exp(-kappa_i x_{i+1}) - exp(-kappa_i x_i)) / kappa_i.
 
-Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa is
-missing, and each exponent has the local kappa times the whole distance instead of the depth cumulated up
-to there. As printed the opacity is negative, and more light comes out than went in; x is counted from
-where the ray enters the first cloud. In a grid kappa is that in the middle of a step.
+Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa
+is missing, and each exponent has the local kappa times the whole distance instead of the depth
+cumulated up to there. As printed the opacity is negative, and more light comes out than went in; x
+is counted from where the ray enters the first cloud. In a grid kappa is that in the middle of a
+step.
 
-**Single scattering**, eq. 1: the light of a step between two nodes is e_{i+1} - e_i, with e = exp(-u)
-and u the depth of both segments. The other sign and the factor kappa dx/(kappa dx + dl) would be right
-(`realtime.clouds.single_scattering`).
+**Single scattering**, eq. 1: the light of a step between two nodes is e_{i+1} - e_i, with e =
+exp(-u) and u the depth of both segments. The other sign and the factor kappa dx/(kappa dx + dl)
+would be right (`realtime.clouds.single_scattering`).
 """
 
 from dataclasses import dataclass
@@ -36,11 +38,13 @@ _HALF = 0.5  # of the density, as printed
 class CloudCollectors2008(CloudCollectors):
     """The light of clouds along every ray, by order of scattering, as published.
 
-    Its slabs are too thick, its density too low, and light is negative where single scattering is printed.
+    Its slabs are too thick, its density too low, and light is negative where
+    single scattering is printed.
 
     References
     ----------
-    Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic scattering in clouds*.
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple
+    anisotropic scattering in clouds*.
     """
 
     name = "cloud-collectors-2008"
@@ -48,7 +52,9 @@ class CloudCollectors2008(CloudCollectors):
     as_published = ""
 
     thickness: str = parameter(
-        "light", "thickness of slabs along the light, or across their faces", choices=("light", "slab")
+        "light",
+        "thickness of slabs along the light, or across their faces",
+        choices=("light", "slab"),
     )
     peak: str = parameter(
         "half",
@@ -56,14 +62,17 @@ class CloudCollectors2008(CloudCollectors):
         choices=("half", "matched", "full"),
     )
     single: str = parameter(
-        "corrected", "single scattering as derived, or by eq. 1 as printed", choices=("corrected", "printed")
+        "corrected",
+        "single scattering as derived, or by eq. 1 as printed",
+        choices=("corrected", "printed"),
     )
     opacity: str = parameter(
         "corrected", "opacity as derived, or by eq. 2 as printed", choices=("corrected", "printed")
     )
     sky: str = parameter(
         "beams",
-        "the light of a sky: a beam from above of pi times its radiance, or the same from everywhere",
+        "the light of a sky: a beam from above of pi times its radiance, or the same from "
+        "everywhere",
         choices=("beams", "uniform"),
     )
 
@@ -77,14 +86,20 @@ class CloudCollectors2008(CloudCollectors):
         return _HALF if self.peak == "half" else super().cut(phase, types)
 
     def light_once(self, rays, beams, stride):
-        """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)]."""
+        """Return the radiance that clouds scatter once into rays, by beam and
+        octave, RGB [W/(m^2 sr)].
+        """
         if self.single == "corrected":
             return super().light_once(rays, beams, stride)
         return light_once(rays, beams, steps=self.steps, stride=stride, integral=printed_step)
 
     def opacity_along(self, rays, stride):
         """Return the opacity of clouds along rays, a colour."""
-        return super().opacity_along(rays, stride) if self.opacity == "corrected" else printed_opacity(rays, stride)
+        return (
+            super().opacity_along(rays, stride)
+            if self.opacity == "corrected"
+            else printed_opacity(rays, stride)
+        )
 
 
 def printed_step(depth: Any, eye: tuple[Any, Any], segment: tuple[Any, Any]) -> Any:
@@ -93,7 +108,9 @@ def printed_step(depth: Any, eye: tuple[Any, Any], segment: tuple[Any, Any]) -> 
 
 
 def printed_opacity(rays: CloudRays, stride: Any) -> Any:
-    """Return eq. 2 along rays through clouds, a colour [m]; `stride` [voxels] as of `light_once`."""
+    """Return eq. 2 along rays through clouds, a colour [m]; `stride`
+    [voxels] as of `light_once`.
+    """
     clouds, origin, direction = rays.clouds, rays.origin, rays.direction
     Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
 
@@ -103,7 +120,10 @@ def printed_opacity(rays: CloudRays, stride: Any) -> Any:
         kappas = [dr.gather(Float, sigma_t, cloud) * rho for sigma_t in clouds.sigma_t]
         first = dr.minimum(first, begin)
         near, far = begin - first, finish - first
-        terms = [dr.select(kappa > 0, (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0) for kappa in kappas]
+        terms = [
+            dr.select(kappa > 0, (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
+            for kappa in kappas
+        ]
         return (first, tuple(own + term for own, term in zip(sums, terms))), mi.Bool(True)
 
     def step(total, x, cloud):

@@ -13,10 +13,14 @@ class ShaderHost:
 
     def __init__(self, name: str) -> None:
         self.device = ""
-        self._process = ChildProcess("airlight.realtime.methods.shader.host", name=f"method {name}", silent=True)
+        self._process = ChildProcess(
+            "airlight.realtime.methods.shader.host", name=f"method {name}", silent=True
+        )
         self.end = self._process.end
 
-    def ask(self, kind: str, arrays: Mapping[str, Any] | None = None, **message: Any) -> tuple[dict[str, Any], Any]:
+    def ask(
+        self, kind: str, arrays: Mapping[str, Any] | None = None, **message: Any
+    ) -> tuple[dict[str, Any], Any]:
         """Return the answer to a message, see `realtime.methods.shader.host`, and the image in it.
 
         Raises

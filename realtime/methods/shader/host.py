@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The process in which OpenGL draws: it imports nothing of ours that loads Mitsuba or Dr.Jit.
 
-A message is its kind, names with values, and names with arrays; an answer is names with values, and an image or None:
+A message is its kind, names with values, and names with arrays; an answer is names with
+values, and an image or None:
 
     open    stages, each with name, text, kind ('picture', '2d', '3d'), size, format, and the words that it uses
     frame   arrays, and how many frames to draw, after forgetting the last ones if `reset`; the answer has the names of
             the shader that nothing sets
     again   draws the same for some seconds, and answers with the time of each frame
 
-A time is the wall clock's from the first call to the end of `finish()` where the processor draws: the timer queries of
-llvmpipe are wrong. On a GPU it is that of a query.
+A time is the wall clock's from the first call to the end of `finish()` where the processor draws:
+the timer queries of llvmpipe are wrong. On a GPU it is that of a query.
 """
 
 import signal
@@ -23,7 +24,8 @@ from airlight.realtime.child_process import connection_to_caller, method_limit
 
 _SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")
 _TARGETS = {"rgba16f": (4, "f2"), "rgba32f": (4, "f4"), "r32f": (1, "f4")}
-_GIVEN = ("frame", "al_size", "al_target", "AlLights", "AlPhase")  # beside the uniforms and arrays of a message
+# beside the uniforms and arrays of a message
+_GIVEN = ("frame", "al_size", "al_target", "AlLights", "AlPhase")
 _VERTICES = """#version 430 core
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }
 """
@@ -36,15 +38,20 @@ class Host:
         import moderngl
 
         self.error = moderngl.Error
-        options = {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"} if sys.platform == "linux" else {}
+        options = (
+            {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"} if sys.platform == "linux" else {}
+        )
         backend = {"backend": "egl"} if sys.platform == "linux" else {}
         self.context = moderngl.create_context(standalone=True, require=430, **backend, **options)
         name = self.context.info["GL_RENDERER"]
         self.device = {"device": name, "version": self.context.info["GL_VERSION"]}
-        self.query = None if any(word in name for word in _SOFTWARE) else self.context.query(time=True)
+        self.query = (
+            None if any(word in name for word in _SOFTWARE) else self.context.query(time=True)
+        )
         self.stages: list[Any] = []
         self.programs: list[Any] = []
-        self.targets: list[Any] = []  # by stage an image and its framebuffer; of a pass, those of the last frame too
+        # by stage an image and its framebuffer; of a pass, those of the last frame too
+        self.targets: list[Any] = []
         self.textures: dict[str, Any] = {}
         self.uniforms: dict[str, Any] = {}
         self.frame = 0
@@ -57,11 +64,15 @@ class Host:
                 if stage["kind"] == "3d":
                     self.programs.append((self.context.compute_shader(stage["text"]), None))
                 else:
-                    program = self.context.program(vertex_shader=_VERTICES, fragment_shader=stage["text"])
+                    program = self.context.program(
+                        vertex_shader=_VERTICES, fragment_shader=stage["text"]
+                    )
                     self.programs.append((program, self.context.vertex_array(program, [])))
             except self.error as error:
                 return {"log": str(error)}, None
-            self.targets.append([self._image(stage) for _ in range(1 if stage["kind"] == "picture" else 2)])
+            self.targets.append(
+                [self._image(stage) for _ in range(1 if stage["kind"] == "picture" else 2)]
+            )
         return self.device, None
 
     def _image(self, stage):
@@ -82,17 +93,25 @@ class Host:
         """Bring arrays to the device: textures, buffers, and the rest as uniforms."""
         for name, array in arrays.items():
             if name.startswith("buffer"):
-                # The binding may not be empty: a light or a table that is not there has one of zeros.
-                self.context.buffer(array.tobytes() or bytes(128)).bind_to_storage_buffer(int(name[-1]))
+                # The binding may not be empty: a light or a table that is
+                # not there has one of zeros.
+                self.context.buffer(array.tobytes() or bytes(128)).bind_to_storage_buffer(
+                    int(name[-1])
+                )
             else:
                 kind, own = name.split()
                 if own in self.textures:
                     self.textures.pop(own).release()
                 if kind == "layers":
-                    texture = self.context.texture_array(array.shape[::-1], 1, array.tobytes(), dtype="f4")
+                    texture = self.context.texture_array(
+                        array.shape[::-1], 1, array.tobytes(), dtype="f4"
+                    )
                 else:
-                    texture = self.context.texture(array.shape[1::-1], 4, array.tobytes(), dtype="f4")
-                texture.filter = (0x2600, 0x2600)  # nearest: what lies between two surfaces is nothing
+                    texture = self.context.texture(
+                        array.shape[1::-1], 4, array.tobytes(), dtype="f4"
+                    )
+                # nearest: what lies between two surfaces is nothing
+                texture.filter = (0x2600, 0x2600)
                 self.textures[own] = texture
 
     def draw(self, uniforms):
@@ -105,24 +124,36 @@ class Host:
             with self.query:
                 self._stages(uniforms)
         self.context.finish()
-        took = 1e3 * (time.perf_counter() - begin) if self.query is None else 1e-6 * self.query.elapsed
+        took = (
+            1e3 * (time.perf_counter() - begin) if self.query is None else 1e-6 * self.query.elapsed
+        )
         self.frame += 1
         return took
 
     def _unset(self):
-        """Return the uniforms, samplers and buffers that the programs read and nothing here sets."""
-        images = {f"{stage['name']}_{end}" for stage in self.stages[:-1] for end in ("image", "last")}
+        """Return the uniforms, samplers and buffers that the programs
+        read and nothing here sets.
+        """
+        images = {
+            f"{stage['name']}_{end}" for stage in self.stages[:-1] for end in ("image", "last")
+        }
         given = {*self.uniforms, *self.textures, *images, *_GIVEN}
-        names = (name for program, _ in self.programs for name in program if not name.startswith("gl_"))
+        names = (
+            name for program, _ in self.programs for name in program if not name.startswith("gl_")
+        )
         return sorted({*names} - given)
 
     def _stages(self, uniforms):
         now, last = self.frame & 1, 1 - (self.frame & 1)
-        for number, (stage, (program, triangle)) in enumerate(zip(self.stages, self.programs, strict=True)):
+        for number, (stage, (program, triangle)) in enumerate(
+            zip(self.stages, self.programs, strict=True)
+        ):
             textures = dict(self.textures)
             for other, made in enumerate(self.stages[:-1]):
                 # A stage that is not drawn yet in this frame shows the last frame.
-                textures[f"{made['name']}_image"] = self.targets[other][now if other < number else last][0]
+                textures[f"{made['name']}_image"] = self.targets[other][
+                    now if other < number else last
+                ][0]
                 textures[f"{made['name']}_last"] = self.targets[other][last][0]
             unit = 0
             for name, texture in textures.items():
@@ -183,7 +214,8 @@ def main():
         if host is None:
             caller.send(({"missing": missing}, None))
             continue
-        # A driver that never returns may hold Python's lock: no thread could end it with its caller.
+        # A driver that never returns may hold Python's lock: no thread
+        # could end it with its caller.
         signal.alarm(limit)
         work = {"open": host.open, "frame": host.draw_frames, "again": host.again}[kind]
         answer = work(message, arrays)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A user's shader as a method, named by its file: 'fog.glsl' (`realtime.methods.shader`).
 
-It is the same to frames, reports and the view as a method in Python. Its time is that of the device that OpenGL draws
-on, which has a name, and no part of it is Dr.Jit's.
+It is the same to frames, reports and the view as a method in Python. Its time is that of the device
+that OpenGL draws on, which has a name, and no part of it is Dr.Jit's.
 """
 
 from dataclasses import dataclass, make_dataclass
@@ -88,14 +88,27 @@ class Shader(Method):
         return run
 
     def render(self, view, state, kernel):
-        """Return the image of the shader; uniforms that nothing sets and values that are not finite are refused."""
+        """Return the image of the shader; uniforms that nothing sets and values that
+        are not finite are refused.
+        """
         host, maps = state
-        arrays: dict[str, Any] = ray_arrays(view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words))
+        arrays: dict[str, Any] = ray_arrays(
+            view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words)
+        )
         arrays["layers shadow_maps"] = map_array(maps)
-        arrays |= {"buffer 0": light_array(view.lights, maps), "buffer 1": phase_table(view.medium.phase)}
-        own = {each.name: getattr(self, each.name) for each in self.shader.parameters if each.uniform}
+        arrays |= {
+            "buffer 0": light_array(view.lights, maps),
+            "buffer 1": phase_table(view.medium.phase),
+        }
+        own = {
+            each.name: getattr(self, each.name) for each in self.shader.parameters if each.uniform
+        }
         first = not self.carries or view.carried is None
-        asked = {"reset": first, "frames": self.shader.frames if first else 1, "uniforms": uniforms(view) | own}
+        asked = {
+            "reset": first,
+            "frames": self.shader.frames if first else 1,
+            "uniforms": uniforms(view) | own,
+        }
         said, image = host.ask("frame", arrays, **asked)
         self.shader.check_unset(said["unset"])
         wrong = ~np.isfinite(image[::-1]).all(axis=2)
@@ -103,12 +116,16 @@ class Shader(Method):
             row, column = np.argwhere(wrong)[0]
             seen = arrays["texture al_rays"][::-1][row, column]
             raise InputError(
-                f"method {self.name}: {int(wrong.sum())} of {wrong.size} pixels are not finite, the first in column "
-                f"{column} of row {row}, ray.direction = ({seen[0]:.6g}, {seen[1]:.6g}, {seen[2]:.6g}), ray.distance = "
+                f"method {self.name}: {int(wrong.sum())} of {wrong.size} pixels are not finite, "
+                "the first in column "
+                f"{column} of row {row}, ray.direction = ({seen[0]:.6g}, {seen[1]:.6g}, "
+                f"{seen[2]:.6g}), ray.distance = "
                 f"{abs(seen[3]):.6g}"
             )
         lanes = image[::-1].reshape(-1, 3)[np.array(view.pixel)]
-        return Layers(checked_radiance(lanes, view, self.name), carried=mi.UInt32(1) if self.carries else None)
+        return Layers(
+            checked_radiance(lanes, view, self.name), carried=mi.UInt32(1) if self.carries else None
+        )
 
 
 def shader_method(name: str) -> type[Method]:
@@ -121,7 +138,8 @@ def shader_method(name: str) -> type[Method]:
     """
     source = read_shader(Path(name))
     fields: list[Any] = [
-        (each.name, type(each.default), parameter(each.default, each.help)) for each in source.parameters
+        (each.name, type(each.default), parameter(each.default, each.help))
+        for each in source.parameters
     ]
     check_names(name, (each.name for each in source.parameters), Shader)
     what = {"name": name, "source": str(source.path), "shader": source, "shadows": source.shadows}

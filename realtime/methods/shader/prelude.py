@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The text around a user's shader: what it is given before it, and the `main` of a stage behind it.
 
-Row 0 of OpenGL is the lowest: pixels are counted from the lower left here, and images turned round at the border.
+Row 0 of OpenGL is the lowest: pixels are counted from the lower left here, and images
+turned round at the border.
 
-A phase function is given in 1/sr with the integral 1, as engines count it; kernels here have the mean 1. The formula 1
-+ g^2 - 2 g c = (1 - |g|)^2 + 2 |g| (1 - sign(g) c) avoids cancellation in a sharp lobe.
+A phase function is given in 1/sr with the integral 1, as engines count it; kernels here have the
+mean 1. The formula 1 + g^2 - 2 g c = (1 - |g|)^2 + 2 |g| (1 - sign(g) c) avoids cancellation in a
+sharp lobe.
 
-The intensity of a soft spot is linear in the angle from the axis between beam and cut-off, as in Mitsuba. One arc
-tangent computes the distance of this angle to the cut-off: a difference of two would cancel at the dim edge.
+The intensity of a soft spot is linear in the angle from the axis between beam and cut-off, as in
+Mitsuba. One arc tangent computes the distance of this angle to the cut-off: a difference of two
+would cancel at the dim edge.
 """
 
 from collections.abc import Mapping
@@ -119,20 +122,33 @@ void main() {{
 """
 
 
-def stage_text(source: ShaderSource, phase: str, settings: Mapping[str, Any], stage: Pass | None) -> str:
+def stage_text(
+    source: ShaderSource, phase: str, settings: Mapping[str, Any], stage: Pass | None
+) -> str:
     """Return the whole text of a stage: that of a pass, or for None of the picture.
 
-    `phase` is the text of `phase_text`, `settings` are the values of the shader's parameters by their names.
+    `phase` is the text of `phase_text`, `settings` are the values of the shader's
+    parameters by their names.
     """
-    given = [f"#define {each.name} {_literal(settings[each.name])}" for each in source.parameters if not each.uniform]
+    given = [
+        f"#define {each.name} {_literal(settings[each.name])}"
+        for each in source.parameters
+        if not each.uniform
+    ]
     kinds = {bool: "bool", int: "int", float: "float"}
-    given += [f"uniform {kinds[type(each.default)]} {each.name};" for each in source.parameters if each.uniform]
+    given += [
+        f"uniform {kinds[type(each.default)]} {each.name};"
+        for each in source.parameters
+        if each.uniform
+    ]
     for each in source.passes:
         given.append(f"uniform sampler{len(each.size)}D {each.name}_image, {each.name}_last;")
     if stage is None:
         end = _PICTURE
     else:
-        end = (_PASS_2D if len(stage.size) == 2 else _PASS_3D).format(name=stage.name, format=stage.format)
+        end = (_PASS_2D if len(stage.size) == 2 else _PASS_3D).format(
+            name=stage.name, format=stage.format
+        )
     head = ["#version 430 core", *source.extensions, f"#line {OWN_LINES}", _GIVEN, phase, *given]
     return "\n".join([*head, source.text, f"#line {OWN_LINES + 500_000}", end])
 

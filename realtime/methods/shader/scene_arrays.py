@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arrays of a view that a shader is given, in the order of OpenGL's images: the first row is the lowest.
+"""The arrays of a view that a shader is given, in the order of OpenGL's images: the
+first row is the lowest.
 
-A ray that meets nothing ends all the same: at the foot of the farthest light and 20/sigma_t behind it, where e^-20 =
-2e-9 of its light is left. Its distance is negative in the array, and `Ray.hit` false.
+A ray that meets nothing ends all the same: at the foot of the farthest light and 20/sigma_t behind
+it, where e^-20 = 2e-9 of its light is left. Its distance is negative in the array, and `Ray.hit`
+false.
 """
 
 from collections.abc import Sequence
@@ -41,16 +43,28 @@ def check_scene(scene: Scene, name: str) -> None:
     medium = scene.medium
     wanted = f"{name} renders point and spot lights in one homogeneous medium without bounds"
     if medium.bounded_media or not isinstance(medium, Homogeneous):
-        what = "has bounds" if medium.bounded_media or medium.clouds else f"is {medium.summary.partition(':')[0]}"
-        raise InputError(f"the medium {what}: {wanted}; use ray-march, or write the method in Python")
+        what = (
+            "has bounds"
+            if medium.bounded_media or medium.clouds
+            else f"is {medium.summary.partition(':')[0]}"
+        )
+        raise InputError(
+            f"the medium {what}: {wanted}; use ray-march, or write the method in Python"
+        )
     if medium.vacuum:
-        raise InputError(f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t above 0")
+        raise InputError(
+            f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t "
+            "above 0"
+        )
     if scene.area_lights:
-        raise InputError(f"the scene has area lights: {wanted}; use soft-shafts, or write the method in Python")
+        raise InputError(
+            f"the scene has area lights: {wanted}; use soft-shafts, or write the method in Python"
+        )
     layers = sum(1 if light.axis is not None else 6 for light in scene.lights)
     if layers > _LAYERS:
         raise InputError(
-            f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: expected {_LAYERS}"
+            f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: expected "
+            f"{_LAYERS}"
         )
 
 
@@ -70,7 +84,11 @@ def ray_arrays(view: View, *, surfaces: bool) -> dict[str, Array]:
     for light in view.lights:
         reach = dr.maximum(reach, dr.dot(light.position - view.origin, view.direction))
     end = reach + OPTICAL_REACH / medium.least_extinction()
-    arrays = {"texture al_rays": image([*view.direction, dr.select(dr.isfinite(view.distance), view.distance, -end)])}
+    arrays = {
+        "texture al_rays": image(
+            [*view.direction, dr.select(dr.isfinite(view.distance), view.distance, -end)]
+        )
+    }
     if surfaces:
         normal, albedo = _surfaces(view, len(pixel))
         arrays |= {"texture g_normal": image(normal), "texture g_albedo": image(albedo)}
@@ -78,7 +96,9 @@ def ray_arrays(view: View, *, surfaces: bool) -> dict[str, Array]:
 
 
 def _surfaces(view: View, lanes: int) -> tuple[Any, Any]:
-    """Return the unit normals of the visible surfaces, towards the camera, and what they reflect diffusely."""
+    """Return the unit normals of the visible surfaces, towards the camera, and
+    what they reflect diffusely.
+    """
     if not view.features.surfaces:
         return dr.zeros(mi.Vector3f, lanes), dr.zeros(mi.Color3f, lanes)
     ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
@@ -91,9 +111,13 @@ def _surfaces(view: View, lanes: int) -> tuple[Any, Any]:
 
 
 def map_array(maps: Sequence[ShadowMap]) -> Array:
-    """Return the shadow maps of all lights, face by face, as layers of one texture; there is one without maps too."""
+    """Return the shadow maps of all lights, face by face, as layers of one texture; there
+    is one without maps too.
+    """
     layers = [
-        np.minimum(np.array(each.distance, dtype=np.float32), _FAR).reshape(-1, each.size + 1, each.size + 1)
+        np.minimum(np.array(each.distance, dtype=np.float32), _FAR).reshape(
+            -1, each.size + 1, each.size + 1
+        )
         for each in maps
     ]
     return np.concatenate(layers or [np.zeros((1, 1, 1), dtype=np.float32)])
@@ -133,7 +157,8 @@ def uniforms(view: View) -> dict[str, Any]:
         g = float(host_numbers(phase.g)[0][0])
     elif isinstance(phase, Tabulated):
         p, c = phase_table(phase), np.linspace(-1, 1, dr.width(phase.values))
-        # c p is a parabola in each cell, of which Simpson's rule is exact: four times the middle is (c0 + c1)(p0 + p1).
+        # c p is a parabola in each cell, of which Simpson's rule is exact: four times the
+        # middle is (c0 + c1)(p0 + p1).
         g = float(np.mean((c * p)[:-1] + (c * p)[1:] + (c[:-1] + c[1:]) * (p[:-1] + p[1:])) / 6)
     return {
         "resolution": [camera.width, camera.height],
@@ -149,4 +174,8 @@ def uniforms(view: View) -> dict[str, Any]:
 
 def phase_table(phase: Any) -> Array:
     """Return the values of a phase function that is a table, nothing of another."""
-    return np.array(phase.values, dtype=np.float32) if isinstance(phase, Tabulated) else np.zeros(0, np.float32)
+    return (
+        np.array(phase.values, dtype=np.float32)
+        if isinstance(phase, Tabulated)
+        else np.zeros(0, np.float32)
+    )

@@ -7,11 +7,12 @@ r"""The shader of a user: GLSL with lines `#pragma airlight`, which other compil
     #pragma airlight shadows none                   it knows no shadows
     #pragma airlight frames N                       frames that a history needs before the image counts
 
-A size is made of numbers, W, H, W/n and H/n, rounded up. A pass in 2D is a function ``vec4 NAME(Ray ray)``, one in 3D
-``vec4 NAME(ivec3 cell, ivec3 cells)``. Lines ``#include "file"`` are resolved beside the file that has them.
+A size is made of numbers, W, H, W/n and H/n, rounded up. A pass in 2D is a function ``vec4 NAME(Ray
+ray)``, one in 3D ``vec4 NAME(ivec3 cell, ivec3 cells)``. Lines ``#include "file"`` are resolved
+beside the file that has them.
 
-Drivers differ in what they make of the second number of `#line` (Mesa 22.3 forgets it), so every text has lines of its
-own: the user's file from 1, an included one from a separate million.
+Drivers differ in what they make of the second number of `#line` (Mesa 22.3 forgets it), so every
+text has lines of its own: the user's file from 1, an included one from a separate million.
 """
 
 import keyword
@@ -37,8 +38,12 @@ _ERRORS = (
     re.compile(r"^\d+\((\d+)\) : error \w+: (.*)$", re.MULTILINE),
     re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE),
 )
-_INITIAL = r"(?<!airlight )\buniform\b[^;]*\b{}\s*(?:\[[^\]]*\]\s*)?=(?!=)"  # a uniform's initial value
-_WAYS_OUT = {"texture2D": "add `#define texture2D texture`", "texture3D": "add `#define texture3D texture`"}
+# a uniform's initial value
+_INITIAL = r"(?<!airlight )\buniform\b[^;]*\b{}\s*(?:\[[^\]]*\]\s*)?=(?!=)"
+_WAYS_OUT = {
+    "texture2D": "add `#define texture2D texture`",
+    "texture3D": "add `#define texture3D texture`",
+}
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,8 @@ class ShaderSource:
                 if words.endswith("candidates are:"):  # They follow one a line, set in.
                     following = map(pattern.match, log[found.end() :].splitlines()[1:])
                     candidates = takewhile(
-                        lambda words: words.startswith(" "), (line[2] if line else "" for line in following)
+                        lambda words: words.startswith(" "),
+                        (line[2] if line else "" for line in following),
                     )
                     words += " " + "; ".join(map(str.strip, candidates))
                 words += "".join(f"; {way}" for name, way in _WAYS_OUT.items() if name in words)
@@ -97,13 +103,16 @@ class ShaderSource:
                     chosen = max(place - 1, 0)
                     lines = self.lines[chosen]
                     shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
-                    return f"{self.files[chosen].name}, line {line}: {words}" + (f": {shown}" if shown else "")
+                    return f"{self.files[chosen].name}, line {line}: {words}" + (
+                        f": {shown}" if shown else ""
+                    )
                 return f"{self.path.name}: {words}"
         lines_of_log = [line.strip() for line in log.splitlines() if "error" in line.lower()]
         return f"{self.path.name}: {lines_of_log[0] if lines_of_log else ' '.join(log.split())}"
 
     def check_unset(self, names: Sequence[str]) -> None:
-        """Refuse uniforms, samplers and buffers that the driver reads and nothing sets: they would be 0.
+        """Refuse uniforms, samplers and buffers that the driver reads and
+        nothing sets: they would be 0.
 
         Parameters
         ----------
@@ -115,11 +124,15 @@ class ShaderSource:
         InputError
             With those that are not set.
         """
-        unset = [name for name in names if not re.search(_INITIAL.format(re.escape(name)), self.text)]
+        unset = [
+            name for name in names if not re.search(_INITIAL.format(re.escape(name)), self.text)
+        ]
         if unset:
             raise InputError(
-                f"method {self.path}: {self.path.name}: nothing sets {', '.join(unset)}; give a uniform a value, "
-                "`uniform float NAME = 1.0;`, or make it a parameter, `#pragma airlight uniform NAME 1.0`; samplers "
+                f"method {self.path}: {self.path.name}: nothing sets {', '.join(unset)}; give a "
+                "uniform a value, "
+                "`uniform float NAME = 1.0;`, or make it a parameter, `#pragma airlight uniform "
+                "NAME 1.0`; samplers "
                 "and buffers are those that airlight gives"
             )
 
@@ -140,17 +153,22 @@ def read_shader(path: Path) -> ShaderSource:
     Raises
     ------
     InputError
-        For a file that cannot be read, a line of ours that means nothing, and a function that is not there.
+        For a file that cannot be read, a line of ours that means nothing, and a
+        function that is not there.
     """
     reader = _Reader(f"method {path}")
     text = reader.read(path, ())
     source = ShaderSource(
         path, text, tuple(reader.files), tuple(reader.lines), tuple(reader.extensions), tuple(reader.parameters),
-        tuple(reader.passes), reader.shadows, reader.frames, frozenset(re.findall(r"[A-Za-z_]\w*", text)),
+        tuple(reader.passes), reader.shadows, reader.frames, frozenset(re.findall((
+            r"[A-Za-z_]\w*"
+        ), text)),
     )  # fmt: skip
     wanted = [("vec3", "airlight", "Ray ray")]
     for each in source.passes:
-        wanted.append(("vec4", each.name, "Ray ray" if len(each.size) == 2 else "ivec3 cell, ivec3 cells"))
+        wanted.append(
+            ("vec4", each.name, "Ray ray" if len(each.size) == 2 else "ivec3 cell, ivec3 cells")
+        )
     for kind, name, arguments in wanted:
         if not re.search(rf"\b{kind}\s+{name}\s*\([^()]*\)\s*\{{", text):
             raise InputError(f"method {path}: {path.name}: no function {kind} {name}({arguments})")
@@ -171,15 +189,21 @@ class _Reader:
 
     def read(self, path: Path, within: tuple[Path, ...]) -> str:
         try:
-            text = path.read_text(encoding="utf-8-sig")  # editors of Windows write a byte order mark
+            # editors of Windows write a byte order mark
+            text = path.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
-            words = error.strerror if isinstance(error, OSError) and error.strerror else "it is no text in UTF-8"
+            words = (
+                error.strerror
+                if isinstance(error, OSError) and error.strerror
+                else "it is no text in UTF-8"
+            )
             raise InputError(f"{self.what}: {path} cannot be read: {words}") from error
         self.files.append(path)
         self.lines.append(tuple(text.splitlines()))
         first = 0 if not within else len(self.files) * _BLOCK
         out = [f"#line {first + 1}"]
-        for number, code in enumerate(_without_comments(text).splitlines(), 1):  # Mesa miscounts lines of comments
+        # Mesa miscounts lines of comments
+        for number, code in enumerate(_without_comments(text).splitlines(), 1):
             found = _DIRECTIVE.match(code)
             word, rest = (found[1], found[2]) if found else ("", "")
             place = f"{self.what}: {path.name}, line {number}"
@@ -207,7 +231,9 @@ class _Reader:
         if word in ("set", "uniform"):
             self.parameters.append(_parameter(rest, place, uniform=word == "uniform"))
             if len({each.name for each in self.parameters}) < len(self.parameters):
-                raise InputError(f"{place}: two parameters are called {self.parameters[-1].name}; rename one")
+                raise InputError(
+                    f"{place}: two parameters are called {self.parameters[-1].name}; rename one"
+                )
         elif word == "pass":
             self.passes.append(_pass(rest, place))
         elif word == "shadows" and rest == "none":
@@ -216,7 +242,8 @@ class _Reader:
             self.frames = int(rest)
         else:
             raise InputError(
-                f"{place}: got `#pragma airlight {text}`, expected set, uniform, pass, `shadows none` or `frames N` "
+                f"{place}: got `#pragma airlight {text}`, expected set, uniform, pass, `shadows "
+                "none` or `frames N` "
                 "with N from 1 to 1000"
             )
 
@@ -234,7 +261,8 @@ def _parameter(text: str, place: str, *, uniform: bool) -> ShaderParameter:
                 continue
     if found is None or value is None:
         raise InputError(
-            f'{place}: got `{word} {text}`, expected `{word} NAME DEFAULT "help"`, such as `{word} STEPS 16`'
+            f'{place}: got `{word} {text}`, expected `{word} NAME DEFAULT "help"`, such as `{word} '
+            "STEPS 16`"
         )
     return ShaderParameter(found[1], value, found[3] or "", uniform)
 
@@ -243,9 +271,14 @@ def _pass(text: str, place: str) -> Pass:
     found = _PASS.match(text)
     terms = tuple(found[2].split("x")) if found else ()
     if found is None or len(terms) not in (2, 3) or not all(map(_TERM.match, terms)):
-        raise InputError(f"{place}: got `pass {text}`, expected `pass NAME size=W/2xH/2` or `pass NAME size=80x60x64`")
+        raise InputError(
+            f"{place}: got `pass {text}`, expected `pass NAME size=W/2xH/2` or `pass NAME "
+            "size=80x60x64`"
+        )
     if (found[3] or _FORMATS[0]) not in _FORMATS:
-        raise InputError(f"{place}: got the format {found[3]}, expected one of {', '.join(_FORMATS)}")
+        raise InputError(
+            f"{place}: got the format {found[3]}, expected one of {', '.join(_FORMATS)}"
+        )
     return Pass(found[1], terms, found[3] or _FORMATS[0])
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow planes: volumetric shadows from silhouettes, without shadow rays.
 
-The silhouette of every occluder, as the light sees it (`realtime.methods.shadow_planes.silhouettes`),
-extruded away from the light, bounds what is in shadow. A camera ray crosses these planes, and between
-crossings it is lit or not as a whole. Counting layers from the camera on gives its lit segments
-[a_i, b_i], and its airlight is
+The silhouette of every occluder, as the light sees it
+(`realtime.methods.shadow_planes.silhouettes`), extruded away from the light, bounds what is in
+shadow. A camera ray crosses these planes, and between crossings it is lit or not as a whole.
+Counting layers from the camera on gives its lit segments [a_i, b_i], and its airlight is
 
     L = sum_i J(a_i, b_i),
 
@@ -30,13 +30,13 @@ from airlight.realtime.scene.read_scene import Scene
 class ShadowPlanes(Method):
     """The airlight between shadow planes.
 
-    Valid for all lights and occluders that are triangle meshes, closed or not. Shadows are those of the triangles,
-    exact to rounding.
+    Valid for all lights and occluders that are triangle meshes, closed or not. Shadows are those of
+    the triangles, exact to rounding.
 
     References
     ----------
-    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
-    WSCG 14.
+    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric
+    shadows*, Journal of WSCG 14.
     """
 
     name = "shadow-planes"
@@ -56,25 +56,37 @@ class ShadowPlanes(Method):
         return PlanePreparation(occluders) if scene.features.shadows else no_state
 
     def airlight(self, view, light, state, kernel):
-        """Return the airlight of every ray between shadow planes, and whether the light reaches the visible surface."""
+        """Return the airlight of every ray between shadow planes, and whether the light
+        reaches the visible surface.
+        """
         rays = view.lit_by(light, kernel)
         if state is None:
             return rays.radiance(rays.gamma(view.distance)), True
-        planes, nothing = ray_planes(state, view.aim, view.distance), rays.nothing(dr.width(view.distance))
-        total, reached = sum_lit_intervals(state, planes, rays.segment(view.distance), rays.airlight, nothing)
+        planes, nothing = (
+            ray_planes(state, view.aim, view.distance),
+            rays.nothing(dr.width(view.distance)),
+        )
+        total, reached = sum_lit_intervals(
+            state, planes, rays.segment(view.distance), rays.airlight, nothing
+        )
         # Frames cast rays for the shadows of a light at infinity on surfaces.
         return rays.radiance(total), reached if light.w else True
 
 
 @dataclass(frozen=True)
 class PlanePreparation:
-    """The occluders of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
+    """The occluders of a scene; called with the scene as it is now, returns the
+    shadow planes of its lights.
+    """
 
     occluders: Occluders
 
     def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
         """Return the planes of every light of a scene."""
-        occluders, camera = with_positions(self.occluders, scene.positions), read_camera(scene.camera)
+        occluders, camera = (
+            with_positions(self.occluders, scene.positions),
+            read_camera(scene.camera),
+        )
         types, states = types_of(type(scene.camera.origin.x)), []
         for light in scene.lights:
             position, shape = host_position(light), scene.source_shape(light)

@@ -1,58 +1,65 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Which shadow planes a camera ray crosses, found by its azimuth about the axis from the light to the camera.
+r"""Which shadow planes a camera ray crosses, found by its azimuth about the axis from
+the light to the camera.
 
-Put the light S at the origin and the camera O on the z axis, at the distance D. A camera ray lies in a half plane that
-the z axis bounds, at the azimuth phi; there it has the direction (sin g, cos g) of (radius, height), g being its angle
-with the axis. A shadow plane contains S, so in that half plane it is a half line from S; the angle between it and the
-axis is psi, the same angle by whose cosine Biri orders the planes (section 5.1.4). Along the ray psi grows from 0.
+Put the light S at the origin and the camera O on the z axis, at the distance D. A camera ray lies
+in a half plane that the z axis bounds, at the azimuth phi; there it has the direction (sin g, cos
+g) of (radius, height), g being its angle with the axis. A shadow plane contains S, so in that half
+plane it is a half line from S; the angle between it and the axis is psi, the same angle by whose
+cosine Biri orders the planes (section 5.1.4). Along the ray psi grows from 0.
 
 A silhouette edge, a straight line, meets the half plane phi at radius c and height z with
 
     1/c = P cos(phi) + Q sin(phi),        z/c = cot(psi) = A cos(phi) + B sin(phi),
 
-because its projection along z is the line P x + Q y = 1, and the plane through S and the edge z = A x + B y. The ray
-point O + x w lies on the half line (c, z) where (x sin g, D + x cos g) is parallel to it:
+because its projection along z is the line P x + Q y = 1, and the plane through S and the edge z = A
+x + B y. The ray point O + x w lies on the half line (c, z) where (x sin g, D + x cos g) is parallel
+to it:
 
     x = D / (sin g cot(psi) - cos g),     and it is beyond the edge, so in its shadow plane, if x sin g / c > 1.
 
-**A light at infinity.** With the light in the direction -a the axis through the camera along a takes the place of the
-line from the light to the camera: put the camera O at the origin and a on the z axis. A shadow plane contains the
-direction a, so in the half plane phi it is a half line parallel to the axis, at the radius c of its edge, from the
-edge's height z on. With P, Q, A and B of the edge as above, but heights from the camera on, the ray point x w lies on
-it where x sin g = c,
+**A light at infinity.** With the light in the direction -a the axis through the camera along a
+takes the place of the line from the light to the camera: put the camera O at the origin and a on
+the z axis. A shadow plane contains the direction a, so in the half plane phi it is a half line
+parallel to the axis, at the radius c of its edge, from the edge's height z on. With P, Q, A and B
+of the edge as above, but heights from the camera on, the ray point x w lies on it where x sin g =
+c,
 
     1/x = P w_x + Q w_y,     and it is beyond the edge if x cos g > z, thus w_z > A w_x + B w_y.
 
-It is the limit of the above as D goes to infinity, where z is D more and both sides of 1/x are divided by D. Along the
-ray the radius c grows from 0 as psi does: so c takes the place of psi, in the order of azimuths, in the layers gained
-and, in the order of the paper, in that of the middles of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the
-light is a point there, without azimuths to span, and no plane; a ray along the light crosses none.
+It is the limit of the above as D goes to infinity, where z is D more and both sides of 1/x are
+divided by D. Along the ray the radius c grows from 0 as psi does: so c takes the place of psi, in
+the order of azimuths, in the layers gained and, in the order of the paper, in that of the middles
+of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the light is a point there, without
+azimuths to span, and no plane; a ray along the light crosses none.
 
-In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is positive ahead of the
-camera and falls along the ray. `plane_crossing` is the one place where they differ on the device.
+In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is
+positive ahead of the camera and falls along the ray. `plane_crossing` is the one place where they
+differ on the device.
 
 Four numbers an edge, no division but one, and no test of depth against a triangle.
 
-**Wedges.** Only edges whose azimuths hold phi count. A *wedge* is a range of azimuths about the axis, narrower than
-most planes: its list holds the planes at its azimuths and few others, and serves every ray there, so that nothing is
-sorted for a frame.
+**Wedges.** Only edges whose azimuths hold phi count. A *wedge* is a range of azimuths about the
+axis, narrower than most planes: its list holds the planes at its azimuths and few others, and
+serves every ray there, so that nothing is sorted for a frame.
 
-**Order.** In a half plane of one azimuth phi all rays cross planes in one order, that of psi, hence of c = A cos(phi) +
-B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its middle; where that is wrong for a ray
-the walk notices (`realtime.methods.shadow_planes.sweep`).
+**Order.** In a half plane of one azimuth phi all rays cross planes in one order, that of psi, hence
+of c = A cos(phi) + B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its
+middle; where that is wrong for a ray the walk notices (`realtime.methods.shadow_planes.sweep`).
 
-**End.** With (w_x, w_y) = sin g (cos phi, sin phi) a plane is crossed at D/x = c sin g - cos g, so before the ray ends
-at x_end only if
+**End.** With (w_x, w_y) = sin g (cos phi, sin phi) a plane is crossed at D/x = c sin g - cos g, so
+before the ray ends at x_end only if
 
     c > (D/x_end + cos g)/sin g          (w = 0: c > 1/(x_end sin g)).
 
-Over a wedge of the angle d, c = R cos(phi - phi_0) is at most the larger of its values at both ends, over cos(d) where
-that is positive: phi_0 may lie between them. The largest such bound of an entry and all behind it falls along the list;
-where it falls below what a ray asks for, a search by halves says, and there the list ends for the ray.
+Over a wedge of the angle d, c = R cos(phi - phi_0) is at most the larger of its values at both
+ends, over cos(d) where that is positive: phi_0 may lie between them. The largest such bound of an
+entry and all behind it falls along the list; where it falls below what a ray asks for, a search by
+halves says, and there the list ends for the ray.
 
-Azimuths are diamond angles (`realtime.numerics.functions`), 0 to 4 for a full turn. Two edges that share a vertex
-share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips between two edges of a loop,
-and none is counted twice.
+Azimuths are diamond angles (`realtime.numerics.functions`), 0 to 4 for a full turn. Two edges that
+share a vertex share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray
+slips between two edges of a loop, and none is counted twice.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -77,14 +84,17 @@ NUMBER = (1 << 24) - 1
 GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -31 to 31
 FULL = 1 << 30  #: the plane is at all azimuths of the wedge
 
-_FINE = 4  # wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
+# wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
+_FINE = 4
 _LEAST, _MOST = 1 << 6, 1 << 16  # wedges
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 
 
 @dataclass(frozen=True)
 class PlaneIndex:
-    """The shadow planes of one light as a frame needs them; Dr.Jit arrays, padded so that their sizes seldom change."""
+    """The shadow planes of one light as a frame needs them; Dr.Jit arrays, padded so that
+    their sizes seldom change.
+    """
 
     axes: tuple[Any, Any, Any]  #: of the frame of `LightBasis`, in float64
     distance: Any  #: D, from the light to the camera [m]; w = 0: 1
@@ -111,7 +121,9 @@ class Planes:
 
 @dataclass(frozen=True)
 class LightBasis:
-    """The frame of a light and a camera: the z axis leads from the light to the camera, or along the light."""
+    """The frame of a light and a camera: the z axis leads from the light to the
+    camera, or along the light.
+    """
 
     axes: Array  #: x, y and z as rows, (3, 3)
     distance: float  #: D, between light and camera [m]; w = 0: 1
@@ -124,7 +136,9 @@ class LightBasis:
 
 
 def light_basis(light: Array, camera: Array) -> LightBasis:
-    """Return the frame of a light, a homogeneous position (4,) or a place (3,), and a camera [m]."""
+    """Return the frame of a light, a homogeneous position (4,) or a
+    place (3,), and a camera [m].
+    """
     l, w = place_and_weight(light)  # noqa: E741
     axis = w * camera - l
     distance = float(np.linalg.norm(axis))
@@ -132,12 +146,16 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
     helper = np.eye(3)[np.argmin(np.abs(z))]
     x = np.cross(helper, z)
     x /= np.linalg.norm(x)
-    return LightBasis(np.stack([x, np.cross(z, x), z]), distance if w else 1.0, l if w else camera, w)
+    return LightBasis(
+        np.stack([x, np.cross(z, x), z]), distance if w else 1.0, l if w else camera, w
+    )
 
 
 def shadow_planes(occluders: Occluders, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes(basis.coordinates(occluders.vertices[edges.edges]), edges.coefficient, w=basis.w)
+    return edge_planes(
+        basis.coordinates(occluders.vertices[edges.edges]), edges.coefficient, w=basis.w
+    )
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) -> Planes:
@@ -146,18 +164,22 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) 
     Edges that are a point as the light sees them have none.
     """
     a, b = vertices[:, 0], vertices[:, 1]
-    azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
+    azimuth = host_diamond_angle(
+        vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32)
+    )
     turn = azimuth[:, 1] - azimuth[:, 0]
     # The short way about the axis; `ahead` if azimuth grows from a to b along it.
     ahead = np.where(np.abs(turn) <= TURN / 2, turn > 0, turn < 0)
     first = np.where(ahead, azimuth[:, 0], azimuth[:, 1])
     last = np.where(ahead, azimuth[:, 1], azimuth[:, 0])
-    # As the light sees it, with the camera's end of the axis up, azimuth grows to the left and psi downwards: the
-    # layers left of an edge that leads to the left lie below it, at larger psi.
+    # As the light sees it, with the camera's end of the axis up, azimuth grows to the left and psi
+    # downwards: the layers left of an edge that leads to the left lie below it, at larger psi.
     gain = np.where(ahead, coefficient, -coefficient)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # The edge meets the axis itself: any tiny number keeps the loop closed.
-    cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
+    cross = np.where(
+        cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         lines = np.stack(
             [
@@ -177,7 +199,8 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) 
 def wedge_lists(
     planes: Planes, *, rank: Array | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Array, np.float32]:
-    """Return first places, entries, bounds and scale of the wedges of planes, as of `PlaneIndex`, in NumPy.
+    """Return first places, entries, bounds and scale of the wedges of planes, as
+    of `PlaneIndex`, in NumPy.
 
     Parameters
     ----------
@@ -200,19 +223,28 @@ def wedge_lists(
 
     # As many wedges as make a plane span a few on average; a wedge lists every plane that it meets.
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
-    count = int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST)) if len(span) else _LEAST
+    count = (
+        int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST))
+        if len(span)
+        else _LEAST
+    )
     scale = np.float32(count / TURN)
     plane, wedge = _in_wedges(planes, scale, count)
 
-    # c = A cos(phi) + B sin(phi): in the middle of a wedge for the order, and at both of its borders for the end.
-    borders, middles = (host_direction((np.arange(count + 1) + step) / float(scale)).T for step in (0.0, 0.5))
+    # c = A cos(phi) + B sin(phi): in the middle of a wedge for the order, and at both of
+    # its borders for the end.
+    borders, middles = (
+        host_direction((np.arange(count + 1) + step) / float(scale)).T for step in (0.0, 0.5)
+    )
     a, b = planes.lines[:, :2].T
     at_middle = [form[plane] * way[wedge] for form, way in zip((a, b), middles)]
-    at_low, at_high = (a[plane] * borders[0][end] + b[plane] * borders[1][end] for end in (wedge, wedge + 1))
+    at_low, at_high = (
+        a[plane] * borders[0][end] + b[plane] * borders[1][end] for end in (wedge, wedge + 1)
+    )
     place = np.lexsort((-(at_middle[0] + at_middle[1]) if rank is None else rank[plane], wedge))
 
-    # The largest c in a wedge, divided by the cosine of its width where it may lie between the borders; and of an entry
-    # and all behind it the largest.
+    # The largest c in a wedge, divided by the cosine of its width where it may lie between the
+    # borders; and of an entry and all behind it the largest.
     bound = np.maximum(at_low, at_high)
     cos_width = np.sum(borders[:, 1:] * borders[:, :-1], axis=0)
     bound = np.where(bound > 0, bound / cos_width[wedge], bound)
@@ -220,14 +252,17 @@ def wedge_lists(
     start = np.concatenate([[0], np.cumsum(np.bincount(wedge, minlength=count))])
     bound = _largest_behind(bound[place], start)
 
-    # An entry packs the number of a plane, its gain, and whether it is at all azimuths of the wedge.
+    # An entry packs the number of a plane, its gain, and whether it is at
+    # all azimuths of the wedge.
     holds = (planes.first[plane] * scale <= wedge) & (planes.last[plane] * scale >= wedge + 1)
     gained = (planes.gain.astype(np.int64) + GAIN_ZERO) << GAIN_SHIFT
     entries = (plane + gained[plane] + FULL * holds).astype(np.uint32)
     return start.astype(np.uint32), entries[place], bound, scale
 
 
-def _in_wedges(planes: Planes, scale: np.float32, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _in_wedges(
+    planes: Planes, scale: np.float32, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return every pair of a plane and a wedge that it meets.
 
     `count` of the wedges is a power of two: then a ray and a plane round alike.
@@ -240,8 +275,11 @@ def _in_wedges(planes: Planes, scale: np.float32, count: int) -> tuple[NDArray[n
 
 
 def _largest_behind(values: Array, start: NDArray[np.int64]) -> Array:
-    """Return of each value of a run the largest of it and those behind it; `start` is where runs begin."""
-    # Runs one after another, from the last: a number that grows by more than the values from run to run parts them.
+    """Return of each value of a run the largest of it and those behind it;
+    `start` is where runs begin.
+    """
+    # Runs one after another, from the last: a number that grows by more than the values
+    # from run to run parts them.
     run = np.repeat(np.arange(len(start) - 1), np.diff(start))
     order = np.argsort(values)
     rank = np.empty(len(values), dtype=np.int64)
@@ -251,7 +289,9 @@ def _largest_behind(values: Array, start: NDArray[np.int64]) -> Array:
 
 
 def parted(planes: Planes) -> Planes:
-    """Part the planes that hold azimuth 0 in two, one that ends beyond 4 and one that begins below 0."""
+    """Part the planes that hold azimuth 0 in two, one that ends beyond 4 and
+    one that begins below 0.
+    """
     around = planes.first > planes.last
     if not around.any():
         return planes
@@ -268,15 +308,21 @@ def _chosen(planes: Planes, which: NDArray[np.bool_]) -> Planes:
 
 def _joined(first: Planes, second: Planes) -> Planes:
     return Planes(
-        *(np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(Planes))
+        *(
+            np.concatenate([getattr(part, field.name) for part in (first, second)])
+            for field in fields(Planes)
+        )
     )
 
 
-def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
+def layers_between(
+    occluders: Occluders, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]
+) -> int:
     """Return how many layers lie between a light and the camera of their basis.
 
-    A closed component counts the larger number of its triangles that face the light and that are averted: the two
-    differ where the light or the camera is inside, and then all beyond is dark. `used` says which components count.
+    A closed component counts the larger number of its triangles that face the light and that are
+    averted: the two differ where the light or the camera is inside, and then all beyond is dark.
+    `used` says which components count.
     """
     l, w = place_and_weight(light)  # noqa: E741
     axes = basis.axes
@@ -292,7 +338,9 @@ def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, use
 
     # The line meets the boxes of few components, and of those few triangles lie about it.
     low, high = occluders.boxes[:, 0], occluders.boxes[:, 1]
-    near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
+    near = used & np.all(
+        (low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1
+    )
     if not near.any():
         return 0
     number = np.flatnonzero(near[occluders.component])
@@ -300,7 +348,8 @@ def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, use
     if not len(number):
         return 0
 
-    # Triangles that the line crosses, by component: those that face the light and those that are averted.
+    # Triangles that the line crosses, by component: those that face the light
+    # and those that are averted.
     crossed = number[_crosses(occluders, number, (start, direction), reach)]
     sign = np.sign(occluders.normals[crossed] @ l - w * occluders.offsets[crossed])
     component = occluders.component[crossed]
@@ -318,23 +367,34 @@ def _beside_axis(occluders: Occluders, number, start: Array, axes: Array) -> NDA
     It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
     """
     x, y = axes[:2] @ occluders.vertices.T - (axes[:2] @ start)[:, None]
-    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    sides = (
+        (x > 0)
+        | (x < 0).view(np.uint8) << 1
+        | (y > 0).view(np.uint8) << 2
+        | (y < 0).view(np.uint8) << 3
+    )
     first, second, third = occluders.triangles[number].T
     return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 
 
-def _crosses(occluders: Occluders, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
-    """Return whether triangles are crossed by start + u direction with u between two bounds, watertight.
+def _crosses(
+    occluders: Occluders, number, line: tuple[Array, Array], reach: tuple[float, float]
+) -> NDArray[np.bool_]:
+    """Return whether triangles are crossed by start + u direction with u
+    between two bounds, watertight.
 
-    The line crosses a triangle if it passes all three edges on the same side. d . (a x b) of an edge is computed from
-    its lower vertex number to its higher one, so that both triangles at an edge see the same rounding.
+    The line crosses a triangle if it passes all three edges on the same side. d . (a x b) of an
+    edge is computed from its lower vertex number to its higher one, so that both triangles at an
+    edge see the same rounding.
     """
     start, direction = line
     triangle = occluders.triangles[number]
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = (occluders.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum))
+        low, high = (
+            occluders.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum)
+        )
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
@@ -405,14 +465,17 @@ def plane_index(
 
 def table_of(Float: type, values: Array, multiple: int) -> Any:
     """Return numbers on the device, flat, padded as by `padded`."""
-    return Float(padded(values.astype(np.float32 if is_single(Float) else np.float64).ravel(), multiple))
+    return Float(
+        padded(values.astype(np.float32 if is_single(Float) else np.float64).ravel(), multiple)
+    )
 
 
 def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
-    """Return the place of the first plane of the wedges of rays, and how many of them they may cross.
+    """Return the place of the first plane of the wedges of rays, and how
+    many of them they may cross.
 
-    `index`: the planes; `azimuth`, `way`: of the rays: diamond angle, and unit direction in the frame, three arrays;
-    `ray_end`: d/x at the end of each; w = 0: 1/x.
+    `index`: the planes; `azimuth`, `way`: of the rays: diamond angle, and unit direction in the
+    frame, three arrays; `ray_end`: d/x at the end of each; w = 0: 1/x.
     """
     x, y, z = way
     # About a light at the camera an azimuth is no number: whole numbers have the upper bound.
@@ -426,15 +489,17 @@ def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
         more = dr.gather(type(x), index.bounds, middle) > asked
         return dr.select(more, middle + 1, low), dr.select(more, high, middle)
 
-    low, _ = dr.while_loop(state=(first, +last), cond=lambda low, high: low < high, body=halve, labels=("low", "high"))
+    low, _ = dr.while_loop(
+        state=(first, +last), cond=lambda low, high: low < high, body=halve, labels=("low", "high")
+    )
     return first, low - first
 
 
 def plane_crossing(index: PlaneIndex, number, way, active):
     """Return where rays cross planes, as D/x (w = 0: 1/x), and whether that is beyond the edge.
 
-    `index`: the planes; `number`: which of them; `way`: unit directions of rays in the frame, three arrays; `active`:
-    lanes to read for.
+    `index`: the planes; `number`: which of them; `way`: unit directions of rays in the frame, three
+    arrays; `active`: lanes to read for.
     """
     x, y, z = way
     a, b, p, q = dr.gather(four_numbers(type(x)), index.lines, number, active)
@@ -447,8 +512,9 @@ def plane_crossing(index: PlaneIndex, number, way, active):
 def padded(values, multiple: int = 1):
     """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
 
-    A frozen function is recorded again where arrays that had one size have two or the other way round, and where the
-    alignment of an array is another; so each kind of array has its own multiple.
+    A frozen function is recorded again where arrays that had one size have two or the other way
+    round, and where the alignment of an array is another; so each kind of array has its own
+    multiple.
     """
     size = multiple << max(6, int(-(-len(values) // multiple) - 1).bit_length())
     room = np.zeros(size * values.itemsize + 64, dtype=np.uint8)

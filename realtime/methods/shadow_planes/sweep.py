@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lit intervals of a camera ray between shadow planes: a walk along the planes of its wedge.
 
-`realtime.methods.shadow_planes.plane_table` has the mathematics. With D the distance from the light to the camera and
-w the direction of the ray in the frame of the light, a plane is crossed at the distance x with D/x = A wx + B wy - wz,
-where 0 < D/x < D (P wx + Q wy); for a light at infinity D is 1. The walk works with that quotient, which falls from the
-camera on, and divides twice an interval.
+`realtime.methods.shadow_planes.plane_table` has the mathematics. With D the distance from the light
+to the camera and w the direction of the ray in the frame of the light, a plane is crossed at the
+distance x with D/x = A wx + B wy - wz, where 0 < D/x < D (P wx + Q wy); for a light at infinity D
+is 1. The walk works with that quotient, which falls from the camera on, and divides twice an
+interval.
 
-A count holds how many layers lie between the light and the point: it starts with those between light and camera, and
-the point is lit where it is zero. Planes come in the order of the middle of a wedge. Two that
-cross within the wedge can come in the wrong order for a ray, so a crossing waits in a queue of two until two more have
-been read. Where that is not enough the ray notices, since its quotients must fall, and starts again with a queue of
-eight; after that it collects the eight nearest crossings from the whole list, goes over them, collects the next eight,
-and so on. That is right for any order. Both queues are worth their code: in processor time at 800 x 600, `tangle`
-takes 2.4 times as long without the queue of eight, and `hall` 17 % longer, `clutter` 12 % without that of two (29
-November 2026).
+A count holds how many layers lie between the light and the point: it starts with those between
+light and camera, and the point is lit where it is zero. Planes come in the order of the middle of a
+wedge. Two that cross within the wedge can come in the wrong order for a ray, so a crossing waits in
+a queue of two until two more have been read. Where that is not enough the ray notices, since its
+quotients must fall, and starts again with a queue of eight; after that it collects the eight
+nearest crossings from the whole list, goes over them, collects the next eight, and so on. That is
+right for any order. Both queues are worth their code: in processor time at 800 x 600, `tangle`
+takes 2.4 times as long without the queue of eight, and `hall` 17 % longer, `clutter` 12 % without
+that of two (29 November 2026).
 
-A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
-(`realtime.intervals` says why): neighbours whose intervals end at two edges of one silhouette are then served at once.
-An interval that is lit to the end of the ray is added after the loop, which rays without crossings do not enter.
+A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits
+until every fourth plane (`realtime.intervals` says why): neighbours whose intervals end at two
+edges of one silhouette are then served at once. An interval that is lit to the end of the ray is
+added after the loop, which rays without crossings do not enter.
 """
 
 from collections.abc import Callable
@@ -50,7 +53,8 @@ from airlight.realtime.methods.shadow_planes.plane_table import (
 from airlight.realtime.numerics.array_types import two_numbers
 from airlight.realtime.numerics.functions import diamond_angle
 
-FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
+#: crossings that wait for others which may come before them, or are collected at once
+FEW, MANY = 2, 8
 _DUE = 3  # marks in the last bits of a place where waiting integrals are added
 
 
@@ -86,7 +90,9 @@ def ray_planes(index: PlaneIndex, aim, distance) -> RayPlanes:
 
 
 def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
-    """Return the quotient D/x of the `k`-th plane of rays, whether they cross it, the layers gained, and its number."""
+    """Return the quotient D/x of the `k`-th plane of rays, whether they cross it, the
+    layers gained, and its number.
+    """
     active = active & (k < ray.count)
     entry = dr.gather(mi.UInt32, index.entries, ray.first + k, active)
     number = entry & NUMBER
@@ -100,7 +106,10 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
     counts = active & beyond & (quotient > 0)
     unsure = counts & ((entry & FULL) == 0)
     crossed = dr.if_stmt(
-        args=(number, ray.azimuth, unsure), cond=unsure, true_fn=within, false_fn=lambda *_: mi.Bool(True)
+        args=(number, ray.azimuth, unsure),
+        cond=unsure,
+        true_fn=within,
+        false_fn=lambda *_: mi.Bool(True),
     )
     gain = Float(mi.Int32((entry >> GAIN_SHIFT) & 63) - GAIN_ZERO)
     return quotient, counts & crossed, gain, number
@@ -109,9 +118,10 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
 def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero):
     """Add up an integral over the lit intervals of every ray.
 
-    `index`, `ray`: the planes and the rays; `segment`: distances (x0, x1) between which to look; `x1` may be infinite
-    [m]; function (x0, x1) -> value of one interval; `zero`: the value of no interval, one for each ray. Returns
-    `total`: sum over the lit intervals; `lit`: whether the light reaches the end of the segment.
+    `index`, `ray`: the planes and the rays; `segment`: distances (x0, x1) between which to look;
+    `x1` may be infinite [m]; function (x0, x1) -> value of one interval; `zero`: the value of no
+    interval, one for each ray. Returns `total`: sum over the lit intervals; `lit`: whether the
+    light reaches the end of the segment.
     """
     x0, x1 = segment
 
@@ -136,7 +146,14 @@ def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero
     )
     # Here, and not behind each walk: a kernel holds the integral once for each place that calls it.
     lit = passed.layers <= 0
-    total = sum_at_end(passed.intervals, sweep.integral, sweep.ray_end, opened=passed.opened, lit=lit, active=wanted)
+    total = sum_at_end(
+        passed.intervals,
+        sweep.integral,
+        sweep.ray_end,
+        opened=passed.opened,
+        lit=lit,
+        active=wanted,
+    )
     return total, lit
 
 
@@ -165,11 +182,18 @@ def _start(sweep: _Sweep) -> _Passed:
     """Return the state of every ray at the camera."""
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     camera = dr.full(Float, dr.inf, width)
-    return _Passed(dr.zeros(Float, width) + sweep.index.layers, camera, +camera, no_intervals(sweep.zero, +camera))
+    return _Passed(
+        dr.zeros(Float, width) + sweep.index.layers,
+        camera,
+        +camera,
+        no_intervals(sweep.zero, +camera),
+    )
 
 
 def _pass_plane(sweep: _Sweep, passed: _Passed, quotient, gain, *, crosses, due) -> _Passed:
-    """Go over a plane where `crosses` is true; an interval that waits is added where `due` or another ends."""
+    """Go over a plane where `crosses` is true; an interval that waits is added
+    where `due` or another ends.
+    """
     layers = passed.layers + dr.select(crosses, gain, 0)
     opens = crosses & (passed.layers > 0) & (layers <= 0)
     closes = crosses & (passed.layers <= 0) & (layers > 0)
@@ -183,7 +207,9 @@ def _pass_plane(sweep: _Sweep, passed: _Passed, quotient, gain, *, crosses, due)
 
 
 def _read(sweep: _Sweep, place, reads):
-    """Return the quotient of a plane and its gain, and whether the ray crosses it before its end."""
+    """Return the quotient of a plane and its gain, and whether the ray
+    crosses it before its end.
+    """
     Float = type(sweep.ray_end)
 
     def read(place, reads):
@@ -191,15 +217,18 @@ def _read(sweep: _Sweep, place, reads):
         return quotient, gain, crossed & (quotient > sweep.ray_end)
 
     return dr.if_stmt(
-        args=(place, reads), cond=reads, true_fn=read, false_fn=lambda *_: (Float(0), Float(0), mi.Bool(False))
+        args=(place, reads),
+        cond=reads,
+        true_fn=read,
+        false_fn=lambda *_: (Float(0), Float(0), mi.Bool(False)),
     )
 
 
 def _walk(sweep: _Sweep, active, *, places: int):
     """Go over the planes in the order of the list.
 
-    Returns `passed`: what the ray has passed, right where it is not lost; `lost`: whether the order was wrong, or wrong
-    by more than the queue could repair.
+    Returns `passed`: what the ray has passed, right where it is not lost; `lost`: whether the order
+    was wrong, or wrong by more than the queue could repair.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.count
@@ -208,8 +237,8 @@ def _walk(sweep: _Sweep, active, *, places: int):
     def body(place, waiting, passed, lost):
         reads = place < count
         quotient, gain, crossed = _read(sweep, place, reads)
-        # Where nothing is crossed the queue stays as it is: infinitely near, that comes out again. Behind the last
-        # plane those that wait come out.
+        # Where nothing is crossed the queue stays as it is: infinitely near, that comes out again.
+        # Behind the last plane those that wait come out.
         moves = crossed | ~reads
         key, gain = dr.select(moves, quotient, dr.inf), dr.select(moves, gain, 0)
         waiting, nearest, gained = exchange(waiting, key, gain)
@@ -222,7 +251,12 @@ def _walk(sweep: _Sweep, active, *, places: int):
     # The first entries that leave the queue have no place and no gain, and change nothing.
     nothing_waits = filled(dr.inf, places, Float, width)
     _, _, passed, lost = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(sweep), dr.full(mi.Bool, False, width)),
+        state=(
+            dr.zeros(mi.UInt32, width),
+            nothing_waits,
+            _start(sweep),
+            dr.full(mi.Bool, False, width),
+        ),
         cond=lambda place, waiting, passed, lost: (place < end) & ~lost,
         body=body,
         labels=("place", "waiting", "passed", "lost"),
@@ -231,9 +265,11 @@ def _walk(sweep: _Sweep, active, *, places: int):
 
 
 def _collect(sweep: _Sweep):
-    """Collect the nearest crossings beyond the last one from the whole list and go over them, until there are none.
+    """Collect the nearest crossings beyond the last one from the whole list and go over
+    them, until there are none.
 
-    Crossings at one quotient come in the order of the list; as many as were already gone over are left out.
+    Crossings at one quotient come in the order of the list; as many as were
+    already gone over are left out.
 
     Returns what the ray has passed.
     """
@@ -254,10 +290,17 @@ def _collect(sweep: _Sweep):
         passed = _pass_plane(sweep, passed, at, gained, crosses=crosses, due=mi.Bool(False))
         empty = ~reads & (at <= 0)
         again = empty & more
-        place, seen = dr.select(reads, place + 1, dr.select(again, 0, place)), dr.select(again, 0, seen)
+        place, seen = (
+            dr.select(reads, place + 1, dr.select(again, 0, place)),
+            dr.select(again, 0, seen),
+        )
         return place, nearest, more & ~again, ties, seen, passed, done | (empty & ~more)
 
-    none, no, zero = filled(0, MANY, Float, width), dr.full(mi.Bool, False, width), dr.zeros(mi.UInt32, width)
+    none, no, zero = (
+        filled(0, MANY, Float, width),
+        dr.full(mi.Bool, False, width),
+        dr.zeros(mi.UInt32, width),
+    )
     *_, passed, _ = dr.while_loop(
         state=(zero, none, no, +zero, +zero, _start(sweep), no),
         cond=lambda place, nearest, more, ties, seen, passed, done: ~done,

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Soft shafts: airlight and surfaces under area lights, from few light samples and filters.
 
-Ali 2016 takes 3 or 5 points of a light, a shadow map for each, the mean of their visibilities in N + 1 levels, few
-steps along each ray, and a bilateral filter of what comes out (its SBFS and SoftBiF-VS); its realTiSoftLS computes
-airlight in fewer pixels. It prints no equation: all is reconstructed from captions, and the defaults are those of its
-Fig. 4.9.
+Ali 2016 takes 3 or 5 points of a light, a shadow map for each, the mean of their visibilities in
+N + 1 levels, few steps along each ray, and a bilateral filter of what comes out (its SBFS and
+SoftBiF-VS); its realTiSoftLS computes airlight in fewer pixels. It prints no equation: all is
+reconstructed from captions, and the defaults are those of its Fig. 4.9.
 
 The stages of a frame:
 
@@ -13,13 +13,16 @@ The stages of a frame:
 3. The bilateral filter, on log(1 + L / mean L), and joint up-sampling with a depth test.
 4. The fraction of each light that reaches each pixel's surface, and its filter, before anything is
    shaded.
-5. The frame multiplies the unshadowed surface by that fraction and adds the airlight, both in linear radiance.
+5. The frame multiplies the unshadowed surface by that fraction and adds the airlight,
+   both in linear radiance.
 
-With `interleave` each pixel of a tile of 4 x 4 takes one of the points and a shift of the steps of its own; the mean
-over the tile, by depth, is that of all points and of sixteen times as many steps. The mean of the fraction is a ratio
-of two means (Heitz, Hill, McGuire 2018): what a tile does not shadow is not noisy.
+With `interleave` each pixel of a tile of 4 x 4 takes one of the points and a shift of the steps of
+its own; the mean over the tile, by depth, is that of all points and of sixteen times as many steps.
+The mean of the fraction is a ratio of two means (Heitz, Hill, McGuire 2018): what a tile does not
+shadow is not noisy.
 
-Lights without extent are one point. Their surfaces are lit by shadow rays and have no penumbra to filter.
+Lights without extent are one point. Their surfaces are lit by shadow rays and
+have no penumbra to filter.
 """
 
 import math
@@ -65,7 +68,8 @@ from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_me
 from airlight.realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
-_LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
+# its narrowest, and that where pixels share the points [pixels]
+_LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5
 _GROUP = 4  # how many light samples a pixel of a narrow penumbra asks
 
 
@@ -75,26 +79,33 @@ class SoftShafts(SoftShaftsParameters):
 
     References
     ----------
-    Ali 2016, reconstructed from captions: Figs. 4.8, 4.9 (points, `hd`, `hr`), 4.19 (taps), 5.8 (R1 to R4).
+    Ali 2016, reconstructed from captions: Figs. 4.8, 4.9 (points, `hd`, `hr`),
+    4.19 (taps), 5.8 (R1 to R4).
     """
 
     def check(self, scene):
-        """Refuse a `scale` that does not divide the image, more samples than share a tile, and maps without room."""
+        """Refuse a `scale` that does not divide the image, more samples than share a
+        tile, and maps without room.
+        """
         camera = scene.camera
         size, scale = self.map, self.scale
         if camera.width % scale or camera.height % scale:
             raise InputError(
-                f"scale: got {scale} and an image of {camera.width} x {camera.height}, expected one that divides both "
+                f"scale: got {scale} and an image of {camera.width} x {camera.height}, expected "
+                "one that divides both "
                 "sides"
             )
         most = max(lights.count for lights in by_source(light_tables(scene.lights)))
         if self.interleave and (most > 16 or 16 % most):
             raise InputError(
-                f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a tile has each"
+                f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a "
+                "tile has each"
             )
         if self._with_maps and scene.features.shadows:
             one = maps_memory(type(camera.origin.x), 1, size)
-            needed = sum(map_memory(light, size) if light.facing is None else one for light in scene.lights)
+            needed = sum(
+                map_memory(light, size) if light.facing is None else one for light in scene.lights
+            )
             check_maps(scene.lights, size, needed)
 
     @property
@@ -102,7 +113,9 @@ class SoftShafts(SoftShaftsParameters):
         return self.shadow == "map" or self.surfaces == "map" or self.hd == AUTO
 
     def preparation(self, scene):
-        """Return a function for the tables of light samples of a frame, and their maps: a record for each source."""
+        """Return a function for the tables of light samples of a frame, and their maps:
+        a record for each source.
+        """
         asked = {
             "with_maps": self._with_maps and scene.features.shadows,
             "for_surfaces": self.surfaces == "map",
@@ -110,7 +123,9 @@ class SoftShafts(SoftShaftsParameters):
 
         def prepare(now):
             sources = by_source(light_tables(now.lights))
-            return tuple(source_state(now.geometry, lights, self.map, **asked) for lights in sources)
+            return tuple(
+                source_state(now.geometry, lights, self.map, **asked) for lights in sources
+            )
 
         return prepare
 
@@ -125,9 +140,13 @@ class SoftShafts(SoftShaftsParameters):
 
 
 class _Frame:
-    """The images of one frame while it is recorded: all pixels row by row, and the few that airlight is computed in."""
+    """The images of one frame while it is recorded: all pixels row by row, and the few that
+    airlight is computed in.
+    """
 
-    def __init__(self, view: View, states: tuple[SourceState, ...], parameters: SoftShaftsParameters):
+    def __init__(
+        self, view: View, states: tuple[SourceState, ...], parameters: SoftShaftsParameters
+    ):
         width, height, scale = view.camera.width, view.camera.height, parameters.scale
         self.view, self.parameters = view, parameters
         self.states = states
@@ -152,7 +171,11 @@ class _Frame:
 
         def of_sample(index: Any, shift: Any = 0.5) -> Any:
             light = lights[index]
-            how: dict[str, Any] = {"steps": p.steps, "spacing": p.spacing, "lit": self._lit(state, light, index)}
+            how: dict[str, Any] = {
+                "steps": p.steps,
+                "spacing": p.spacing,
+                "lit": self._lit(state, light, index),
+            }
             return marched_integral(few.lit_by(light), few.distance, shift=shift, **how)
 
         if like.facing is None:
@@ -172,11 +195,15 @@ class _Frame:
             row = view.pixel // self.raster.width
             place = {"column": view.pixel - row * self.raster.width, "row": row}
             own = depth_guide(view.distance, p.hz)
-            integral = upsample(integral, self.few_depth, own.values, self.few_raster, scale=p.scale, **place)
+            integral = upsample(
+                integral, self.few_depth, own.values, self.few_raster, scale=p.scale, **place
+            )
         return view.medium.radiance(like, integral)
 
     def visibility(self, number: int, lights: LightTable) -> list[Any]:
-        """Return the fraction of a source that reaches the surfaces, or one for each of its lights."""
+        """Return the fraction of a source that reaches the surfaces, or
+        one for each of its lights.
+        """
         view, p, whole = self.view, self.parameters, self.whole
         if not view.features.shadows or not view.features.surfaces:
             count = 1 if p.by_source else lights.count
@@ -184,12 +211,16 @@ class _Frame:
         there = dr.isfinite(view.distance)
         point = view.origin + view.direction * dr.select(there, view.distance, 0)
         if lights.rows.facing is None:
-            # Twenty units in the last place towards the camera: rounded behind its surface, a point is in its shadow.
+            # Twenty units in the last place towards the camera: rounded behind its surface,
+            # a point is in its shadow.
             before = view.origin + view.direction * dr.select(there, view.distance * (1 - 2e-6), 0)
             return [there & view.visible(before, lights.rows)]
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
-            return [there & self._reached(state, place, lights[place], point) for place in range(lights.count)]
+            return [
+                there & self._reached(state, place, lights[place], point)
+                for place in range(lights.count)
+            ]
         if p.interleave:
             number = self._fraction(self.raster, lights.count).number
             own = reached_surfaces(whole, state, lights, lambda _: number, 1, p)
@@ -198,7 +229,9 @@ class _Frame:
                 dr.schedule(own.lit, own.all)
             lit = self._over_tiles(own).fraction
         else:
-            lit = reached_surfaces(whole, state, lights, lambda index: index, lights.count, p).fraction
+            lit = reached_surfaces(
+                whole, state, lights, lambda index: index, lights.count, p
+            ).fraction
         if p.hd == AUTO:
             dr.eval(lit)
             width = self._penumbra_width(state, lights)
@@ -210,7 +243,13 @@ class _Frame:
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
             lit = _smooth_fraction(
-                lit, self.raster, there=there, depth=self.depth, points=lights.count, levels=levels, p=p
+                lit,
+                self.raster,
+                there=there,
+                depth=self.depth,
+                points=lights.count,
+                levels=levels,
+                p=p,
             )
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
@@ -221,7 +260,9 @@ class _Frame:
         few, step = few_pixels(self.raster)
         blockers = blockers_of(self.rays(small_pixels(few, step, self.raster.width)), state, lights)
         distance, camera = self.whole.distance, self.view.camera
-        return penumbra_width(blockers, distance, camera, state.width, self.raster, guide=self.depth)
+        return penumbra_width(
+            blockers, distance, camera, state.width, self.raster, guide=self.depth
+        )
 
     def _over_tiles(self, reached: Reached) -> Reached:
         """Return the means over a tile: the fraction is then one mean over another."""
@@ -229,12 +270,19 @@ class _Frame:
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
     def _where_narrow(
-        self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, lights: LightTable
+        self,
+        lit: Any,
+        width: Any,
+        own: Reached,
+        number: Any,
+        state: SourceState,
+        lights: LightTable,
     ) -> Any:
-        """Return the fraction, with the rest of each pixel's group of light samples where penumbrae are narrow.
+        """Return the fraction, with the rest of each pixel's group of light samples
+        where penumbrae are narrow.
 
-        Adjacent pixels lie in different groups of `_GROUP` light samples; the filter that follows combines four groups.
-        A pixel has already tested one sample of its group.
+        Adjacent pixels lie in different groups of `_GROUP` light samples; the filter that follows
+        combines four groups. A pixel has already tested one sample of its group.
         """
         p = self.parameters
         group = min(_GROUP, lights.count)
@@ -250,12 +298,18 @@ class _Frame:
 
     def _smooth_by_width(self, lit: Any, width: Any, points: int) -> Any:
         p = self.parameters
-        fraction, least = (AUTO_WIDTH_SHARED, _LEAST_SHARED) if p.interleave else (AUTO_WIDTH, _LEAST_AUTO)
+        fraction, least = (
+            (AUTO_WIDTH_SHARED, _LEAST_SHARED) if p.interleave else (AUTO_WIDTH, _LEAST_AUTO)
+        )
         hd = dr.clip(fraction / points * width, least, _MOST_AUTO)
-        return separable(lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO)
+        return separable(
+            lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO
+        )
 
     def _lit(self, state: SourceState, light: Light, number: Any) -> Callable[[Any], Any]:
-        """Return a test of whether a light of a number in its source reaches the few rays at distances [m]."""
+        """Return a test of whether a light of a number in its source reaches the
+        few rays at distances [m].
+        """
         view, p, maps = self.few, self.parameters, state.maps
         if not view.features.shadows or p.shadow == "none":
             return lambda x: True
@@ -275,7 +329,8 @@ class _Frame:
     def _fraction(self, raster: Raster, samples: int) -> Fraction:
         """Return which light sample each pixel takes, and how far its steps are shifted."""
         column, row = raster.places()
-        # The order of ordered dithering (Bayer 1973): pixels side by side are far apart in it, and so are their points.
+        # The order of ordered dithering (Bayer 1973): pixels side by side are far apart in it,
+        # and so are their points.
         other = column ^ row
         order = (other & 1) * 8 + (row & 1) * 4 + (other & 2) + ((row & 2) >> 1)
         # Another lattice, so that the shifts of neighbouring points are far apart too.
@@ -284,18 +339,27 @@ class _Frame:
 
 
 def _smooth_fraction(
-    fraction: Any, raster: Raster, *, there: Any, depth: Guide, points: int, levels: bool, p: SoftShaftsParameters
+    fraction: Any,
+    raster: Raster,
+    *,
+    there: Any,
+    depth: Guide,
+    points: int,
+    levels: bool,
+    p: SoftShaftsParameters,
 ) -> Any:
     """Return the fraction of a light that reaches the surfaces, filtered.
 
-    `fraction`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the sky takes no part;
-    `depth`: the guide of their depth; `points`, `levels`: N, and whether the fraction has N + 1 levels; `p`: the
-    parameters, with a filter whose `hd` is a number.
+    `fraction`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the
+    sky takes no part; `depth`: the guide of their depth; `points`, `levels`: N, and whether the
+    fraction has N + 1 levels; `p`: the parameters, with a filter whose `hd` is a number.
     """
     if p.filter == "gauss" or p.guide == "self":
         hr = math.inf if p.filter == "gauss" else p.hr
         if levels:
-            return bilateral_of_levels(fraction, raster, levels=points, hd=p.width, hr=hr, there=there)
+            return bilateral_of_levels(
+                fraction, raster, levels=points, hd=p.width, hr=hr, there=there
+            )
         # The sky is unlike all surfaces.
         sky = Guide(dr.select(there, type(fraction)(0), 1), 1e-3)
         guides = (sky,) if math.isinf(hr) else (sky, Guide(fraction, hr))
@@ -303,8 +367,12 @@ def _smooth_fraction(
     return _filtered(fraction, raster, (depth,), p.width)
 
 
-def _smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters) -> Any:
-    """Return airlight filtered; `hd` counts pixels of the full image, whatever the scale of this one."""
+def _smooth_airlight(
+    integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters
+) -> Any:
+    """Return airlight filtered; `hd` counts pixels of the full image,
+    whatever the scale of this one.
+    """
     if p.filter == "none" or p.hd == AUTO:
         return integral
     guides: tuple[Guide, ...] = ()

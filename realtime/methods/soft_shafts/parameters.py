@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters of soft shafts. The defaults are those of Ali 2016, Fig. 4.9: 5 points, hd = 5, hr = 0.5."""
+"""The parameters of soft shafts. The defaults are those of Ali 2016, Fig. 4.9: 5
+points, hd = 5, hr = 0.5.
+"""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +29,9 @@ def check_width(value: Any) -> None:
     except (TypeError, ValueError):
         width = math.nan
     if not 0 < width <= MOST_HD:
-        raise InputError(f"hd: got {value!r}, expected 'auto' or a number above 0 to {MOST_HD:g} [pixels]")
+        raise InputError(
+            f"hd: got {value!r}, expected 'auto' or a number above 0 to {MOST_HD:g} [pixels]"
+        )
 
 
 def check_range(value: Any) -> None:
@@ -59,28 +63,40 @@ class SoftShaftsParameters(Method):
         choices=("uniform", "equiangular"),
     )
     shadow: str = parameter(
-        "map", "of the steps: a look-up in a map, a shadow ray, or none", choices=("map", "ray", "none")
+        "map",
+        "of the steps: a look-up in a map, a shadow ray, or none",
+        choices=("map", "ray", "none"),
     )
     surfaces: str = parameter(
-        "map", "visibility of surfaces: by look-ups in the maps, or by a shadow ray", choices=("map", "ray")
+        "map",
+        "visibility of surfaces: by look-ups in the maps, or by a shadow ray",
+        choices=("map", "ray"),
     )
     map: int = map_size(512, "texels on a side of the map of every light sample")
     scale: int = parameter(
-        1, "airlight is computed in one pixel of so many, in rows and columns, and interpolated", choices=(1, 2, 4, 8)
+        1,
+        "airlight is computed in one pixel of so many, in rows and columns, and interpolated",
+        choices=(1, 2, 4, 8),
     )
     interleave: bool = parameter(
-        False, "each pixel of a tile of 4 x 4 takes one of the light samples and a shift of the steps of its own"
+        False,
+        "each pixel of a tile of 4 x 4 takes one of the light samples and a shift of the steps of "
+        "its own",
     )
     narrow: float = parameter(
         0.0,
-        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel tests four light samples",
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel tests four "
+        "light samples",
         least=0,
         unit="pixels",
     )
-    filter: str = parameter("bilateral", "filters of visibility and airlight", choices=("bilateral", "gauss", "none"))
+    filter: str = parameter(
+        "bilateral", "filters of visibility and airlight", choices=("bilateral", "gauss", "none")
+    )
     hd: str = parameter(
         "5",
-        "standard deviation of the filter in the image; auto: by pixel, from the width of the penumbra",
+        "standard deviation of the filter in the image; auto: by pixel, from the width of the "
+        "penumbra",
         unit="pixels",
         check=check_width,
         wanted="auto, or a number above 0 to 64",
@@ -92,13 +108,19 @@ class SoftShaftsParameters(Method):
         wanted="a number above 0, or inf",
     )
     guide: str = parameter(
-        "self", "values that the bilateral filter compares: the image itself, or depths", choices=("self", "depth")
+        "self",
+        "values that the bilateral filter compares: the image itself, or depths",
+        choices=("self", "depth"),
     )
-    hz: float = parameter(0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10)
+    hz: float = parameter(
+        0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10
+    )
 
     def _check_together(self) -> None:
         if self.hd == AUTO and (self.filter != "bilateral" or self.guide != "depth"):
-            raise InputError("hd: auto has the depth for a guide; expected filter=bilateral guide=depth with it")
+            raise InputError(
+                "hd: auto has the depth for a guide; expected filter=bilateral guide=depth with it"
+            )
 
     @property
     def width(self) -> float:
@@ -107,7 +129,9 @@ class SoftShaftsParameters(Method):
 
     @property
     def by_source(self):
-        """All points of a light have one fraction: without filter each has its own, and the sum is exact."""
+        """All points of a light have one fraction: without filter each has its
+        own, and the sum is exact.
+        """
         return self.filter != "none" or self.interleave
 
     def error_causes(self, size):

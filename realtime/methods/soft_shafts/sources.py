@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Light samples of a source as methods ask them, and their shadow maps.
 
-**Which fraction of an area light reaches the visible surfaces**, and how wide its penumbrae are there.
+**Which fraction of an area light reaches the visible surfaces**, and how wide
+its penumbrae are there.
 
-The mean over N light samples has N + 1 levels. Points of a sphere face different ways: there each counts with its
-cosine at the light over the square of its distance, as it counts in the irradiance.
+The mean over N light samples has N + 1 levels. Points of a sphere face different ways: there each
+counts with its cosine at the light over the square of its distance, as it counts in the irradiance.
 
-The width of a penumbra follows from similar triangles (Fernando 2005, PCSS): of a light of the width L, an edge at the
-distance d_b and a surface at d_r from it,
+The width of a penumbra follows from similar triangles (Fernando 2005, PCSS): of a light of the
+width L, an edge at the distance d_b and a surface at d_r from it,
 
     w = L (d_r - d_b) / d_b,
 
-with d_b what a map holds in the direction of the surface, where that is nearer than it. Over the light samples and the
-neighbours of a pixel the geometric mean of w is taken: where edges at several distances shadow a pixel, the narrow
-penumbrae count, which a wide filter would smear. Widths change slowly, so that they are looked for in few pixels.
+with d_b what a map holds in the direction of the surface, where that is nearer than it. Over the
+light samples and the neighbours of a pixel the geometric mean of w is taken: where edges at several
+distances shadow a pixel, the narrow penumbrae count, which a wide filter would smear. Widths change
+slowly, so that they are looked for in few pixels.
 """
 
 from collections.abc import Callable
@@ -46,7 +48,9 @@ class SourceState:
 def source_state(
     scene: Any, lights: LightTable, size: int, *, with_maps: bool, for_surfaces: bool = True
 ) -> SourceState:
-    """Return the state of a source of some `lights`; `size` [texels] is that of its maps, also `for_surfaces`."""
+    """Return the state of a source of some `lights`; `size` [texels] is that of its
+    maps, also `for_surfaces`.
+    """
     light = lights.rows
     if light.facing is None:
         maps = cast_shadow_map(scene, light, size) if with_maps else None
@@ -64,7 +68,9 @@ def source_state(
 
 @dataclass(frozen=True)
 class Fraction:
-    """The part of an area light that each ray takes: one light sample, with a shift of its steps."""
+    """The part of an area light that each ray takes: one light sample,
+    with a shift of its steps.
+    """
 
     number: Any  #: of the light sample
     shift: Any  #: of the steps, from 0 to 1 of one
@@ -72,11 +78,14 @@ class Fraction:
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (its test fits it again).
 AUTO_WIDTH = 0.4
-#: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
+#: The same where pixels share the points, whose mean over a tile is no staircase:
+#: the least error in `fence`.
 AUTO_WIDTH_SHARED = 1.6
 _STEP = 4  # pixels from one place where the width is looked for to the next
-_SEARCH = 4.0  # how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
-_NEARER = 0.01  # what is this much nearer to the light than a surface, of its own distance, is not that surface
+# how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
+_SEARCH = 4.0
+# what is this much nearer to the light than a surface, of its own distance, is not that surface
+_NEARER = 0.01
 
 
 @dataclass(frozen=True)
@@ -103,8 +112,9 @@ def reached_surfaces(
 ) -> Reached:
     """Return the part of an area light that reaches `asked` surfaces of a view; others return 0.
 
-    `view`: the rays, row by row; `state`, `lights`: the light and its samples; `number_of`, `count`: which light
-    sample each ray asks first, second and so on, counted from 0, and how many; `p`: the parameters.
+    `view`: the rays, row by row; `state`, `lights`: the light and its samples; `number_of`,
+    `count`: which light sample each ray asks first, second and so on, counted from 0, and how many;
+    `p`: the parameters.
     """
     Float = type(view.distance)
     there = dr.isfinite(view.distance) & asked
@@ -117,7 +127,9 @@ def reached_surfaces(
         return Reached(*of_sample(mi.UInt32(0)))
 
     def add(index: Any, sums: Any):
-        return index + 1, [so_far + term for so_far, term in zip(sums, of_sample(index), strict=True)]
+        return index + 1, [
+            so_far + term for so_far, term in zip(sums, of_sample(index), strict=True)
+        ]
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(2)]),
@@ -129,7 +141,13 @@ def reached_surfaces(
 
 
 def _reached_of_sample(
-    view: View, state: SourceState, lights: LightTable, place: Any, there: Any, number: Any, p: SoftShaftsParameters
+    view: View,
+    state: SourceState,
+    lights: LightTable,
+    place: Any,
+    there: Any,
+    number: Any,
+    p: SoftShaftsParameters,
 ) -> list[Any]:
     """Return the terms of one light sample in the sums of `Reached`."""
     light = lights[number]
@@ -145,22 +163,30 @@ def _reached_of_sample(
         lit = state.maps.of(number, light).lit_surface(place)
     else:
         lit = view.visible(place, light, there)
-    return [dr.select(there & lit, type(square)(weight), 0), dr.select(there, type(square)(weight), 0)]
+    return [
+        dr.select(there & lit, type(square)(weight), 0),
+        dr.select(there, type(square)(weight), 0),
+    ]
 
 
 def few_pixels(raster: Raster) -> tuple[Raster, int]:
-    """Return the image of the pixels in which penumbrae are looked for, and how many pixels it is to the next one."""
+    """Return the image of the pixels in which penumbrae are looked for, and how many
+    pixels it is to the next one.
+    """
     # One pixel of some is enough to look about, where these divide the image.
     step = _STEP if raster.width % _STEP == 0 and raster.height % _STEP == 0 else 1
     return Raster(raster.width // step, raster.height // step), step
 
 
-def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, raster: Raster, *, guide: Guide) -> Any:
-    """Return how wide the penumbra of a light is about every pixel [pixels], 0 where nothing blocks it.
+def penumbra_width(
+    blockers: Any, distance: Any, camera: Camera, width: Any, raster: Raster, *, guide: Guide
+) -> Any:
+    """Return how wide the penumbra of a light is about every pixel [pixels], 0
+    where nothing blocks it.
 
-    `blockers`: from `blockers_of`, in the pixels of `few_pixels`; `distance`: how far all surfaces of the image are,
-    row by row [m]; `camera`, `width`: of the image, and how wide the light is [m]; `raster`: the image; `guide`: of the
-    depth.
+    `blockers`: from `blockers_of`, in the pixels of `few_pixels`; `distance`: how far all surfaces
+    of the image are, row by row [m]; `camera`, `width`: of the image, and how wide the light is
+    [m]; `raster`: the image; `guide`: of the depth.
     """
     few, step = few_pixels(raster)
     dr.eval(guide.values)
@@ -179,7 +205,8 @@ def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, ras
 
 
 def blockers_of(view: View, state: SourceState, lights: LightTable) -> Any:
-    """Return the sum of log((d_r - d_b) / d_b) over the light samples that something blocks, and how many these are.
+    """Return the sum of log((d_r - d_b) / d_b) over the light samples that something
+    blocks, and how many these are.
 
     `view`: rays to surfaces; `state`, `lights`: the light, with its maps, and its samples.
     """
@@ -192,7 +219,11 @@ def blockers_of(view: View, state: SourceState, lights: LightTable) -> Any:
         light = lights[number]
         beyond = maps.of(number, light).beyond(place, there)
         before = there & (beyond > _NEARER) & (dr.dot(place - light.position, light.normal) > 0)
-        return number + 1, near + dr.select(before, dr.log(beyond), 0), blocked + dr.select(before, Float(1), 0)
+        return (
+            number + 1,
+            near + dr.select(before, dr.log(beyond), 0),
+            blocked + dr.select(before, Float(1), 0),
+        )
 
     nothing = dr.zeros(Float, dr.width(view.distance))
     _, near, blocked = dr.while_loop(

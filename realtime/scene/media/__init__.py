@@ -1,41 +1,49 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Media: what fills space, and what it answers. Methods find lit intervals and ask the medium for the rest.
+"""Media: what fills space, and what it answers. Methods find lit intervals and ask
+the medium for the rest.
 
-**A new medium** is a frozen dataclass derived from `Medium` whose fields are Dr.Jit arrays, `albedo` and `phase` among
-them. It must write
+**A new medium** is a frozen dataclass derived from `Medium` whose fields are Dr.Jit arrays,
+`albedo` and `phase` among them. It must write
 
-- `channels` and `vacuum`: one extinction or three, and whether a ray can leave the medium without end;
+- `channels` and `vacuum`: one extinction or three, and whether a ray can
+  leave the medium without end;
 - `extinction(rays, x)`: at distances along rays, by channel;
-- `optical_depth(rays, x0, x1)`: of segments, by channel, in closed form where it has one; x1 may be infinite;
-- `longest(rays, light, x, change)`: a length from x on in which both depths and the logarithm of the extinction change
-  by no more than a number together;
+- `optical_depth(rays, x0, x1)`: of segments, by channel, in closed form where it has
+  one; x1 may be infinite;
+- `longest(rays, light, x, change)`: a length from x on in which both depths and the logarithm of
+  the extinction change by no more than a number together;
 - `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any;
 - `length_of(depth)`: after which length no uniform step is needed;
 - `thicker(factor)`: itself, with more extinction.
 
-With these every method of lit intervals, the marchers, soft shafts, froxels, surfaces and user methods render it, lit
-segments to 1e-6: `tests/realtime/scene/media/test_integrate.py` has a linear density ramp. It may write, because it
-knows better,
+With these every method of lit intervals, the marchers, soft shafts, froxels, surfaces and user
+methods render it, lit segments to 1e-6: `tests/realtime/scene/media/test_integrate.py` has a linear
+density ramp. It may write, because it knows better,
 
 - `summary`, in words for the user, and `phases` where it has several;
-- `lit`: rays with a light, a class derived from `LitRays` with its own `airlight(x0, x1)`, a closed form or a kernel
-  (`realtime.kernels` are those of the homogeneous medium), or its own `panel`, which shares work between nodes;
+- `lit`: rays with a light, a class derived from `LitRays` with its own `airlight(x0, x1)`, a closed
+  form or a kernel (`realtime.kernels` are those of the homogeneous medium), or its own `panel`,
+  which shares work between nodes;
 - `check_beam`: which lights at infinity it lets in;
 - `depth_to_light`: of whole paths from points to a light;
 - `rays`: what of rays is found once, as where they enter and leave its parts, for `Rays.crossed`;
-- `source` and `unit`: what scatters, and what of it is the same everywhere and is left out of integrals;
+- `source` and `unit`: what scatters, and what of it is the same everywhere and
+  is left out of integrals;
 - `mean_source`, `last_depth`, `part`, `ambient`: of froxels, of steps, of a constant field.
 
-`realtime.scene.read_media` makes it of what Mitsuba loaded. Point, spot and area lights have a `position`; a light at
-infinity (`light.w == 0`) has an `axis`, its rays' direction. Its source is not divided by r^2.
+`realtime.scene.read_media` makes it of what Mitsuba loaded. Point, spot and area lights have a
+`position`; a light at infinity (`light.w == 0`) has an `axis`, its rays' direction. Its source is
+not divided by r^2.
 
 Read in this order:
 
-- `medium.py`: the protocol, `Medium`, rays with one light, `LitRays`, and the homogeneous medium, which asks kernels;
+- `medium.py`: the protocol, `Medium`, rays with one light, `LitRays`, and the homogeneous
+  medium, which asks kernels;
 - `integrate.py`: the airlight of lit segments, by panels, in any medium;
 - `height_fog.py`: density by height: optical depths and suns in closed form;
 - `density_grid.py`: density on a grid, marched;
 - `bounded.py`: homogeneous media with bounds, in vacuum or in another; clouds;
-- `light_paths.py`: how much of the paths from a light to the points of a ray lies in a convex medium;
+- `light_paths.py`: how much of the paths from a light to the points of a ray
+  lies in a convex medium;
 - `bounded_rays.py`: their airlight: the bends of these paths, and how long panels may be.
 """

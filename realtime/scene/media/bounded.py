@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounded media: homogeneous, convex and disjoint, in vacuum or in a homogeneous medium around them.
+"""Bounded media: homogeneous, convex and disjoint, in vacuum or in a
+homogeneous medium around them.
 
-A ray enters and leaves each medium once. The lengths of its segments in the media follow from these two distances,
-found once a ray (`crossed`), and those of light paths from `realtime.scene.media.light_paths`; an optical depth is
+A ray enters and leaves each medium once. The lengths of its segments in the media follow from these
+two distances, found once a ray (`crossed`), and those of light paths from
+`realtime.scene.media.light_paths`; an optical depth is
 
     tau = sigma_0 length + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 """
@@ -24,7 +26,9 @@ from airlight.realtime.scene.phase import Phase
 
 @dataclass(frozen=True)
 class Clouds:
-    """Media within closed bounds of any shape, disjoint, in vacuum: tables with an entry for each."""
+    """Media within closed bounds of any shape, disjoint, in vacuum:
+    tables with an entry for each.
+    """
 
     sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel; the largest of a cloud with a density
     albedo: Any  #: single-scattering albedos, RGB [1]
@@ -35,12 +39,18 @@ class Clouds:
     @property
     def grids(self) -> int:
         """How many clouds have a grid of densities."""
-        return 0 if self.density is None else int(np.count_nonzero(np.isfinite(np.array(self.density.voxel))))
+        return (
+            0
+            if self.density is None
+            else int(np.count_nonzero(np.isfinite(np.array(self.density.voxel))))
+        )
 
 
 @dataclass(frozen=True)
 class BoundedMedia(Homogeneous):
-    """A homogeneous medium or vacuum with bounded media in it. They have as many extinctions as it has."""
+    """A homogeneous medium or vacuum with bounded media in it. They have as
+    many extinctions as it has.
+    """
 
     bounded_media: tuple[BoundedMedium, ...] = ()
     clear: bool = False
@@ -57,13 +67,17 @@ class BoundedMedia(Homogeneous):
         if self.clouds is None or self.bounded_media:
             return f"bounded, in {'vacuum' if self.clear else 'another medium'}: rays clipped, no kernel"
         grids = self.clouds.grids
-        words = f"{dr.width(self.clouds.phase)} clouds in vacuum, bounded by meshes: rays cast at them"
+        words = (
+            f"{dr.width(self.clouds.phase)} clouds in vacuum, bounded by meshes: rays cast at them"
+        )
         return words + (f", {grids} with a grid of densities: marched" if grids else "")
 
     @property
     def phases(self):
         """The phase functions of the bounded media, and of the medium around them."""
-        bounded = self.clouds.phases if self.clouds else [own.medium.phase for own in self.bounded_media]
+        bounded = (
+            self.clouds.phases if self.clouds else [own.medium.phase for own in self.bounded_media]
+        )
         return (*bounded, *(() if self.clear else (self.phase,)))
 
     def rays(self, origin, direction, aim=None):
@@ -111,7 +125,9 @@ class BoundedMedia(Homogeneous):
 
     def source(self, rays, x, angle):
         """Return albedo sigma_t p of the medium in which a point lies, RGB [1/m]."""
-        return self._scattered(rays, angle, lambda enter, leave: dr.select((x >= enter) & (x < leave), 1, type(x)(0)))
+        return self._scattered(
+            rays, angle, lambda enter, leave: dr.select((x >= enter) & (x < leave), 1, type(x)(0))
+        )
 
     def mean_source(self, rays, x0, x1, angle):
         """Return `source` by the part of a segment that lies in each medium: an edge dims it."""
@@ -138,7 +154,8 @@ class BoundedMedia(Homogeneous):
         """Return the part of a segment [m] from the first to the last bounded medium, in vacuum."""
         if not self.clear:
             return super().part(rays, x0, x1, uniform=uniform)
-        # An unbounded ray that meets none would begin at infinity, where a map has no place and a step no length.
+        # An unbounded ray that meets none would begin at infinity, where a map has no
+        # place and a step no length.
         first, last = x1, x0
         for enter, leave in rays.crossed:
             first = dr.minimum(first, enter)
@@ -148,18 +165,25 @@ class BoundedMedia(Homogeneous):
         return dr.select(meets, begin, 0), dr.select(meets, end, 0)
 
     def ambient(self, rays, distance):
-        """Return the light of a constant field of radiance 1: albedo (exp(-tau_0) - exp(-tau_1)) a piece, RGB."""
+        """Return the light of a constant field of radiance 1: albedo (exp(-tau_0) -
+        exp(-tau_1)) a piece, RGB.
+        """
         total = type(self.albedo)(0)
         for piece in camera_pieces(self, rays):
             length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
             ends = zip(piece.medium.sigma_t, piece.before)
-            channels = [dr.select(length > 0, dr.exp(-tau) - dr.exp(-dr.fma(s, length, tau)), 0) for s, tau in ends]
+            channels = [
+                dr.select(length > 0, dr.exp(-tau) - dr.exp(-dr.fma(s, length, tau)), 0)
+                for s, tau in ends
+            ]
             total += piece.medium.albedo * type(total)(*channels)
         return total
 
     def thicker(self, factor):
         """Return it, the bounded media and the clouds with the extinction times a factor."""
-        bounded_media = tuple(replace(own, medium=own.medium.thicker(factor)) for own in self.bounded_media)
+        bounded_media = tuple(
+            replace(own, medium=own.medium.thicker(factor)) for own in self.bounded_media
+        )
         clouds = self.clouds
         if clouds is not None:
             sigma_t = tuple(own * factor for own in clouds.sigma_t)
@@ -173,12 +197,14 @@ class BoundedMedia(Homogeneous):
         Raises
         ------
         InputError
-            For other kernels than `exact` and a light that has a place: they are of one medium without bounds.
+            For other kernels than `exact` and a light that has a place: they are of
+            one medium without bounds.
         """
         if not self.bounded_media:  # what clouds fill is for their methods
             return super().lit(rays, light, geometry, kernel)
         if light.w and not (kernel is None or kernel.exact):
             raise InputError(
-                f"kernel: got {kernel.name}, which is of one medium without bounds; expected exact in bounded media"
+                f"kernel: got {kernel.name}, which is of one medium without bounds; expected exact "
+                "in bounded media"
             )
         return BoundedRays(self, light, rays, geometry, kernel, camera_pieces(self, rays))

@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight in bounded media: homogeneous, convex and disjoint, in vacuum or in another medium.
 
-A ray runs through *pieces*, the bounded media that it meets and, unless they are in vacuum, the gaps between them. In a
-piece of the medium j, over a lit segment of it,
+A ray runs through *pieces*, the bounded media that it meets and, unless they are in vacuum, the
+gaps between them. In a piece of the medium j, over a lit segment of it,
 
     J = int exp(-tau_camera(x) - tau_light(x)) p / r^2 dx,
 
-without r^2 for a light at infinity, with the true optical depths on both paths. Camera: the depth up to the piece is
-one number a ray, and sigma_j (x - x_j) is added in it. Light: the path from the light to x has the length l_k in the
-medium k (`realtime.scene.media.light_paths`), and
+without r^2 for a light at infinity, with the true optical depths on both paths. Camera: the depth
+up to the piece is one number a ray, and sigma_j (x - x_j) is added in it. Light: the path from the
+light to x has the length l_k in the medium k (`realtime.scene.media.light_paths`), and
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 
-Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, all of this is smooth. The
-panels of `realtime.scene.media.integrate` end at a bend, and sooner where they would
+Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, all of
+this is smooth. The panels of `realtime.scene.media.integrate` end at a bend, and sooner where they
+would
 
 * be optically thicker than some depth, both paths together,
-* change 1 + e by more than some fraction of it: the length rises steeply where a path grazes its facet.
+* change 1 + e by more than some fraction of it: the length rises steeply where
+  a path grazes its facet.
 """
 
 from dataclasses import dataclass
@@ -49,12 +51,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class BoundedRays(LitRays):
-    """Rays in bounded media, and one light: integrals are sums of albedo_j sigma_j J_j, RGB [1/m^2]."""
+    """Rays in bounded media, and one light: integrals are sums of albedo_j
+    sigma_j J_j, RGB [1/m^2].
+    """
 
     pieces: tuple[Piece, ...] = ()
 
     def airlight(self, x0, x1):
-        """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1] [m], RGB [1/m^2], from infinity [1].
+        """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1] [m], RGB
+        [1/m^2], from infinity [1].
 
         `x1` may be infinite. Times intensity / (4 pi), or irradiance / (4 pi), it is the radiance.
         """
@@ -76,22 +81,32 @@ class BoundedRays(LitRays):
         paths = tuple(self.light_paths(piece, x0, x1))
         lit = PieceRays(self.medium, self.light, self.rays, self.geometry, None, self, piece, paths)
         sums = zip(piece.medium.sigma_t, integral(lit, x0, x1), strict=True)
-        return piece.medium.albedo * type(piece.medium.albedo)(*(sigma * total for sigma, total in sums))
+        return piece.medium.albedo * type(piece.medium.albedo)(
+            *(sigma * total for sigma, total in sums)
+        )
 
     def light_paths(self, piece: Piece, x0, x1) -> list[LightPaths]:
-        """Return the paths from the light to a segment [m] in one piece, through each medium that they may meet."""
+        """Return the paths from the light to a segment [m] in one piece, through each
+        medium that they may meet.
+        """
         rays = self.rays
-        return paths_from(self.medium, self.light, rays.origin, rays.direction, own=piece.number, segment=(x0, x1))
+        return paths_from(
+            self.medium, self.light, rays.origin, rays.direction, own=piece.number, segment=(x0, x1)
+        )
 
     def growth(self, piece: Piece, x, r):
-        """Return how fast the depth of both paths grows along the ray, bounded media on the light's left out [1/m]."""
+        """Return how fast the depth of both paths grows along the ray, bounded media on
+        the light's left out [1/m].
+        """
         rate = reduce(dr.maximum, piece.medium.sigma_t)
         if self.light.w and not self.medium.clear:
             rate = rate + reduce(dr.maximum, self.medium.sigma_t)
         return rate
 
     def depths(self, piece: Piece, x, r, lengths) -> list[Any]:
-        """Return the optical depth of both paths at x, by channel; `lengths` of the light's by medium [m]."""
+        """Return the optical depth of both paths at x, by channel; `lengths` of
+        the light's by medium [m].
+        """
         depths = []
         for channel, around in enumerate(self.medium.sigma_t):
             depth = dr.fma(piece.medium.sigma_t[channel], x - piece.begin, piece.before[channel])
@@ -104,13 +119,17 @@ class BoundedRays(LitRays):
 
     @property
     def height(self):
-        """The height [m]; a ray through the light has an infinite integral, and so nearly is its value."""
+        """The height [m]; a ray through the light has an infinite integral,
+        and so nearly is its value.
+        """
         return dr.maximum(self.geometry.height, 1e-15)
 
 
 @dataclass(frozen=True)
 class PieceRays(LitRays):
-    """Rays in one piece: values are p exp(-tau) by channel, the state is the envelopes of the light's paths."""
+    """Rays in one piece: values are p exp(-tau) by channel, the state is the
+    envelopes of the light's paths.
+    """
 
     whole: Any = None  #: `BoundedRays`
     piece: Any = None  #: `Piece`
@@ -118,7 +137,9 @@ class PieceRays(LitRays):
 
     @property
     def most_panels(self):
-        """Some, and two for each facet: a path enters and leaves each facet of a convex body once."""
+        """Some, and two for each facet: a path enters and leaves each
+        facet of a convex body once.
+        """
         return _MOST + 2 * sum(path.bounded.count for path in self.paths)
 
     @property
@@ -143,9 +164,12 @@ class PieceRays(LitRays):
         return mi.Bool(True)
 
     def panel(self, start: Start, envelopes):
-        """Return the ends of panels, p exp(-tau) by channel at nodes, and the envelopes behind the panels."""
+        """Return the ends of panels, p exp(-tau) by channel at nodes, and the
+        envelopes behind the panels.
+        """
         x, end = start.x, start.end(self._rate(start, envelopes))
-        # The next place at which a facet takes over, or a path passes an edge: beyond a rounding error of x.
+        # The next place at which a facet takes over, or a path passes an edge:
+        # beyond a rounding error of x.
         at = beyond(x)
         changes = [own and path.next_change(own, at) for path, own in zip(self.paths, envelopes)]
         for own, change in zip(envelopes, changes):
@@ -155,12 +179,23 @@ class PieceRays(LitRays):
 
         def values(node: Node):
             lengths = [
-                (path.bounded.medium, path.length(own, node.x, node.r)) for path, own in zip(self.paths, envelopes)
+                (path.bounded.medium, path.length(own, node.x, node.r))
+                for path, own in zip(self.paths, envelopes)
             ]
             phase = self.phase.evaluate_half(node.down, node.up)
-            return [phase * exp_bounded(-depth) for depth in self.whole.depths(self.piece, node.x, node.r, lengths)]
+            return [
+                phase * exp_bounded(-depth)
+                for depth in self.whole.depths(self.piece, node.x, node.r, lengths)
+            ]
 
-        return end, values, [own and _after(own, change, start.foot + end) for own, change in zip(envelopes, changes)]
+        return (
+            end,
+            values,
+            [
+                own and _after(own, change, start.foot + end)
+                for own, change in zip(envelopes, changes)
+            ],
+        )
 
     def _rate(self, start: Start, envelopes):
         """Return the reciprocal of the longest panels [1/m]."""
@@ -182,7 +217,9 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
 
     pieces = [
         piece(bounded.medium, number, *ends)
-        for number, (bounded, ends) in enumerate(zip(medium.bounded_media, rays.crossed, strict=True))
+        for number, (bounded, ends) in enumerate(
+            zip(medium.bounded_media, rays.crossed, strict=True)
+        )
     ]
     if not medium.clear:
         around = Homogeneous(medium.sigma_t, medium.albedo, medium.phase)
@@ -192,7 +229,9 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
             for enter, _ in rays.crossed:
                 end = dr.minimum(end, dr.select(enter >= begin, enter, dr.inf))
             # A camera within a bounded medium has no gap before it.
-            inside = reduce(or_, [(enter <= begin) & (begin < leave) for enter, leave in rays.crossed])
+            inside = reduce(
+                or_, [(enter <= begin) & (begin < leave) for enter, leave in rays.crossed]
+            )
             pieces.append(piece(around, None, begin, dr.select(inside, begin, end)))
     return tuple(pieces)
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A density grid around the camera: an extinction that is trilinear between the centres of voxels, in a box.
+"""A density grid around the camera: an extinction that is trilinear between the
+centres of voxels, in a box.
 
-Methods that sample points march it: `extinction` is a look-up, and depths are walks from cell to cell. In a cell the
-extinction along a line is a cubic, so two nodes of Gauss are exact; that is two look-ups a cell, where engines take one
-a step. Nothing integrates a lit segment: `realtime.methods.interface.media_checks` refuses methods that ask for one.
+Methods that sample points march it: `extinction` is a look-up, and depths are walks from cell to
+cell. In a cell the extinction along a line is a cubic, so two nodes of Gauss are exact; that is two
+look-ups a cell, where engines take one a step. Nothing integrates a lit segment:
+`realtime.methods.interface.media_checks` refuses methods that ask for one.
 """
 
 from dataclasses import dataclass, replace
@@ -41,10 +43,14 @@ class GridMedium(VaryingMedium):
         ]
         Float = type(direction.x)
         near, far = Float(0), Float(dr.inf)
-        for (one, other), at, way, low, high in zip(ends, origin, direction, self.low, self.high, strict=True):
+        for (one, other), at, way, low, high in zip(
+            ends, origin, direction, self.low, self.high, strict=True
+        ):
             beside = (way == 0) & ((at < low) | (at > high))
             near = dr.maximum(near, dr.select(way == 0, 0, dr.minimum(one, other)))
-            far = dr.minimum(far, dr.select(beside, 0, dr.select(way == 0, dr.inf, dr.maximum(one, other))))
+            far = dr.minimum(
+                far, dr.select(beside, 0, dr.select(way == 0, dr.inf, dr.maximum(one, other)))
+            )
         meets = far > near
         crossed = dr.select(meets, near, 0), dr.select(meets, far, 0)
         return replace(super().rays(origin, direction, aim), crossed=crossed)
@@ -53,16 +59,23 @@ class GridMedium(VaryingMedium):
         """Return the extinction [1/m]."""
         enter, leave = rays.crossed
         inside = (x >= enter) & (x <= leave)
-        return (dr.select(inside, self.largest * self.density.at(rays.at(x), mi.UInt32(0), inside), 0),)
+        return (
+            dr.select(inside, self.largest * self.density.at(rays.at(x), mi.UInt32(0), inside), 0),
+        )
 
     def optical_depth(self, rays, x0, x1):
         """Return the optical depth of segments [m], exact by cells [1]."""
         enter, leave = rays.crossed
         x0, x1 = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
         start, length = rays.at(x0), dr.maximum(x1 - x0, 0)
-        at, beyond = (self.density.rows_at(point, mi.UInt32(0), True) for point in (start, start + rays.direction))
+        at, beyond = (
+            self.density.rows_at(point, mi.UInt32(0), True)
+            for point in (start, start + rays.direction)
+        )
         rates = [after - before for before, after in zip(at, beyond, strict=True)]
-        least = _LEAST / dr.maximum(dr.maximum(dr.abs(rates[0]), dr.abs(rates[1])), dr.abs(rates[2]))
+        least = _LEAST / dr.maximum(
+            dr.maximum(dr.abs(rates[0]), dr.abs(rates[1])), dr.abs(rates[2])
+        )
 
         def walk(x, total):
             ahead = dr.inf
@@ -72,7 +85,10 @@ class GridMedium(VaryingMedium):
                 ahead = dr.minimum(ahead, dr.select(rate == 0, dr.inf, (face - place) / rate))
             width = dr.minimum(dr.maximum(ahead, least), length - x)
             nodes = (x + (0.5 + side) * width for side in (-_GAUSS, _GAUSS))
-            found = [self.density.at(dr.fma(rays.direction, node, start), mi.UInt32(0), x < length) for node in nodes]
+            found = [
+                self.density.at(dr.fma(rays.direction, node, start), mi.UInt32(0), x < length)
+                for node in nodes
+            ]
             return x + width, dr.fma(0.5 * width, found[0] + found[1], total)
 
         zero = dr.zeros(type(length), dr.width(length))
@@ -92,7 +108,10 @@ class GridMedium(VaryingMedium):
     def last_depth(self, origin, forward):
         """Return the depth of the farthest corner of the box [m]."""
         nearer, farther = self.low - origin, self.high - origin
-        return dr.maximum(sum(dr.maximum(a * f, b * f) for a, b, f in zip(nearer, farther, forward, strict=True)), 0)
+        return dr.maximum(
+            sum(dr.maximum(a * f, b * f) for a, b, f in zip(nearer, farther, forward, strict=True)),
+            0,
+        )
 
     def thicker(self, factor):
         """Return it with the extinction times a factor."""

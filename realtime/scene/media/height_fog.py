@@ -1,27 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Height fog: a medium whose density depends on height alone, between a floor and a cap, without sides.
+"""Height fog: a medium whose density depends on height alone, between a floor
+and a cap, without sides.
 
 With the height z of a point and layers i
 
     sigma_t(z) = sigma_0 + sum_i sigma_i exp(-(z - z_i)/H_i),     clamped: sigma_i exp(-max(z - z_i, 0)/H_i).
 
-**Optical depth.** A layer's mean over a segment is its density at the *lower* end times phi(u) = (1 - e^-u)/u, with
-u >= 0 the rise in scale heights: from the upper end e^u would overflow where the value is small. Rounding of u near 0
-changes phi by half as much, so level rays are no special case. The length in which a layer's depth grows by T follows
-by inversion, -log(1 - c T/s)/c with the density s where it begins and c = dz/H.
+**Optical depth.** A layer's mean over a segment is its density at the *lower* end times phi(u) =
+(1 - e^-u)/u, with u >= 0 the rise in scale heights: from the upper end e^u would overflow where the
+value is small. Rounding of u near 0 changes phi by half as much, so level rays are no special case.
+The length in which a layer's depth grows by T follows by inversion, -log(1 - c T/s)/c with the
+density s where it begins and c = dz/H.
 
-**Suns.** tau(x, sun) = (1/mu) int_z^cap sigma_t dz, mu the height of the sun, so that the exponent E of both ways grows
-by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of the depth tau
+**Suns.** tau(x, sun) = (1/mu) int_z^cap sigma_t dz, mu the height of the sun, so that the exponent
+E of both ways grows by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of
+the depth tau
 
     int sigma_t exp(-E) dx = exp(-E(a)) tau phi(q),     q = (1 - dz/mu) tau;     exp(-E(b)) tau phi(-q) for q < 0
 
 (plane-parallel single scattering, Chandrasekhar 1960). It costs two optical depths and no node.
 
-**Lights at places.** A panel (`realtime.scene.media.integrate`) is computed from its lower end: there a node has one
-exponential for each layer, e^-u - 1, for the density and for the depth from the camera; the depth to the light takes
-the density at both its ends. Panels end at the bases of clamped layers. Beyond a base the mean density of the way to a
-light goes like 1/(z - z_light), a panel's limit there; a layer that falls is a fraction of the density, and its fourth
-root counts, since the rule leaves about the fourth power of what it does not resolve.
+**Lights at places.** A panel (`realtime.scene.media.integrate`) is computed from its lower end:
+there a node has one exponential for each layer, e^-u - 1, for the density and for the depth from
+the camera; the depth to the light takes the density at both its ends. Panels end at the bases of
+clamped layers. Beyond a base the mean density of the way to a light goes like 1/(z - z_light), a
+panel's limit there; a layer that falls is a fraction of the density, and its fourth root counts,
+since the rule leaves about the fourth power of what it does not resolve.
 """
 
 from dataclasses import dataclass, replace
@@ -71,17 +75,23 @@ class HeightFog(VaryingMedium):
         """Refuse light from the horizon or below."""
         if not axis @ np.array(self.up, dtype=np.float64).ravel() < 0:
             raise InputError(
-                f"light '{name}' is directional and shines from the horizon or below: each of its light paths "
-                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
+                f"light '{name}' is directional and shines from the horizon or below: each of its "
+                "light paths "
+                "through height fog, which has no sides, is infinitely deep; expected a light from "
+                "above the horizon"
             )
 
     def rays(self, origin, direction, aim=None):
-        """Return rays with the distances between which they are in the fog [m], and their heights and rise."""
+        """Return rays with the distances between which they are in the fog [m],
+        and their heights and rise.
+        """
         start, rise = dr.dot(origin, self.up), dr.dot(direction, self.up)
         ends = [(z - start) / rise for z in (self.floor, self.cap)]
         level, inside = rise == 0, (start >= self.floor) & (start <= self.cap)
         enter = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
-        leave = dr.select(level, dr.select(inside, _UNBOUNDED, 0), dr.clip(dr.maximum(*ends), 0, _UNBOUNDED))
+        leave = dr.select(
+            level, dr.select(inside, _UNBOUNDED, 0), dr.clip(dr.maximum(*ends), 0, _UNBOUNDED)
+        )
         crossed = (dr.minimum(enter, leave), leave), (start, rise)
         return replace(super().rays(origin, direction, aim), crossed=crossed)
 
@@ -99,7 +109,10 @@ class HeightFog(VaryingMedium):
         (enter, leave), (start, rise) = rays.crossed
         a, b = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
         length = dr.maximum(b - a, 0)
-        return (length * self._mean(dr.fma(rise, dr.select(rise > 0, a, b), start), dr.abs(rise) * length),)
+        return (
+            length
+            * self._mean(dr.fma(rise, dr.select(rise > 0, a, b), start), dr.abs(rise) * length),
+        )
 
     def depth_to_light(self, light, point, r, active=True):
         """Return the optical depth from points [m] to a light, in closed form [1]."""
@@ -114,12 +127,15 @@ class HeightFog(VaryingMedium):
         return tuple((layer.base - start) / rise for layer in self.layers) if self.clamped else ()
 
     def longest(self, rays, light, x, change):
-        """Return a length in which depths and the logarithm of the density change by no more than a number [m]."""
+        """Return a length in which depths and the logarithm of the density change by
+        no more than a number [m].
+        """
         (_, (start, rise)), end = rays.crossed, self._end(light)
         z = dr.fma(rise, x, start)
         whole, part, low = self._to_light(z, light, end)
         r = dr.norm(light.position - rays.at(x))
-        # The density here, its integral over the heights up to the light, and what changes behind a base.
+        # The density here, its integral over the heights up to the light, and
+        # what changes behind a base.
         density, column, behind = self.constant, self.constant * part, type(x)(0)
         extinctions = []
         for layer in self.layers:
@@ -133,7 +149,8 @@ class HeightFog(VaryingMedium):
                 crossed = (z - layer.base) * above < _AT_BASE * layer.scale_height * dr.abs(above)
                 changes = r * layer.sigma_t * dr.abs(here - of_layer / part)
                 behind = dr.maximum(behind, dr.select(crossed, _root(changes), 0))
-        # Upwards a layer counts by its fraction of the density; downwards any can become the largest.
+        # Upwards a layer counts by its fraction of the density; downwards
+        # any can become the largest.
         up, down = type(x)(0), type(x)(0)
         for layer, extinction in zip(self.layers, extinctions, strict=True):
             steep = dr.rcp(layer.scale_height)
@@ -141,13 +158,16 @@ class HeightFog(VaryingMedium):
             down = dr.maximum(down, steep)
         steep = dr.abs(rise) * dr.select(rise > 0, up, down)
         thick = density + column * dr.rcp(whole)
-        # Downwards depths grow as exponentials of the way, by `change` after log(1 + change steep/thick)/steep.
+        # Downwards depths grow as exponentials of the way, by `change` after log(1 +
+        # change steep/thick)/steep.
         grown = change * steep * dr.rcp(thick)
         thick = dr.select((rise < 0) & (grown > 1e-2), change * steep / dr.log(1 + grown), thick)
         return change / (thick + steep + dr.abs(rise) * (behind * dr.rcp(whole)))
 
     def length_from(self, rays, x, depth: float):
-        """Return a length after x [m] in which the optical depth grows by `depth` or more; infinite: it does not."""
+        """Return a length after x [m] in which the optical depth grows by `depth` or
+        more; infinite: it does not.
+        """
         _, (start, rise) = rays.crossed
         z, longest = dr.fma(rise, x, start), depth / self.constant
         for layer in self.layers:
@@ -155,17 +175,24 @@ class HeightFog(VaryingMedium):
             c = rise / layer.scale_height
             bend = c * fraction
             # From below the base a clamped layer grows no faster than at the base.
-            grown = dr.select(dr.abs(bend) < 1e-3, fraction, dr.select(bend < 1, -dr.log(1 - bend) / c, dr.inf))
+            grown = dr.select(
+                dr.abs(bend) < 1e-3, fraction, dr.select(bend < 1, -dr.log(1 - bend) / c, dr.inf)
+            )
             if self.clamped:
                 grown = dr.select((z < layer.base) | (rise < 0), fraction, grown)
             longest = dr.minimum(longest, grown)
         return longest
 
     def part(self, rays, x0, x1, *, uniform):
-        """Return the part of a segment [m] between floor and cap, as far as something is left of the light."""
+        """Return the part of a segment [m] between floor and cap, as far as
+        something is left of the light.
+        """
         (enter, leave), _ = rays.crossed
         begin = dr.clip(x0, enter, leave)
-        end = dr.minimum(dr.clip(x1, enter, leave), begin + self.length_from(rays, begin, optical_reach(type(begin))))
+        end = dr.minimum(
+            dr.clip(x1, enter, leave),
+            begin + self.length_from(rays, begin, optical_reach(type(begin))),
+        )
         meets = end > begin
         return dr.select(meets, begin, 0), dr.select(meets, end, 0)
 
@@ -177,7 +204,8 @@ class HeightFog(VaryingMedium):
         return thicker
 
     def lit(self, rays, light, geometry, kernel=None):
-        """Return rays with one light, by the panels of this module, or by those of the kernel `quadrature`.
+        """Return rays with one light, by the panels of this module, or by those of
+        the kernel `quadrature`.
 
         Raises
         ------
@@ -187,7 +215,8 @@ class HeightFog(VaryingMedium):
         nodes = None if kernel is None or kernel.exact else kernel.asinh_nodes
         if light.w and not (kernel is None or kernel.exact or nodes is not None):
             raise InputError(
-                f"kernel: got {kernel.name}, which is of homogeneous fog; expected exact, or quadrature with its "
+                f"kernel: got {kernel.name}, which is of homogeneous fog; expected exact, or "
+                "quadrature with its "
                 "nodes, in height fog"
             )
         return HeightRays(self, light, rays, geometry, kernel, nodes)
@@ -197,8 +226,13 @@ class HeightFog(VaryingMedium):
         return dr.clip(dr.dot(light.position, self.up), self.floor, self.cap)
 
     def _to_light(self, z, light, end):
-        """Return how far a light is from heights upwards, how far within the fog, and the lower end of that [m]."""
-        whole, part = (dr.maximum(dr.abs(other - z), _LEVEL) for other in (dr.dot(light.position, self.up), end))
+        """Return how far a light is from heights upwards, how far within the fog, and
+        the lower end of that [m].
+        """
+        whole, part = (
+            dr.maximum(dr.abs(other - z), _LEVEL)
+            for other in (dr.dot(light.position, self.up), end)
+        )
         return whole, part, dr.minimum(z, end)
 
     def _fall(self, layer: Layer, z):
@@ -210,24 +244,33 @@ class HeightFog(VaryingMedium):
         return exp_bounded(-dr.maximum(above, 0 if self.clamped else -55.0))
 
     def _column(self, layer: Layer, low, rise, ends):
-        """Return the integral of a layer over heights, `rise` [m] from `low` up, by its densities at the `ends` [m]."""
+        """Return the integral of a layer over heights, `rise` [m] from `low` up, by its
+        densities at the `ends` [m].
+        """
         below = dr.clip(layer.base - low, 0, rise) if self.clamped else 0
         above, largest = rise - below, dr.maximum(*ends)
         u = above / layer.scale_height
         if not is_single(type(u)):
             return below + above * largest * phi(u)
-        # Above 1/2 the difference has its digits; below, the series does, and takes less than an exponential.
+        # Above 1/2 the difference has its digits; below, the series does, and takes
+        # less than an exponential.
         series = type(u)(1 / 5040)
         for divisor in (720, 120, 24, 6, 2, 1):
             series = dr.fma(-u, series, 1 / divisor)
-        return below + dr.select(u < 0.5, largest * (above * series), layer.scale_height * dr.abs(ends[0] - ends[1]))
+        return below + dr.select(
+            u < 0.5, largest * (above * series), layer.scale_height * dr.abs(ends[0] - ends[1])
+        )
 
     def _mean(self, low, rise):
-        """Return the mean density between a height `low` and one `rise` above it, both between floor and cap [1/m]."""
+        """Return the mean density between a height `low` and one `rise` above it, both
+        between floor and cap [1/m].
+        """
         total = self.constant
         for layer in self.layers:
             if not self.clamped:
-                total = total + layer.sigma_t * self._fall(layer, low) * phi(rise / layer.scale_height)
+                total = total + layer.sigma_t * self._fall(layer, low) * phi(
+                    rise / layer.scale_height
+                )
                 continue
             below = dr.clip(layer.base - low, 0, rise)
             part = dr.select(rise > 0, below / rise, dr.select(low < layer.base, 1, type(rise)(0)))
@@ -236,7 +279,9 @@ class HeightFog(VaryingMedium):
         return total
 
     def _between(self, z, other, r):
-        """Return the optical depth between two heights a distance r apart; what is beyond floor and cap is left out."""
+        """Return the optical depth between two heights a distance r apart; what is beyond
+        floor and cap is left out.
+        """
         a, b = dr.clip(z, self.floor, self.cap), dr.clip(other, self.floor, self.cap)
         low, rise, whole = dr.minimum(a, b), dr.abs(b - a), dr.abs(other - z)
         inside = (a == z) & (b == other)
@@ -253,7 +298,8 @@ class HeightFog(VaryingMedium):
 class HeightRays(LitRays):
     """Rays in height fog with one light: integrals are RGB [1/m^2], of suns [1]."""
 
-    nodes_asked: int | None = None  #: of each panel, which then ends at the foot, too; None: as many as it needs
+    #: of each panel, which then ends at the foot, too; None: as many as it needs
+    nodes_asked: int | None = None
 
     def airlight(self, x0, x1):
         """Return the integral over lit segments [x0, x1] [m]."""
@@ -263,7 +309,9 @@ class HeightRays(LitRays):
         return self.medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
 
     def within(self, x0, x1):
-        """Return the part of segments between floor and cap [m]: the light's path may lose as the camera's gains."""
+        """Return the part of segments between floor and cap [m]: the light's path may
+        lose as the camera's gains.
+        """
         enter, leave = self.rays.crossed[0]
         return dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
 
@@ -273,7 +321,9 @@ class HeightRays(LitRays):
         (tau,) = medium.optical_depth(self.rays, x0, x1)
         q = (1 - rise / mu) * tau
         x = dr.select(q >= 0, x0, x1)
-        exponent = medium.optical_depth(self.rays, 0, x)[0] + medium._overhead(dr.fma(rise, x, start)) / mu
+        exponent = (
+            medium.optical_depth(self.rays, 0, x)[0] + medium._overhead(dr.fma(rise, x, start)) / mu
+        )
         return exp_bounded(-exponent) * tau * phi(dr.abs(q)) * self.angle(None, None)(medium.phase)
 
     def nodes(self, Float):
@@ -281,11 +331,15 @@ class HeightRays(LitRays):
         return self.nodes_asked or super().nodes(Float)
 
     def panel_width(self, Float):
-        """Return the width of panels with the nodes that were asked for, otherwise the usual one."""
+        """Return the width of panels with the nodes that were asked for,
+        otherwise the usual one.
+        """
         return Float(_WIDTH_ASKED) if self.nodes_asked else super().panel_width(Float)
 
     def bends(self):
-        """Return the bends of the fog; panels with nodes that were asked for end at the foot, too."""
+        """Return the bends of the fog; panels with nodes that were asked
+        for end at the foot, too.
+        """
         return (*super().bends(), self.geometry.foot) if self.nodes_asked else super().bends()
 
     def sum(self, totals):
@@ -297,10 +351,14 @@ class HeightRays(LitRays):
         return [dr.zeros(type(self.geometry.height), width)]
 
     def panel(self, start: Start, depths):
-        """Return the ends of panels, the density times p exp(-tau) at nodes, and the depths behind the panels."""
+        """Return the ends of panels, the density times p exp(-tau) at nodes, and the
+        depths behind the panels.
+        """
         (before,), medium, light = depths, self.medium, self.light
         Float, (origin, slope) = type(before), self.rays.crossed[1]
-        rate = Float(0) if self.nodes_asked else 1 / medium.longest(self.rays, light, start.x, CHANGE)
+        rate = (
+            Float(0) if self.nodes_asked else 1 / medium.longest(self.rays, light, start.x, CHANGE)
+        )
         end = start.end(rate)
         length, x1 = end - start.s, start.foot + end
 
@@ -322,21 +380,31 @@ class HeightRays(LitRays):
         def values(node: Node):
             far = dr.select(up, node.far, node.rest)
             whole, part, lower = medium._to_light(dr.fma(rise, far, z_low), light, at_light)
-            density, camera, segment = medium.constant, medium.constant * far, medium.constant * part
+            density, camera, segment = (
+                medium.constant,
+                medium.constant * far,
+                medium.constant * part,
+            )
             for layer, steep, at_low, along, at_end in layers:
                 fraction, less = exp_expm1_bounded(-steep * far)
                 here = at_low * fraction
                 density = dr.fma(layer.sigma_t, here, density)
                 camera = dr.fma(layer.sigma_t * along, less, camera)
-                segment = dr.fma(layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), segment)
+                segment = dr.fma(
+                    layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), segment
+                )
             exponent = dr.fma(sign, camera, lowest) + node.r * (segment * dr.rcp(whole))
-            return [density * exp_bounded(-exponent) * medium.phase.evaluate_half(node.down, node.up)]
+            return [
+                density * exp_bounded(-exponent) * medium.phase.evaluate_half(node.down, node.up)
+            ]
 
         return end, values, [after]
 
 
 def _root(fraction):
-    """Return the fourth root: a panel may have so many scale heights of what is a fraction of its integral."""
+    """Return the fourth root: a panel may have so many scale heights of what is a
+    fraction of its integral.
+    """
     return dr.sqrt(dr.sqrt(fraction))
 
 

@@ -55,7 +55,8 @@ from airlight.realtime.scene.rule_reach import NODES
 
 _NODES_DOUBLE = 16  # rho^(-32): 1e-16 where six nodes leave 1e-6
 _SOFT = 0.85  # widest panel where the intensity of a spot falls off, linear in an angle
-_LEAST_HEIGHT = 1e-15  # [m]: a ray through the light has an infinite integral, and so nearly is its value
+# [m]: a ray through the light has an infinite integral, and so nearly is its value
+_LEAST_HEIGHT = 1e-15
 _TAIL, _TAIL_DOUBLE = 1e7, 1e12  # r + s, over its first value, behind which 1/r^2 leaves nothing
 
 
@@ -75,7 +76,9 @@ class Start:
         return self.foot + self.s
 
     def end(self, rate) -> Any:
-        """Return s at the end of a panel [m]; `rate`: reciprocal of the medium's longest one [1/m]."""
+        """Return s at the end of a panel [m]; `rate`: reciprocal of the
+        medium's longest one [1/m].
+        """
         length = 1 / dr.sqrt(dr.fma(rate, rate, dr.square(self.rate)))
         return dr.minimum(self.s + length, self.last)
 
@@ -117,16 +120,28 @@ def integral(lit: Any, x0, x1) -> list[Any]:
         # The light's limits to a panel first, then the medium's.
         start = _start(foot, height, s, _following(bends, s, s1), width)
         end, values, state = lit.panel(start, state)
-        nodes = _at_place(lit, start, end, height) if light.w else _at_infinity(lit, start, end, half_angles)
+        nodes = (
+            _at_place(lit, start, end, height)
+            if light.w
+            else _at_infinity(lit, start, end, half_angles)
+        )
         for node in nodes:
             weight = node.weight
             if light.varies:
                 weight *= geometry.falloff_beside(light, node.s)
-            totals = [dr.fma(weight, value, total) for total, value in zip(totals, values(node), strict=True)]
+            totals = [
+                dr.fma(weight, value, total)
+                for total, value in zip(totals, values(node), strict=True)
+            ]
         return turn + 1, end, state, totals
 
     _, reached, state, totals = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, lanes), s0, lit.begin(x0 + dr.zeros(Float, lanes)), lit.zeros(lanes)),
+        state=(
+            dr.zeros(mi.UInt32, lanes),
+            s0,
+            lit.begin(x0 + dr.zeros(Float, lanes)),
+            lit.zeros(lanes),
+        ),
         cond=lambda turn, s, state, totals: (s < s1) & lit.shines(state) & (turn < lit.most_panels),
         body=panel,
         labels=("turn", "s", "state", "totals"),
@@ -200,11 +215,15 @@ def _at_infinity(lit: Any, start: Start, end, half_angles: tuple[Any, Any]) -> I
     length, (down, up) = end - start.s, half_angles
     for t, weight in unit_nodes(lit.nodes(type(length))):
         far = t * length
-        yield Node(start.x + far, far, (1 - t) * length, start.s + far, start.r, down, up, weight * length)
+        yield Node(
+            start.x + far, far, (1 - t) * length, start.s + far, start.r, down, up, weight * length
+        )
 
 
 def _half_angles(lit: Any) -> tuple[Any, Any]:
-    """Return sin^2 and cos^2 of half the angle between rays and a light at infinity, both with all digits."""
+    """Return sin^2 and cos^2 of half the angle between rays and a light at
+    infinity, both with all digits.
+    """
     axis, direction = lit.light.axis, lit.rays.direction
     return 0.25 * dr.squared_norm(axis + direction), 0.25 * dr.squared_norm(axis - direction)
 

@@ -2,36 +2,39 @@
 """How much of the paths from a light to the points of a ray lies in a convex medium.
 
 A light is a homogeneous position L with w = 1, a place, or w = 0, against the direction of its rays
-(`realtime.scene.lights`). The path from the point P is P + t D, D = L - w P, up to t = 1 or without end. It crosses
-the plane n . P = c of a half space at
+(`realtime.scene.lights`). The path from the point P is P + t D, D = L - w P, up to t = 1 or without
+end. It crosses the plane n . P = c of a half space at
 
     t = e/(1 + w e),     e = (c - n . P)/N,     N = n . L - w c.
 
-e rises with t. Where N > 0 the light comes in through the plane, and the path is in the half space up to e, from P on;
-where N < 0 it is so beyond e. With
+e rises with t. Where N > 0 the light comes in through the plane, and the path is in the half space
+up to e, from P on; where N < 0 it is so beyond e. With
 
     e_0 = max(0, max e over the planes with N < 0),     e_1 = max(0, min e over those with N > 0)
 
-the path has in the medium the length max(0, e_1 - e_0) |D|/((1 + w e_0)(1 + w e_1)). Nothing cancels but e itself.
+the path has in the medium the length max(0, e_1 - e_0) |D|/((1 + w e_0)(1 + w e_1)).
+Nothing cancels but e itself.
 
-e is linear in P: along a ray P = o + x d it is a line, c + s x, for a light at any place. The least of some lines and
-the largest of others, the *envelopes*, bend where another line takes over, and the length bends there, where one of
-the two is 0, and where they meet. The least of lines is concave: beyond a place only steeper falling lines can take
-over from the one that is least there, and the first of them to cross it does. One pass over the planes finds it.
+e is linear in P: along a ray P = o + x d it is a line, c + s x, for a light at any place. The least
+of some lines and the largest of others, the *envelopes*, bend where another line takes over, and
+the length bends there, where one of the two is 0, and where they meet. The least of lines is
+concave: beyond a place only steeper falling lines can take over from the one that is least there,
+and the first of them to cross it does. One pass over the planes finds it.
 
-The facets through which the light comes in tile the medium as the light sees it. A path that meets the medium therefore
-finds its plane by going from facet to facet while a neighbour has less: on the straight way from a point of the facet k
-to that of the path, the neighbour beyond the edge where k is left has less from there on, since the difference is
-linear. Where no neighbour on the light's side has less, and none on the other has more, the crossing lies in the facet.
-Otherwise the path misses the medium, and e_0 > e_1 says so. The walk begins at the facet in the direction, from the
-medium's centre, of the place where the path crosses the sphere around it. For points within the medium the next plane
-along a ray shares an edge with the last one, too.
+The facets through which the light comes in tile the medium as the light sees it. A path that meets
+the medium therefore finds its plane by going from facet to facet while a neighbour has less: on the
+straight way from a point of the facet k to that of the path, the neighbour beyond the edge where k
+is left has less from there on, since the difference is linear. Where no neighbour on the light's
+side has less, and none on the other has more, the crossing lies in the facet. Otherwise the path
+misses the medium, and e_0 > e_1 says so. The walk begins at the facet in the direction, from the
+medium's centre, of the place where the path crosses the sphere around it. For points within the
+medium the next plane along a ray shares an edge with the last one, too.
 
 A camera ray is the path of a light at infinity in its direction, from its origin.
 
-**Spheres.** With C and R the middle and the radius, p = P - C and M = L - w C, p x D = p x M is linear in x too. The
-path is nearest to C at the distance b = -p . D/|D| from P, and half its chord is q, q^2 = R^2 - |p x M|^2/|D|^2.
-Paths graze the sphere where
+**Spheres.** With C and R the middle and the radius, p = P - C and M = L - w C, p x D = p x M is
+linear in x too. The path is nearest to C at the distance b = -p . D/|D| from P, and half its chord
+is q, q^2 = R^2 - |p x M|^2/|D|^2. Paths graze the sphere where
 
     |p x M|^2 = R^2 |D|^2,     with the discriminant (|M|^2 - w R^2)(R^2 |D x d|^2 - (M . (p x d))^2),
 
@@ -51,11 +54,13 @@ from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous, Medium
 
 _FAR = 1e30  #: e of no plane
-#: Planes that are read faster than walked over. The walk makes frames of `three-media`, with bodies of 320 and 120
-#: facets, 6.4 times as fast as all planes: 69 and 437 ms (shadow planes, 320 x 240, 29 November 2026).
+#: Planes that are read faster than walked over. The walk makes frames of `three-media`, with bodies
+#: of 320 and 120 facets, 6.4 times as fast as all planes: 69 and 437 ms (shadow planes, 320 x 240,
+#: 29 November 2026).
 _FEW = 16
 _UNROLLED = 4  #: neighbours of a plane, as many as facets of boxes have
-_STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25  #: of the square of half a chord in a panel; panels over the radius
+#: of the square of half a chord in a panel; panels over the radius
+_STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25
 
 
 @dataclass(frozen=True)
@@ -63,20 +68,26 @@ class BoundedMedium:
     """A homogeneous medium within convex bounds (`realtime.scene.closed_mesh`)."""
 
     medium: Homogeneous
-    planes: Any  #: four numbers a half space: its outward normal, and its distance from `centre` [m]; None for a sphere
+    #: four numbers a half space: its outward normal, and its distance from
+    #: `centre` [m]; None for a sphere
+    planes: Any
     count: int  #: half spaces
     centre: Any  #: of the sphere, or of one that holds the medium [m]
     radius: Any  #: of that sphere [m]
     mean_distance: Any  #: R, see `realtime.scene.closed_mesh.mean_distance` [m]
-    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
+    #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
+    neighbours: Any = None
     beside: Any = None  #: `planes` of the neighbours
     sides: int = 0
-    starts: Any = None  #: by cell of directions a half space, see `realtime.scene.closed_mesh.radial_planes`
+    #: by cell of directions a half space, see `realtime.scene.closed_mesh.radial_planes`
+    starts: Any = None
 
 
 @dataclass
 class Envelopes:
-    """The lines of the planes through which paths enter and leave a medium, near one place of the rays."""
+    """The lines of the planes through which paths enter and leave a medium,
+    near one place of the rays.
+    """
 
     least: tuple[Any, Any]  #: constant and slope [1/m] of the least e with N > 0
     largest: tuple[Any, Any]  #: and of the largest with N < 0
@@ -87,7 +98,9 @@ class Envelopes:
         return dr.maximum(_value(self.largest, x), 0), dr.maximum(_value(self.least, x), 0)
 
     def crossing(self, x):
-        """Return the next distance beyond x at which the lines meet or one of them is 0, or infinity [m]."""
+        """Return the next distance beyond x at which the lines meet or one of
+        them is 0, or infinity [m].
+        """
         low, high = _value(self.largest, x), _value(self.least, x)
         rising, falling = self.largest[1], self.least[1]
         until = type(x)(dr.inf)
@@ -119,12 +132,17 @@ class LightPaths:
         return self.toward - dr.fma(self.direction, x, self.start) if self.w else self.toward
 
     def length(self, envelopes: Envelopes | None, x, r):
-        """Return the length within the medium of the paths to x [m]; `r` is |D|, and spheres have no envelopes."""
+        """Return the length within the medium of the paths to x [m]; `r` is |D|, and
+        spheres have no envelopes.
+        """
         if envelopes is None:
             point, away = dr.fma(self.direction, x, self.start), self.away(x)
             square = dr.squared_norm(away)
             nearest = -dr.dot(point, away) / r
-            half = dr.square(self.bounded.radius) - dr.squared_norm(dr.cross(point, self.toward)) / square
+            half = (
+                dr.square(self.bounded.radius)
+                - dr.squared_norm(dr.cross(point, self.toward)) / square
+            )
             half = dr.sqrt(dr.maximum(half, 0))
             last = dr.minimum(nearest + half, r) if self.w else nearest + half
             length = dr.maximum(last - dr.maximum(nearest - half, 0), 0)
@@ -147,11 +165,19 @@ class LightPaths:
         """Return the envelopes at a distance x [m]; None for a sphere."""
         if self.round:
             return None
-        return self._walk(x) if self.own else self._over_planes(self._none(x), self._tighter(x), self.active)
+        return (
+            self._walk(x)
+            if self.own
+            else self._over_planes(self._none(x), self._tighter(x), self.active)
+        )
 
     def _none(self, x) -> Envelopes:
         width = dr.width(x, self.start, self.direction, self.toward, self.active)
-        far, flat, number = dr.full(type(x), _FAR, width), dr.zeros(type(x), width), dr.zeros(mi.UInt32, width)
+        far, flat, number = (
+            dr.full(type(x), _FAR, width),
+            dr.zeros(type(x), width),
+            dr.zeros(mi.UInt32, width),
+        )
         return Envelopes((far, flat), (-far, flat + 0), (number, number + 0))
 
     def _tighter(self, x):
@@ -166,7 +192,8 @@ class LightPaths:
         return step
 
     def _walk(self, x) -> Envelopes:
-        """Return the envelopes of paths to x that meet the medium, from facet to facet; others have e_0 > e_1.
+        """Return the envelopes of paths to x that meet the medium, from facet to
+        facet; others have e_0 > e_1.
 
         For points within the medium only the plane with the least e is searched.
         """
@@ -185,14 +212,20 @@ class LightPaths:
             unset = (found.least[0] == _FAR, found.largest[0] == -_FAR)[side]
             planes = tuple(dr.select(unset, number, plane) for plane in found.planes)
             found = replace(found, planes=planes)
-            found = self._descend(step(number, self._line(self.bounded.planes, number, self.active), found), step, side)
+            found = self._descend(
+                step(number, self._line(self.bounded.planes, number, self.active), found),
+                step,
+                side,
+            )
         # The walk may begin on the other side, with no neighbour on its own.
         lost = found.least[0] == _FAR
         lost = lost if self.own else lost | (found.largest[0] == -_FAR)
         return self._over_planes(found, step, self.active & lost)
 
     def _descend(self, found: Envelopes, step: Callable[..., Any], side: int) -> Envelopes:
-        """Go from facet to facet while a neighbour has a tighter plane of one side: 0 for the least, 1 the largest."""
+        """Go from facet to facet while a neighbour has a tighter plane of one side: 0 for
+        the least, 1 the largest.
+        """
 
         def further(turn, searches, found):
             after = self._over_neighbours(found.planes[side], found, step)
@@ -208,14 +241,20 @@ class LightPaths:
         return found
 
     def _plane_towards(self, direction):
-        """Return the number of a plane that is met in about a direction from the medium's centre."""
+        """Return the number of a plane that is met in about a direction
+        from the medium's centre.
+        """
         column, row, layer = (
-            mi.UInt32(dr.clip(dr.fma(part, 0.5 * CELLS, 0.5 * CELLS), 0, CELLS - 1)) for part in direction
+            mi.UInt32(dr.clip(dr.fma(part, 0.5 * CELLS, 0.5 * CELLS), 0, CELLS - 1))
+            for part in direction
         )
-        return dr.gather(mi.UInt32, self.bounded.starts, (layer * CELLS + row) * CELLS + column, self.active)
+        return dr.gather(
+            mi.UInt32, self.bounded.starts, (layer * CELLS + row) * CELLS + column, self.active
+        )
 
     def next_change(self, envelopes: Envelopes, x) -> tuple[tuple[Any, Any], Envelopes]:
-        """Return where other lines take over from the least and the largest at x [m], and these lines.
+        """Return where other lines take over from the least and the largest
+        at x [m], and these lines.
 
         `x` is at least a rounding error `beyond` the last change: so each is met once.
         """
@@ -226,7 +265,8 @@ class LightPaths:
             constant, slope, facing = line
             value = dr.fma(slope, x, constant)
             nearing = dr.select(facing, envelopes.least[1] - slope, slope - envelopes.largest[1])
-            # Below 0 where rounding has let a crossing pass: the earliest is still the next of the envelope.
+            # Below 0 where rounding has let a crossing pass: the earliest is still
+            # the next of the envelope.
             gap = dr.select(facing, value - low, high - value)
             at = dr.select(nearing > 0, x + gap / nearing, dr.inf)
             less, more = facing & (at < until_low), ~facing & (at < until_high)
@@ -242,7 +282,9 @@ class LightPaths:
         return (until_low, until_high), after
 
     def steepness(self, envelopes: Envelopes | None, x, r):
-        """Return |d length/dx| at most [1], and the longest panel from x on, as far as this medium says [m]."""
+        """Return |d length/dx| at most [1], and the longest panel from x on, as far
+        as this medium says [m].
+        """
         Float = type(x)
         if envelopes is None:
             longest = dr.select(self.active, self._smooth_chord(x), dr.inf)
@@ -262,28 +304,36 @@ class LightPaths:
 
             (2 ((p x M) . (d x M) + w f D . d) t + (|d x M|^2 - w f) t^2)/|D - w t d|^2,
 
-        whose divisor is taken for |D|^2: panels end before it changes by much. The second term counts where the first
-        is none: where a segment begins with the longest chord of its paths.
+        whose divisor is taken for |D|^2: panels end before it changes by much. The second term
+        counts where the first is none: where a segment begins with the longest chord of its paths.
         """
         radius, away, w = self.bounded.radius, self.away(x), self.w
         cross = dr.cross(dr.fma(self.direction, x, self.start), self.toward)
         turned, square = dr.cross(self.direction, self.toward), dr.squared_norm(away)
         distance = dr.squared_norm(cross) / square
-        rate = dr.abs(2 * (dr.dot(cross, turned) + w * distance * dr.dot(away, self.direction)) / square)
+        rate = dr.abs(
+            2 * (dr.dot(cross, turned) + w * distance * dr.dot(away, self.direction)) / square
+        )
         bend = dr.abs(dr.squared_norm(turned) - w * distance) / square
         change = _STEEP * dr.maximum(radius * radius - distance, 0)
         length = 2 * change / (rate + dr.sqrt(dr.fma(rate, rate, 4 * bend * change)))
         return dr.select(change > 0, dr.clip(length, _LEAST * radius, _MOST * radius), dr.inf)
 
     def grazed_at(self) -> tuple[Any, ...]:
-        """Return where the points lie whose paths graze a sphere: two distances or infinity [m]; () for planes."""
+        """Return where the points lie whose paths graze a sphere: two distances or
+        infinity [m]; () for planes.
+        """
         if not self.round:
             return ()
         w, toward, start, direction = self.w, self.toward, self.start, self.direction
         square = dr.square(self.bounded.radius)
         away = toward - start if w else toward
         distance = dr.norm(toward)
-        outside = (distance - self.bounded.radius) * (distance + self.bounded.radius) if w else type(distance)(1)
+        outside = (
+            (distance - self.bounded.radius) * (distance + self.bounded.radius)
+            if w
+            else type(distance)(1)
+        )
         cross, turned = dr.cross(start, toward), dr.cross(direction, toward)
         inner = square * dr.squared_norm(dr.cross(away, direction))
         inner = outside * (inner - dr.square(dr.dot(toward, dr.cross(start, direction))))
@@ -297,10 +347,11 @@ class LightPaths:
         return tuple(dr.select(there & dr.isfinite(x), x, dr.inf) for x in ends)
 
     def near_segment(self, x0, x1):
-        """Return whether paths to points of a segment may meet the medium; never False where one does.
+        """Return whether paths to points of a segment may meet the medium;
+        never False where one does.
 
-        They fill a triangle, or a strip without end, in the plane of ray and light. The medium's sphere may lie beside
-        that plane, behind the ray, before the first path or beyond the last.
+        They fill a triangle, or a strip without end, in the plane of ray and light. The medium's
+        sphere may lie beside that plane, behind the ray, before the first path or beyond the last.
         """
         first, last = self.away(x0), self.away(x1)
         point0, point1 = (dr.fma(self.direction, x, self.start) for x in (x0, x1))
@@ -319,7 +370,9 @@ class LightPaths:
         return ~(beside | behind | before | after)
 
     def near_points(self):
-        """Return whether the paths to the origins of the rays may meet the medium; never False where one does."""
+        """Return whether the paths to the origins of the rays may meet the medium;
+        never False where one does.
+        """
         away = self.away(type(self.start.x)(0))
         square, along = dr.squared_norm(away), -dr.dot(self.start, away)
         beyond = dr.square(1.001 * self.bounded.radius)
@@ -328,7 +381,9 @@ class LightPaths:
         return dr.squared_norm(dr.fma(away, nearest, self.start)) < beyond
 
     def _line(self, planes, number, active):
-        """Return e of a plane along the rays, constant and slope, and whether the light comes in through it."""
+        """Return e of a plane along the rays, constant and slope, and whether the
+        light comes in through it.
+        """
         values = dr.gather(four_numbers(type(self.start.x)), planes, number, active)
         normal, offset = values.xyz, values.w
         facing = dr.dot(normal, self.toward) - self.w * offset
@@ -336,7 +391,11 @@ class LightPaths:
         tilt = 16 * dr.epsilon(type(facing)) * (self.bounded.radius if self.w else 1)
         facing = dr.mulsign(dr.maximum(dr.abs(facing), tilt), facing)
         scale = dr.rcp(facing)
-        return (offset - dr.dot(normal, self.start)) * scale, -dr.dot(normal, self.direction) * scale, facing > 0
+        return (
+            (offset - dr.dot(normal, self.start)) * scale,
+            -dr.dot(normal, self.direction) * scale,
+            facing > 0,
+        )
 
     def _over_planes(self, state, step: Callable[..., Any], active):
         """Return a state after step(number, line, state) over the planes."""
@@ -374,17 +433,26 @@ class LightPaths:
 
 
 def paths_from(
-    medium: Medium, light: Light, origin, direction, *, own=None, segment: tuple[Any, Any] | None = None, active=True
+    medium: Medium,
+    light: Light,
+    origin,
+    direction,
+    *,
+    own=None,
+    segment: tuple[Any, Any] | None = None,
+    active=True,
 ) -> list[LightPaths]:
     """Return the paths from a light to the points of rays, by bounded medium.
 
-    `own` is the number of the medium in which the points lie, if it is known; `segment` the ends of what the points
-    lie on [m], if they are within one; `active` the lanes to compute.
+    `own` is the number of the medium in which the points lie, if it is known; `segment` the ends of
+    what the points lie on [m], if they are within one; `active` the lanes to compute.
     """
     paths = []
     for number, bounded in enumerate(medium.bounded_media):
         toward = light.toward(bounded.centre)
-        path = LightPaths(bounded, light.w, toward, origin - bounded.centre, direction, active, own=number == own)
+        path = LightPaths(
+            bounded, light.w, toward, origin - bounded.centre, direction, active, own=number == own
+        )
         if segment is not None and not path.own:
             path = replace(path, active=active & path.near_segment(*segment))
         paths.append(path)
@@ -392,12 +460,15 @@ def paths_from(
 
 
 def beyond(x):
-    """Return a distance a rounding error beyond x [m]: there the line counts that took over at x."""
+    """Return a distance a rounding error beyond x [m]: there the line
+    counts that took over at x.
+    """
     return x + 64 * dr.epsilon(type(x)) * (x + 1)
 
 
 def chord(bounded: BoundedMedium, origin, direction) -> tuple[Any, Any]:
-    """Return where rays enter and leave a medium [m], both infinite where they miss it; from within, 0 and the end.
+    """Return where rays enter and leave a medium [m], both infinite where they miss it;
+    from within, 0 and the end.
 
     `origin` [m] is one for all lanes, `direction` unit vectors.
     """

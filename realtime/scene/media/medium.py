@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interface of every medium, which all code that renders in media uses (see the page of this room).
+"""The interface of every medium, which all code that renders in media uses
+(see the page of this room).
 
-The plainest medium is here too: homogeneous, without bounds. Its extinction is the same everywhere, so integrals leave
-out albedo sigma_t, and integrals of a grey medium are one number. Its airlight is the business of a kernel, a function
-``kernel(geometry, x0, x1, medium, light) -> J [1/m]`` (`realtime.kernels.registry`), which attenuates by exp(-sigma_t
-(x + r)).
+The plainest medium is here too: homogeneous, without bounds. Its extinction is the same everywhere,
+so integrals leave out albedo sigma_t, and integrals of a grey medium are one number. Its airlight
+is the business of a kernel, a function ``kernel(geometry, x0, x1, medium, light) -> J [1/m]``
+(`realtime.kernels.registry`), which attenuates by exp(-sigma_t (x + r)).
 """
 
 from abc import ABC, abstractmethod
@@ -36,7 +37,8 @@ class Rays:
     origin: Any  #: one for all rays, or one each [m]
     direction: Any  #: unit directions
     aim: Any  #: the same in float64, of about unit length, for what lies near a light
-    crossed: tuple[Any, ...]  #: what the medium finds of them once, such as where they enter and leave its parts
+    #: what the medium finds of them once, such as where they enter and leave its parts
+    crossed: tuple[Any, ...]
 
     def at(self, x):
         """Return the points at the distances x [m]."""
@@ -51,7 +53,8 @@ class Medium(ABC):
     sums_depth = False  #: whether depths are walks, so that a march adds those of its steps up
     clear = False  #: whether nothing scatters or absorbs but bounded media
     bounded_media: tuple[Any, ...] = ()  #: those in it
-    clouds: Any = None  #: in vacuum: all bounded media, of any shape, for methods that render clouds
+    #: in vacuum: all bounded media, of any shape, for methods that render clouds
+    clouds: Any = None
 
     @property
     def summary(self) -> str:
@@ -79,30 +82,39 @@ class Medium(ABC):
 
     @abstractmethod
     def optical_depth(self, rays: Rays, x0, x1) -> tuple[Any, ...]:
-        """Return the optical depth of segments [m] of rays, by channel [1]; `x1` may be infinite."""
+        """Return the optical depth of segments [m] of rays, by channel
+        [1]; `x1` may be infinite.
+        """
 
     @abstractmethod
     def longest(self, rays: Rays, light: Light, x, change: float) -> Any:
         """Return the longest panel that may begin at distances x [m]; it may be infinite.
 
-        In it the depth to the camera, the depth to the light and the logarithm of the extinction together change by no
-        more than `change`.
+        In it the depth to the camera, the depth to the light and the logarithm of the extinction
+        together change by no more than `change`.
         """
 
     def bends(self, rays: Rays, light: Light) -> tuple[Any, ...]:
-        """Return the distances along rays at which the extinction or a depth has a kink [m]; by default none."""
+        """Return the distances along rays at which the extinction or a depth has a
+        kink [m]; by default none.
+        """
         return ()
 
     @abstractmethod
     def length_of(self, depth: float) -> Any:
-        """Return a length in which the optical depth grows by `depth` in every channel, wherever it lies [m]."""
+        """Return a length in which the optical depth grows by `depth` in every
+        channel, wherever it lies [m].
+        """
 
     def rays(self, origin, direction, aim=None) -> Rays:
-        """Return rays [m] of unit directions, with what the medium finds of them once; `aim` has twice their digits."""
+        """Return rays [m] of unit directions, with what the medium finds of them once;
+        `aim` has twice their digits.
+        """
         return Rays(origin, direction, direction if aim is None else aim, ())
 
     def depth_to_light(self, light: Any, point, r, active: Any = True) -> tuple[Any, ...]:
-        """Return the optical depth from points [m] to a light, by channel; `r` is its distance [m], if it has a place.
+        """Return the optical depth from points [m] to a light, by channel; `r` is its
+        distance [m], if it has a place.
 
         Parameters
         ----------
@@ -112,45 +124,61 @@ class Medium(ABC):
             The lanes to compute.
         """
         if not getattr(light, "w", 1):
-            return self.optical_depth(self.rays(point, -light.axis), 0, dr.full(type(point.x), dr.inf))
+            return self.optical_depth(
+                self.rays(point, -light.axis), 0, dr.full(type(point.x), dr.inf)
+            )
         return self.optical_depth(self.rays(point, (light.position - point) / r), 0, r)
 
     def source(self, rays: Rays, x, angle: Angle) -> Any:
-        """Return albedo sigma_t p at distances x of rays, in parts of `unit`: a colour [1/m], or a number."""
+        """Return albedo sigma_t p at distances x of rays, in parts of `unit`: a
+        colour [1/m], or a number.
+        """
         return self.albedo * self.colour(self.extinction(rays, x)) * angle(self.phase)
 
     def mean_source(self, rays: Rays, x0, x1, angle: Angle) -> Any:
-        """Return the mean of `source` over segments: froxels hold one value. By default it is that in the middle."""
+        """Return the mean of `source` over segments: froxels hold one value. By default
+        it is that in the middle.
+        """
         return self.source(rays, 0.5 * (x0 + x1), angle)
 
     @property
     def unit(self) -> Any:
-        """What `source` and all integrals of it leave out because it is the same everywhere: by default nothing."""
+        """What `source` and all integrals of it leave out because it is the same
+        everywhere: by default nothing.
+        """
         return 1
 
     def part(self, rays: Rays, x0, x1, *, uniform: bool) -> tuple[Any, Any]:
-        """Return the part of segments [m] in which steps are worth while, 0 and 0 where there is none.
+        """Return the part of segments [m] in which steps are worth while, 0
+        and 0 where there is none.
 
         `uniform` steps need an end; those in the angle at a light have it at infinity.
         """
         return x0, dr.minimum(x1, x0 + self.length_of(OPTICAL_REACH)) if uniform else x1
 
     def last_depth(self, origin, forward) -> Any:
-        """Return the depth from a camera behind which nothing scatters [m], None for media that do not say."""
+        """Return the depth from a camera behind which nothing scatters [m], None
+        for media that do not say.
+        """
         return None
 
     def ambient(self, rays: Rays, distance) -> Any:
-        """Return the light of a constant field of radiance 1 in the medium up to a distance [m], RGB: 1 - exp(-tau)."""
+        """Return the light of a constant field of radiance 1 in the medium up to a distance
+        [m], RGB: 1 - exp(-tau).
+        """
         return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))
 
     def check_beam(self, axis, name: str) -> None:
-        """Refuse a light at infinity along a unit vector, on the host, that the medium does not let in.
+        """Refuse a light at infinity along a unit vector, on the host, that
+        the medium does not let in.
 
         Raises InputError, with the `name` of the light: by default for any.
         """
         raise InputError(
-            "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
-            "infinity: needs media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
+            "the scene has a directional light and a medium without bounds, which lets nothing of "
+            "it through from "
+            "infinity: needs media with bounds in vacuum; give the medium bounds, or use a 'point' "
+            "or 'spot' light"
         )
 
     @abstractmethod
@@ -172,7 +200,9 @@ class Medium(ABC):
         return LitRays(self, light, rays, geometry, kernel)
 
     def colour(self, channels: Sequence[Any]) -> Any:
-        """Return values by channel as one: the number itself of a grey medium, otherwise a colour."""
+        """Return values by channel as one: the number itself of a grey
+        medium, otherwise a colour.
+        """
         return channels[0] if len(channels) == 1 else type(self.albedo)(*channels)
 
     def transmittance(self, depths: Sequence[Any]) -> Any:
@@ -180,15 +210,21 @@ class Medium(ABC):
         return self.colour([exp_bounded(-depth) for depth in depths])
 
     def both_ways(self, rays: Rays, x, light: Any, r, camera: Sequence[Any] | None = None) -> Any:
-        """Return the transmittance from a light to the points at x and on to the camera; `r` is their distance [m].
+        """Return the transmittance from a light to the points at x and on to the camera;
+        `r` is their distance [m].
 
         `camera`: the optical depths from the camera by channel, where they are known.
         """
-        depths = self.optical_depth(rays, 0, x) if camera is None else camera, self.depth_to_light(light, rays.at(x), r)
+        depths = (
+            self.optical_depth(rays, 0, x) if camera is None else camera,
+            self.depth_to_light(light, rays.at(x), r),
+        )
         return self.transmittance([before + own for before, own in zip(*depths, strict=True)])
 
     def radiance(self, light: Light, integral) -> Any:
-        """Return the radiance of an integral of `source` exp(-tau)/r^2 dx [W/(m^2 sr)] (DESIGN section 2)."""
+        """Return the radiance of an integral of `source` exp(-tau)/r^2 dx [W/(m^2
+        sr)] (DESIGN section 2).
+        """
         return light.intensity * (self.unit * (integral * (0.25 * dr.inv_pi)))
 
 
@@ -215,7 +251,9 @@ class VaryingMedium(Medium):
 
 @dataclass(frozen=True)
 class LitRays:
-    """Rays with one light: what methods ask of the medium. Integrals are in parts of `Medium.unit`."""
+    """Rays with one light: what methods ask of the medium. Integrals are
+    in parts of `Medium.unit`.
+    """
 
     medium: Any
     light: Light
@@ -228,17 +266,23 @@ class LitRays:
         return dr.zeros(type(self.medium.albedo), width)
 
     def segment(self, distance) -> tuple[Any, Any]:
-        """Return the part of the rays that the light could reach, up to a distance, in the cone of a spot [m]."""
+        """Return the part of the rays that the light could reach, up to a distance,
+        in the cone of a spot [m].
+        """
         return self.geometry.lit_segment(type(distance)(0), distance)
 
     def airlight(self, x0, x1):
-        """Return the integral over lit segments [x0, x1] [m], any that a light could reach; `x1` may be infinite."""
+        """Return the integral over lit segments [x0, x1] [m], any that a light could
+        reach; `x1` may be infinite.
+        """
         medium, rays = self.medium, self.rays
         x0, x1 = self.within(*self.geometry.lit_segment(x0, x1))
-        return medium.transmittance(medium.optical_depth(rays, 0, x0)) * self.sum(integral(self, x0, x1))
+        return medium.transmittance(medium.optical_depth(rays, 0, x0)) * self.sum(
+            integral(self, x0, x1)
+        )
 
-    # The integrand, in the words of `realtime.scene.media.integrate`. A state is the optical depth, by channel, from
-    # where the segment begins to where a panel does.
+    # The integrand, in the words of `realtime.scene.media.integrate`. A state is the optical depth,
+    # by channel, from where the segment begins to where a panel does.
 
     @property
     def most_panels(self) -> int:
@@ -281,7 +325,8 @@ class LitRays:
     def shines(self, depths) -> Any:
         """Return whether something is left of the light behind panels.
 
-        Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
+        Twice the usual reach: out of thick fog the way to the light may lose more depth
+        than the camera's gains.
         """
         return reduce(dr.minimum, depths) < 2 * optical_reach(type(depths[0]))
 
@@ -290,10 +335,15 @@ class LitRays:
         medium, rays, light = self.medium, self.rays, self.light
 
         def after(x):
-            return [depth + more for depth, more in zip(depths, medium.optical_depth(rays, start.x, x), strict=True)]
+            return [
+                depth + more
+                for depth, more in zip(depths, medium.optical_depth(rays, start.x, x), strict=True)
+            ]
 
         def values(node: Node) -> list[Any]:
-            source = medium.source(rays, node.x, lambda phase: phase.evaluate_half(node.down, node.up))
+            source = medium.source(
+                rays, node.x, lambda phase: phase.evaluate_half(node.down, node.up)
+            )
             return [source * medium.both_ways(rays, node.x, light, node.r, after(node.x))]
 
         end = start.end(1 / medium.longest(rays, light, start.x, CHANGE))
@@ -302,12 +352,14 @@ class LitRays:
     def gamma(self, x):
         """Return Gamma(x), the airlight from the camera to a distance [m] (Biri 2006, section 4.2).
 
-        A difference of two Gammas carries the rounding of both: `airlight` of a segment is better where it can be had.
+        A difference of two Gammas carries the rounding of both: `airlight` of a segment is
+        better where it can be had.
         """
         return self.airlight(type(x)(0), x)
 
     def source(self, x, camera: Sequence[Any] | None = None):
-        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what `Medium.source` does not leave out.
+        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what
+        `Medium.source` does not leave out.
 
         `camera`: see `Medium.both_ways`.
         """
@@ -316,7 +368,9 @@ class LitRays:
         square = dr.fma(s, s, dr.square(self.geometry.height)) if light.w else type(x)(1)
         inverse = dr.rsqrt(square)
         r, strength = square * inverse, dr.square(inverse)
-        value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(self.rays, x, light, r, camera)
+        value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(
+            self.rays, x, light, r, camera
+        )
         return value * (strength * self.geometry.falloff(light, x) if light.varies else strength)
 
     def angle(self, s, r) -> Angle:
@@ -335,7 +389,9 @@ class LitRays:
 
 @dataclass(frozen=True)
 class Homogeneous(Medium):
-    """A homogeneous medium. One extinction for a grey medium, three for a coloured one: code runs once for each."""
+    """A homogeneous medium. One extinction for a grey medium, three for a coloured one:
+    code runs once for each.
+    """
 
     sigma_t: tuple[Any, ...]  #: extinction [1/m], one or three values
     albedo: Any
@@ -364,7 +420,9 @@ class Homogeneous(Medium):
         return depth / self.least_extinction()
 
     def longest(self, rays, light, x, change):
-        """Return `change` over twice the largest extinction: to the light the way may grow as to the camera [m]."""
+        """Return `change` over twice the largest extinction: to the light the way may
+        grow as to the camera [m].
+        """
         return change / (2 * reduce(dr.maximum, self.sigma_t))
 
     def depth_to_light(self, light, point, r, active=True):
@@ -386,10 +444,15 @@ class Homogeneous(Medium):
 
     def thicker(self, factor):
         """Return it with the extinction times a factor."""
-        return replace(self, sigma_t=tuple(dr.opaque(type(own), factor * float(own[0])) for own in self.sigma_t))
+        return replace(
+            self,
+            sigma_t=tuple(dr.opaque(type(own), factor * float(own[0])) for own in self.sigma_t),
+        )
 
     def per_extinction(self, function: Callable[[Any], Any]):
-        """Return `function(sigma_t)` for a grey medium, and its three values as a colour for a coloured one."""
+        """Return `function(sigma_t)` for a grey medium, and its three values as a
+        colour for a coloured one.
+        """
         return self.colour([function(sigma_t) for sigma_t in self.sigma_t])
 
     def least_extinction(self):
@@ -407,10 +470,16 @@ class HomogeneousRays(LitRays):
         return dr.zeros(type(self.medium.sigma_t[0]) if grey else type(self.medium.albedo), width)
 
     def airlight(self, x0, x1):
-        """Return J over the part of [x0, x1] [m] that the light's cone reaches [1/m]; valid where the kernel is."""
-        return self.kernel(self.geometry, *self.geometry.lit_segment(x0, x1), self.medium, self.light)
+        """Return J over the part of [x0, x1] [m] that the light's cone reaches [1/m];
+        valid where the kernel is.
+        """
+        return self.kernel(
+            self.geometry, *self.geometry.lit_segment(x0, x1), self.medium, self.light
+        )
 
 
 def optical_reach(Float) -> float:
-    """Return the optical depths after which a number type has nothing left of light; float64 takes twice as many."""
+    """Return the optical depths after which a number type has nothing left of light;
+    float64 takes twice as many.
+    """
     return OPTICAL_REACH if is_single(Float) else 2 * OPTICAL_REACH

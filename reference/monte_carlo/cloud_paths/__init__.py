@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of scenes of clouds: light paths through closed meshes of any shape, binned by order of scattering.
+"""The reference of scenes of clouds: light paths through closed meshes of any shape,
+binned by order of scattering.
 
 Read in this order:
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A batch of paths through clouds as the layers of an image, by sets of orders of scattering.
 
-Paths go through the pixel centres. Where the extinction of clouds depends on the channel, each channel has paths of its
-own. Pixels that see nothing but the sky get none: they hold no scattered light.
+Paths go through the pixel centres. Where the extinction of clouds depends on the channel, each
+channel has paths of its own. Pixels that see nothing but the sky get none: they hold no scattered
+light.
 """
 
 import math
@@ -27,10 +28,11 @@ SIDE = 0.5  #: probability of a side flight
 
 
 def set_layers(sets: Sequence[str]) -> tuple[str, ...]:
-    """Return the layers of a batch: all orders, light that met a surface, sets of orders such as '3-4', and `straight`.
+    """Return the layers of a batch: all orders, light that met a surface, sets of orders such
+    as '3-4', and `straight`.
 
-    `surface_straight` is the part of `surface` that went from the lights to the visible surface and from there to the
-    eye, attenuated by clouds but not scattered.
+    `surface_straight` is the part of `surface` that went from the lights to the visible surface and
+    from there to the eye, attenuated by clouds but not scattered.
     """
     return ("airlight", "surface", *(set_layer(name) for name in sets), "surface_straight")
 
@@ -50,9 +52,10 @@ def cloud_paths_batch(
 ) -> Batches:
     """Trace one batch.
 
-    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
-    256; `sets`: names of disjoint sets of orders with their first and last order, the last `math.inf` for one without
-    end; `seen`: pixels whose rays meet a cloud or a surface, (pixels,).
+    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
+    samples a pixel, at most 256; `sets`: names of disjoint sets of orders with their first and last
+    order, the last `math.inf` for one without end; `seen`: pixels whose rays meet a cloud or a
+    surface, (pixels,).
     """
     check_samples(samples)
     targets = _targets([orders for _, orders in sets])
@@ -67,18 +70,27 @@ def cloud_paths_batch(
             part = pixels[first : first + _LANES // streams]
             sampler = mi.load_dict({"type": "independent"})
             # Streams differ by seed: each part of the pixels and each channel has its own seeds.
-            sampler.seed((seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place, len(part) * streams)
-            directions = dr.normalize(mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T))
+            sampler.seed(
+                (seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place,
+                len(part) * streams,
+            )
+            directions = dr.normalize(
+                mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T)
+            )
             rays = mi.Ray3f(mi.Point3f(*(float(c) for c in clouds.origin)), directions)
             dr.make_opaque(rays)  # one kernel for all cameras
             side = SIDE if scene.has_suns else 0.0  # flights are drawn about suns
             walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)
             for channel in channels:
-                lanes = np.array(walked[channel], dtype=np.float64).reshape(targets.count, len(part), streams)
+                lanes = np.array(walked[channel], dtype=np.float64).reshape(
+                    targets.count, len(part), streams
+                )
                 sums[:, part, channel] = lanes.sum(axis=2)
     orders, rest, surface, straight = sums[:-3], sums[-3], sums[-2], sums[-1]
     layers = [orders.sum(axis=0) + rest, surface + straight, *orders, straight]
-    return single_batch(seed, samples, np.stack(layers) / samples, layers=set_layers([name for name, _ in sets]))
+    return single_batch(
+        seed, samples, np.stack(layers) / samples, layers=set_layers([name for name, _ in sets])
+    )
 
 
 def _targets(sets: Sequence[tuple[int, float]]) -> Targets:
@@ -91,7 +103,9 @@ def _targets(sets: Sequence[tuple[int, float]]) -> Targets:
 
 
 def _streams(pixels: int, samples: int) -> int:
-    """Return how many lanes share the samples of a pixel: a divisor of them, so that small images fill the machine."""
+    """Return how many lanes share the samples of a pixel: a divisor of them, so that small
+    images fill the machine.
+    """
     streams = 1
     while pixels * streams < _FEWEST_LANES and samples % (2 * streams) == 0:
         streams *= 2

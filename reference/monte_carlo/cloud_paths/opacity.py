@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much clouds let through along the pixel-centre rays, up to the visible surface or to infinity, without samples.
+"""How much clouds let through along the pixel-centre rays, up to the visible surface or to
+infinity, without samples.
 
-Mitsuba's ray casts find the triangles that a ray crosses; where it crosses their planes is computed in float64. A
-stretch lies in a cloud if it ends at a face of it seen from inside, as in the walk. Densities
-are summed up by small steps.
+Mitsuba's ray casts find the triangles that a ray crosses; where it crosses their planes is computed
+in float64. A stretch lies in a cloud if it ends at a face of it seen from inside, as in the walk.
+Densities are summed up by small steps.
 """
 
 from dataclasses import dataclass
@@ -37,7 +38,9 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
     inside = np.full(count, clouds.camera_cloud)
     left = np.arange(count)
     extinction = np.stack([cloud.sigma_t for cloud in clouds.clouds])
-    corners = [triangles_of(cloud.shape) if cloud.shape.is_mesh() else None for cloud in clouds.clouds]
+    corners = [
+        triangles_of(cloud.shape) if cloud.shape.is_mesh() else None for cloud in clouds.clouds
+    ]
     reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
     while left.size:
@@ -68,7 +71,9 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         for number, cloud in enumerate(clouds.clouds):
             own = within == number
             if cloud.density is not None:
-                stretch[own] = cloud.density.along(clouds.origin, way[own], passed[left][own], stretch[own])
+                stretch[own] = cloud.density.along(
+                    clouds.origin, way[own], passed[left][own], stretch[own]
+                )
         depth[left] += np.where(within[:, None] >= 0, extinction[within] * stretch[:, None], 0.0)
         passed[left] = np.maximum(length, passed[left])
         distance[left[opaque]] = length[opaque]

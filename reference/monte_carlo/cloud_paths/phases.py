@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Phase functions of the walk, in Dr.Jit: values by half the angle, and scattering angles at random.
+"""Phase functions of the walk, in Dr.Jit: values by half the angle, and
+scattering angles at random.
 
-Both work with down = sin^2(angle/2), which two unit vectors give without cancellation, |a - b|^2/4. Values have the
-mean 1 over the sphere, so down is distributed with the density p on [0, 1].
+Both work with down = sin^2(angle/2), which two unit vectors give without cancellation, |a - b|^2/4.
+Values have the mean 1 over the sphere, so down is distributed with the density p on [0, 1].
 """
 
 from typing import Any, Protocol
@@ -31,8 +32,8 @@ class WalkPhase(Protocol):
 class HenyeyGreenstein:
     """Henyey and Greenstein's function, isotropic for g = 0.
 
-    The distribution's inverse is down = (1 - g) (1 - u) (r + 1 - g) / (2 (1 - g + 2 g u)), r = (1 - g^2)/(1 - g + 2 g
-    u): the usual formula of the cosine without its cancellations.
+    The distribution's inverse is down = (1 - g) (1 - u) (r + 1 - g) / (2 (1 - g + 2 g u)), r = (1 -
+    g^2)/(1 - g + 2 g u): the usual formula of the cosine without its cancellations.
     """
 
     def __init__(self, g: float):
@@ -68,7 +69,8 @@ class Rayleigh:
 class Tabulated:
     """Values at regularly spaced cosines, linear between them.
 
-    A cell is drawn by the alias method (Walker 1977; Vose 1991), a place in it by the inverse of the linear density.
+    A cell is drawn by the alias method (Walker 1977; Vose 1991), a place in it by the
+    inverse of the linear density.
 
     `values`: (A,), from backward to forward, of mean 1.
     """
@@ -83,7 +85,10 @@ class Tabulated:
         """Return p."""
         place = up * self._last
         cell = dr.clip(mi.Int32(place), 0, self._last - 1)
-        low, high = dr.gather(mi.Float, self._values, cell), dr.gather(mi.Float, self._values, cell + 1)
+        low, high = (
+            dr.gather(mi.Float, self._values, cell),
+            dr.gather(mi.Float, self._values, cell + 1),
+        )
         return dr.lerp(low, high, place - cell)
 
     def down(self, sampler, active):
@@ -100,7 +105,9 @@ class Tabulated:
 
 
 def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
-    """Return for each cell the fraction of its draws that stay with it, and the cell that gets the others."""
+    """Return for each cell the fraction of its draws that stay with it, and the
+    cell that gets the others.
+    """
     count = len(weights)
     fraction = weights * (count / weights.sum())
     other = np.arange(count, dtype=np.uint32)
@@ -129,4 +136,7 @@ def walk_phase(phase: analytic.PhaseFunction) -> WalkPhase:
     if isinstance(phase, analytic.Tabulated):
         values = np.asarray(phase.table)
         return Tabulated(values / (0.5 * (values[1:] + values[:-1])).mean())
-    raise InputError(f"the walk has no phase function '{phase.name}'; expected isotropic, hg, rayleigh or tabulated")
+    raise InputError(
+        f"the walk has no phase function '{phase.name}'; expected isotropic, hg, rayleigh or "
+        "tabulated"
+    )

@@ -15,7 +15,8 @@ from airlight.reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_ph
 from airlight.reference.scene.clouds import CloudDensity, CloudScene
 
 _FOUR_PI = 4 * np.pi
-#: How far past a crossing the next ray starts, relative to the largest coordinate: what float32 can tell apart.
+#: How far past a crossing the next ray starts, relative to the largest coordinate:
+#: what float32 can tell apart.
 _BEYOND = 4e-7
 
 
@@ -31,10 +32,12 @@ class WalkScene:
     phases: tuple[WalkPhase, ...]  #: each once
     phase_of: Any  #: which of `phases`, by medium
     sky: tuple[float, float, float]  #: radiance [W/(m^2 sr)]
-    suns: tuple[tuple[Any, Any, float], ...]  #: direction to each, irradiance over 4 pi and probability, probability
+    #: direction to each, irradiance over 4 pi and probability, probability
+    suns: tuple[tuple[Any, Any, float], ...]
     has_surfaces: bool
     beyond: float  #: how far past a crossing the next ray starts [m]
-    densities: tuple[tuple[int, CloudDensity], ...] = ()  #: of the media that have one, with their numbers
+    #: of the media that have one, with their numbers
+    densities: tuple[tuple[int, CloudDensity], ...] = ()
 
     @property
     def has_suns(self) -> bool:
@@ -82,7 +85,11 @@ class WalkScene:
     def _by_sun(self, number, field: int, kind):
         result = kind(0)
         for place, sun in enumerate(self.suns):
-            result = kind(sun[field]) if place == 0 else dr.select(number == place, kind(sun[field]), result)
+            result = (
+                kind(sun[field])
+                if place == 0
+                else dr.select(number == place, kind(sun[field]), result)
+            )
         return result
 
     def phase_value(self, medium, first, second, active):
@@ -99,7 +106,9 @@ class WalkScene:
         """Return the density of directions drawn about suns [1/sr]."""
         density = mi.Float(0)
         for towards, _, probability in self.suns:
-            density += probability * self.phase_value(medium, mi.Vector3f(towards), direction, active)
+            density += probability * self.phase_value(
+                medium, mi.Vector3f(towards), direction, active
+            )
         return density
 
     def scattered(self, medium, about, sampler, active):
@@ -112,7 +121,9 @@ class WalkScene:
         sine, azimuth = 2 * dr.sqrt(down * (1 - down)), 2 * dr.pi * sampler.next_1d(active)
         across, along = dr.sincos(azimuth)
         s, t = mi.coordinate_system(about)
-        return dr.normalize(dr.fma(s, sine * along, dr.fma(t, sine * across, about * (1 - 2 * down))))
+        return dr.normalize(
+            dr.fma(s, sine * along, dr.fma(t, sine * across, about * (1 - 2 * down)))
+        )
 
 
 def _numbers(values) -> tuple[float, float, float]:
@@ -123,9 +134,13 @@ def _numbers(values) -> tuple[float, float, float]:
 def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     """Return the scene for the walk, with the extinctions of one channel."""
     numbers = {
-        int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n for n, each in enumerate(clouds.clouds, 1)
+        int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n
+        for n, each in enumerate(clouds.clouds, 1)
     }
-    every = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in clouds.scene.shapes()]
+    every = [
+        int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+        for shape in clouds.scene.shapes()
+    ]
     kinds = np.zeros(max(every) + 1, dtype=np.uint32)
     kinds[list(numbers)] = list(numbers.values())
     functions = list(dict.fromkeys(each.phase for each in clouds.clouds))
@@ -133,8 +148,13 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     suns = []
     for sun, fraction in zip(clouds.suns, power / power.sum() if len(power) else [], strict=True):
         if fraction > 0:
-            suns.append((_numbers(-sun.direction), _numbers(sun.irradiance / fraction), float(fraction)))
-    reach = max(np.abs(np.array(clouds.scene.bbox().min)).max(), np.abs(np.array(clouds.scene.bbox().max)).max())
+            suns.append(
+                (_numbers(-sun.direction), _numbers(sun.irradiance / fraction), float(fraction))
+            )
+    reach = max(
+        np.abs(np.array(clouds.scene.bbox().min)).max(),
+        np.abs(np.array(clouds.scene.bbox().max)).max(),
+    )
     return WalkScene(
         scene=clouds.scene,
         camera_medium=clouds.camera_cloud + 1,
@@ -147,5 +167,7 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
         suns=tuple(suns),
         has_surfaces=bool(clouds.occluders.shapes()),
         beyond=_BEYOND * max(float(reach), float(np.abs(clouds.origin).max())),
-        densities=tuple((n, each.density) for n, each in enumerate(clouds.clouds, 1) if each.density is not None),
+        densities=tuple(
+            (n, each.density) for n, each in enumerate(clouds.clouds, 1) if each.density is not None
+        ),
     )

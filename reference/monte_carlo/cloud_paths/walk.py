@@ -1,36 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Light paths from the eye through clouds, in one loop that casts one ray a turn.
 
-A path flies an exponentially distributed optical length through clouds (air has no extinction), is scattered by the
-phase function, and so on until it leaves and meets the sky. At every place of scattering a shadow ray to a sun adds the
-sun's light: one of the suns at random, by its irradiance.
+A path flies an exponentially distributed optical length through clouds (air has no extinction), is
+scattered by the phase function, and so on until it leaves and meets the sky. At every place of
+scattering a shadow ray to a sun adds the sun's light: one of the suns at random, by its irradiance.
 
-With a directional sun that term holds the phase function p_s of the angle between the path and the sun, whose forward
-peak is rarely met and then large. Directions are therefore sampled a second time, about the sun (multiple importance
-sampling, Veach and Guibas 1995): from each place x a *side flight* leaves in a direction drawn from p_s, has its own
-free flight, and adds the sun's light where the flight ends. With p_a the phase function about the path, the sun's light
-at the ends of both flights counts
+With a directional sun that term holds the phase function p_s of the angle between the path and the
+sun, whose forward peak is rarely met and then large. Directions are therefore sampled a second
+time, about the sun (multiple importance sampling, Veach and Guibas 1995): from each place x a *side
+flight* leaves in a direction drawn from p_s, has its own free flight, and adds the sun's light
+where the flight ends. With p_a the phase function about the path, the sun's light at the ends of
+both flights counts
 
     p_a/(p_a + p_s)                  times its value after the path's own flight,
 
-which is at most 1 times p_s, so that their product stays below p_a: no peak is left. A place before which the path was
-not scattered (the first, and the one after a surface) has no side flight before it, and its light counts whole.
+which is at most 1 times p_s, so that their product stays below p_a: no peak is left. A place before
+which the path was not scattered (the first, and the one after a surface) has no side flight before
+it, and its light counts whole.
 
-Paths are never cut short in clouds: absorption is a weight. Where a weight falls below 0.05, by absorption or by dark
-surfaces, the path goes on with a probability in proportion (Russian roulette, unbiased). A shadow ray that leaves a
-cloud with less than 1/8 of its light likewise goes on with 8 times that fraction as its probability.
+Paths are never cut short in clouds: absorption is a weight. Where a weight falls below 0.05, by
+absorption or by dark surfaces, the path goes on with a probability in proportion (Russian roulette,
+unbiased). A shadow ray that leaves a cloud with less than 1/8 of its light likewise goes on with 8
+times that fraction as its probability.
 
-The end of a stretch tells its medium: before a face of a cloud seen from inside, the cloud; before a face seen from
-outside, or nothing, vacuum; before an opaque surface, the medium where the path was last. A crossing that rounding
-doubles or hides therefore does no harm beyond the next face. After a crossing a ray starts a little further on; this
-gap is added to the length of its next stretch.
+The end of a stretch tells its medium: before a face of a cloud seen from inside, the cloud; before
+a face seen from outside, or nothing, vacuum; before an opaque surface, the medium where the path
+was last. A crossing that rounding doubles or hides therefore does no harm beyond the next face.
+After a crossing a ray starts a little further on; this gap is added to the length of its next
+stretch.
 
-A cloud with a density has its largest extinction for `sigma_t`, and the fraction rho of it at each place. Flights go as
-if it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on
-(delta tracking, Woodcock 1965). A shadow ray has such flights too, and goes on with the factor 1 - rho where one ends
-(ratio tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
+A cloud with a density has its largest extinction for `sigma_t`, and the fraction rho of it at each
+place. Flights go as if it had the largest everywhere, and where one ends it is scattered with the
+probability rho, otherwise it flies on (delta tracking, Woodcock 1965). A shadow ray has such
+flights too, and goes on with the factor 1 - rho where one ends (ratio tracking, Novak, Selle,
+Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
 
-A lane of the loop follows the samples of one pixel one after another, so that lanes end at nearly the same time.
+A lane of the loop follows the samples of one pixel one after another, so that lanes end
+at nearly the same time.
 """
 
 from dataclasses import dataclass
@@ -51,12 +57,14 @@ _SHADOW_FRACTION = 8.0
 class Targets:
     """Where light goes: its layer by order of scattering, and two of surfaces.
 
-    Light that met no surface goes to one of `orders` layers, or to the layer `orders` if it is of no order wanted.
-    Two layers follow: light that met surfaces, and of that what came from the lights to the visible surface and from
-    there to the eye straight, which the first of the two lacks.
+    Light that met no surface goes to one of `orders` layers, or to the layer `orders` if it is of
+    no order wanted. Two layers follow: light that met surfaces, and of that what came from the
+    lights to the visible surface and from there to the eye straight, which the first of the two
+    lacks.
     """
 
-    by_order: Any  #: layer of each order from 0 on, UInt32; the last number is that of all further orders
+    #: layer of each order from 0 on, UInt32; the last number is that of all further orders
+    by_order: Any
     orders: int  #: how many layers of orders there are
 
     @property
@@ -65,8 +73,12 @@ class Targets:
         return self.orders + 3
 
     def layer(self, order, met, straight):
-        """Return the layer of light of an order, that `met` a surface or not, and came straight from there."""
-        of_order = dr.gather(mi.UInt32, self.by_order, dr.minimum(order, dr.width(self.by_order) - 1))
+        """Return the layer of light of an order, that `met` a surface or not, and
+        came straight from there.
+        """
+        of_order = dr.gather(
+            mi.UInt32, self.by_order, dr.minimum(order, dr.width(self.by_order) - 1)
+        )
         of_surface = dr.select(straight, mi.UInt32(self.orders + 2), mi.UInt32(self.orders + 1))
         return dr.select(met, of_surface, of_order)
 
@@ -95,11 +107,13 @@ class Paths:
 
 
 def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, side: float):
-    """Return the sums over samples, (layers x lanes) for each channel, and how many rays each lane cast.
+    """Return the sums over samples, (layers x lanes) for each channel, and how
+    many rays each lane cast.
 
-    `scene`: what the walk reads; `targets`: where light goes; `sampler`: seeded, as wide as there are lanes; `rays`:
-    where paths start from the eye's side and their unit directions, one a lane, as Mitsuba's rays; `samples`: how many
-    paths each lane follows; `side`: probability of a side flight, 0 to 1.
+    `scene`: what the walk reads; `targets`: where light goes; `sampler`: seeded, as wide as there
+    are lanes; `rays`: where paths start from the eye's side and their unit directions, one a lane,
+    as Mitsuba's rays; `samples`: how many paths each lane follows; `side`: probability of a side
+    flight, 0 to 1.
     """
     lanes = dr.width(rays.d)
     sums = [dr.zeros(mi.Float, targets.count * lanes) for _ in range(3)]
@@ -124,7 +138,10 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
     )
     turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
     paths, _ = dr.while_loop(
-        state=(paths, sampler), cond=lambda paths, _: paths.left > 0, body=turn, label="paths through clouds"
+        state=(paths, sampler),
+        cond=lambda paths, _: paths.left > 0,
+        body=turn,
+        label="paths through clouds",
     )
     return sums, paths.casts
 
@@ -135,7 +152,14 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     lanes = dr.width(rays.d)
     lane = dr.arange(mi.UInt32, lanes)
     flags = int(mi.RayFlags.All) if scene.has_surfaces else int(mi.RayFlags.Minimal)
-    mode, o, d, gap, depth, medium = paths.mode, paths.o, paths.d, paths.gap, paths.depth, paths.medium
+    mode, o, d, gap, depth, medium = (
+        paths.mode,
+        paths.o,
+        paths.d,
+        paths.gap,
+        paths.depth,
+        paths.medium,
+    )
     x, w, cloud, weight, order = paths.x, paths.w, paths.cloud, paths.weight, paths.order
     bounces, fraction, value, target = paths.bounces, paths.fraction, paths.value, paths.target
     si = scene.scene.ray_intersect(mi.Ray3f(o, d), flags, False, active)
@@ -162,7 +186,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         stays = thins | (scatters & (sampler.next_1d(active) >= rho))
         scatters &= ~stays
         crosses, meets, leaves = crosses & ~thins, meets & ~thins, leaves & ~thins
-        optical = dr.select(thins, -dr.log(dr.maximum(1 - rho, 0)), dr.select(shadow & uneven, 0, optical))
+        optical = dr.select(
+            thins, -dr.log(dr.maximum(1 - rho, 0)), dr.select(shadow & uneven, 0, optical)
+        )
     begins = scatters & is_main
     depth = dr.select(shadow, depth + optical, depth - optical)
 
@@ -172,7 +198,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     arriving = value * lit
     place = target * lanes + lane
     for number in range(3):
-        dr.scatter_add(sums[number], arriving[number], place, arrives, mode=dr.ReduceMode.NoConflicts)
+        dr.scatter_add(
+            sums[number], arriving[number], place, arrives, mode=dr.ReduceMode.NoConflicts
+        )
     chance = dr.minimum(_SHADOW_FRACTION * lit, 1.0)
     fades = dims & (sampler.next_1d(active) >= chance)
     value = dr.select(dims, arriving / dr.maximum(chance, dr.smallest(mi.Float)), value)
@@ -184,14 +212,20 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     albedo = dr.gather(mi.Color3f, scene.albedo, within, active)
     order = dr.select(begins, order + 1, order)
     weight = dr.select(begins, weight * albedo, weight)
-    x, w, cloud = dr.select(begins, scattered_at, x), dr.select(begins, d, w), dr.select(begins, within, cloud)
+    x, w, cloud = (
+        dr.select(begins, scattered_at, x),
+        dr.select(begins, d, w),
+        dr.select(begins, within, cloud),
+    )
     over = escapes & is_main
     if scene.has_sky:
         of_sky = over & ((order > 0) | (bounces > 0))
         place = targets.layer(order, bounces > 0, (order == 0) & (bounces == 1)) * lanes + lane
         from_sky = weight * mi.Color3f(*scene.sky)
         for number in range(3):
-            dr.scatter_add(sums[number], from_sky[number], place, of_sky, mode=dr.ReduceMode.NoConflicts)
+            dr.scatter_add(
+                sums[number], from_sky[number], place, of_sky, mode=dr.ReduceMode.NoConflicts
+            )
     sun = scene.random_sun(sampler, active)
     to_sun, irradiance = scene.to_sun(sun), scene.irradiance(sun)
     weighed = dr.select(begins, weight, weight * albedo) * fraction
@@ -206,8 +240,13 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         bsdf, context = si.bsdf(mi.RayDifferential3f(mi.Ray3f(o, d))), mi.BSDFContext()
         seen_sun = bsdf.eval(context, si, si.to_local(to_sun), reflects) * irradiance
         value = dr.select(reflects, weight * seen_sun, value)
-        target = dr.select(reflects, targets.layer(order, mi.Bool(True), (order == 0) & (bounces == 1)), target)
-        first, second = sampler.next_1d(active), mi.Point2f(sampler.next_1d(active), sampler.next_1d(active))
+        target = dr.select(
+            reflects, targets.layer(order, mi.Bool(True), (order == 0) & (bounces == 1)), target
+        )
+        first, second = (
+            sampler.next_1d(active),
+            mi.Point2f(sampler.next_1d(active), sampler.next_1d(active)),
+        )
         drawn, passed = bsdf.sample(context, si, first, second, reflects)
         onwards = si.to_world(drawn.wo)
         weight = dr.select(reflects, weight * passed, weight)

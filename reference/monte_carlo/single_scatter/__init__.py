@@ -3,7 +3,8 @@
 
 Read in this order:
 
-- `distance_sampling.py`: distances along a ray: equi-angular, uniform and free-flight sampling combined;
+- `distance_sampling.py`: distances along a ray: equi-angular, uniform and
+  free-flight sampling combined;
 - `boundary_walk.py`: optical depth and visibility through the boundaries of media;
 - `stretches.py`: camera rays, their parts in media, cells of samples;
 - `varying_media.py`: parts in height fog and density grids, with their own optical depths;

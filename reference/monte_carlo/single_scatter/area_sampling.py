@@ -1,31 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Sampling points on area lights, in Dr.Jit: for places on surfaces, and towards the ray.
 
-A surface point has points that are even over the area, or over the disk as which it sees a sphere: with theta the angle
-at the centre between a point of the sphere and the way to the place, cos(theta)^2 is uniform above (R/d)^2 and the
-density cos(theta)/(pi R^2 (1 - (R/d)^2)).
+A surface point has points that are even over the area, or over the disk as which it sees a sphere:
+with theta the angle at the centre between a point of the sphere and the way to the place,
+cos(theta)^2 is uniform above (R/d)^2 and the density cos(theta)/(pi R^2 (1 - (R/d)^2)).
 
 For one point y of a light, the distances along a camera ray come from
-`reference.monte_carlo.single_scatter.distance_sampling`, as for a point light at y. The value of such a sample is
-bounded by range/h, h the distance of y from the ray. If y were uniform over the area, its mean square would be the
-integral of 1/h^2 over the area, which diverges where a ray meets the light. Half of the points are therefore spread
-about the place c where the ray meets the light, or comes nearest to it, with a density that goes as 1/rho,
-rho = \|y - c\|: the mean square is then the integral of 1/rho over the area, which is finite.
+`reference.monte_carlo.single_scatter.distance_sampling`, as for a point light at y. The value of
+such a sample is bounded by range/h, h the distance of y from the ray. If y were uniform over the
+area, its mean square would be the integral of 1/h^2 over the area, which diverges where a ray meets
+the light. Half of the points are therefore spread about the place c where the ray meets the light,
+or comes nearest to it, with a density that goes as 1/rho, rho = \|y - c\|: the mean square is then
+the integral of 1/rho over the area, which is finite.
 
-In the plane of a rectangle, disk or triangle, seen from c, with R(phi) how far the piece reaches in the direction phi:
+In the plane of a rectangle, disk or triangle, seen from c, with R(phi) how far the piece
+reaches in the direction phi:
 
     rho = R(phi) v,  phi uniform        pdf = 1 / (2 pi R(phi) rho)
 
-On a sphere of radius R the chord rho from c to y is uniform in [0, 2 R], and the angle about the axis through c is
-uniform too. With an area of rho d(rho) d(phi) (Archimedes: equal slices have equal areas, and rho^2 is linear in the
-height),
+On a sphere of radius R the chord rho from c to y is uniform in [0, 2 R], and the angle about the
+axis through c is uniform too. With an area of rho d(rho) d(phi) (Archimedes: equal slices have
+equal areas, and rho^2 is linear in the height),
 
     pdf = 1 / (4 pi R rho).
 
-A ray may meet a sphere twice: each of both places has a quarter of the points. On a mesh half of the points are spread
-so in the one triangle that the ray meets first, if any, and the others evenly over all triangles. The density of a
-point is the mean over the techniques, each with its fraction (the balance heuristic with one sample, Veach 1997,
-section 9.2.4).
+A ray may meet a sphere twice: each of both places has a quarter of the points. On a mesh half of
+the points are spread so in the one triangle that the ray meets first, if any, and the others evenly
+over all triangles. The density of a point is the mean over the techniques, each with its fraction
+(the balance heuristic with one sample, Veach 1997, section 9.2.4).
 
 References
 ----------
@@ -72,20 +74,30 @@ class Triangles:
 
     def facing(self, u, v, place) -> LightSample:
         """Sample points evenly over the area."""
-        number = dr.binary_search(0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u)
+        number = dr.binary_search(
+            0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u
+        )
         return self._even(number, u, v)
 
     def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly, and half of those of a ray that meets a triangle about the place where it does."""
-        hit = self.scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
+        """Sample points evenly, and half of those of a ray that meets a triangle about
+        the place where it does.
+        """
+        hit = self.scene.ray_intersect_preliminary(
+            mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+        )
         meets = hit.is_valid()
         met = dr.select(meets, hit.prim_index, 0)
         fraction = mi.Float64(dr.select(meets, 0.5, 0))
-        number = dr.binary_search(0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u)
+        number = dr.binary_search(
+            0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u
+        )
         even = self._even(number, u, (v - fraction) / (1 - fraction)).position
 
         # The place in the triangle that was met, in the axes of its first side and across it.
-        corner, first, second = (self._vector(self.corners, met * 9 + 3 * which) for which in range(3))
+        corner, first, second = (
+            self._vector(self.corners, met * 9 + 3 * which) for which in range(3)
+        )
         normal = self._vector(self.normals, met * 3)
         across = dr.normalize(first)
         up = dr.cross(normal, across)
@@ -96,7 +108,9 @@ class Triangles:
         sine, cosine = dr.sincos(2 * math.pi * u)
         way = across * cosine + up * sine
         about = meets & (v < fraction)
-        drawn = place + way * (_edge_of_triangle(place, way, ends, normal) * v / dr.maximum(fraction, _LEAST))
+        drawn = place + way * (
+            _edge_of_triangle(place, way, ends, normal) * v / dr.maximum(fraction, _LEAST)
+        )
         position = dr.select(about, drawn, even)
         number = dr.select(about, met, number)
 
@@ -106,15 +120,25 @@ class Triangles:
         rho = dr.select(here & counts, rho, 1)
         edge = _edge_of_triangle(place, (position - place) / rho, ends, normal)
         density = (1 - fraction) / self.area + dr.select(here, _about(fraction, edge, rho), 0)
-        return LightSample(position, self._vector(self.normals, number * 3), dr.select(counts, density, 0))
+        return LightSample(
+            position, self._vector(self.normals, number * 3), dr.select(counts, density, 0)
+        )
 
     def _even(self, number, u, v) -> LightSample:
-        """Return points of triangles, given u, by which these were chosen by area, and v in [0, 1)."""
-        before = dr.select(number == 0, 0, dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1))
+        """Return points of triangles, given u, by which these were chosen
+        by area, and v in [0, 1).
+        """
+        before = dr.select(
+            number == 0, 0, dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1)
+        )
         root = dr.sqrt((u - before) / (dr.gather(mi.Float64, self.below, number) - before))
-        corner, first, second = (self._vector(self.corners, number * 9 + 3 * which) for which in range(3))
+        corner, first, second = (
+            self._vector(self.corners, number * 9 + 3 * which) for which in range(3)
+        )
         position = corner + first * (root * (1 - v)) + second * (root * v)
-        return LightSample(position, self._vector(self.normals, number * 3), mi.Float64(1 / self.area))
+        return LightSample(
+            position, self._vector(self.normals, number * 3), mi.Float64(1 / self.area)
+        )
 
     def _vector(self, numbers, base):
         return mi.Vector3d(*(dr.gather(mi.Float64, numbers, base + axis) for axis in range(3)))
@@ -142,24 +166,34 @@ class Flat:
         return LightSample(self._at(x, y), self.normal, mi.Float64(1 / self.area))
 
     def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly and about the place where the ray meets the plane, moved onto the light."""
+        """Sample points evenly and about the place where the ray meets the
+        plane, moved onto the light.
+        """
         slope = dr.dot(direction, self.normal)
         offset = self.centre - origin
         parallel = dr.abs(slope) < _PARALLEL
         meets = dr.dot(offset, self.normal) / dr.select(parallel, 1, slope)
-        place = origin + direction * dr.select(parallel, dr.dot(offset, direction), meets) - self.centre
+        place = (
+            origin + direction * dr.select(parallel, dr.dot(offset, direction), meets) - self.centre
+        )
         x0, y0 = dr.dot(place, self.across), dr.dot(place, self.up)
         a, b = self.half
         inward = dr.minimum(1, a / dr.maximum(dr.hypot(x0, y0), _LEAST))
-        x0, y0 = (x0 * inward, y0 * inward) if self.round else (dr.clip(x0, -a, a), dr.clip(y0, -b, b))
+        x0, y0 = (
+            (x0 * inward, y0 * inward) if self.round else (dr.clip(x0, -a, a), dr.clip(y0, -b, b))
+        )
         fraction = _fraction(self._at(x0, y0), max(a, b), origin, direction)
 
         x, y = self._even(u, (v - fraction) / (1 - fraction))
         sine, cosine = dr.sincos(2 * math.pi * u)
         about, distance = v < fraction, self._edge(x0, y0, cosine, sine) * (v / fraction)
-        x, y = dr.select(about, x0 + distance * cosine, x), dr.select(about, y0 + distance * sine, y)
+        x, y = (
+            dr.select(about, x0 + distance * cosine, x),
+            dr.select(about, y0 + distance * sine, y),
+        )
         rho = dr.hypot(x - x0, y - y0)
-        # At a place on the edge the light has no extent outwards: the sample drawn there is the place itself.
+        # At a place on the edge the light has no extent outwards: the sample drawn
+        # there is the place itself.
         counts = rho > _TOUCHING * max(a, b)
         rho = dr.select(counts, rho, 1)
         edge = self._edge(x0, y0, (x - x0) / rho, (y - y0) / rho)
@@ -200,7 +234,9 @@ class Ball:
         return 4 * math.pi * self.radius**2
 
     def facing(self, u, v, place) -> LightSample:
-        """Sample points of the cap that places outside see, evenly over its projection towards them."""
+        """Sample points of the cap that places outside see, evenly over its
+        projection towards them.
+        """
         way = place - self.centre
         distance = dr.maximum(dr.norm(way), _LEAST)
         # A place on the sphere or in it sees nothing, wherever the samples are.
@@ -212,7 +248,9 @@ class Ball:
         return LightSample(self.centre + self.radius * normal, normal, density)
 
     def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points on the side turned to the ray, and about the two places where the ray meets the sphere."""
+        """Sample points on the side turned to the ray, and about the two places where
+        the ray meets the sphere.
+        """
         radius = self.radius
         offset = origin - self.centre
         middle = offset - direction * dr.dot(offset, direction)
@@ -225,7 +263,9 @@ class Ball:
         fraction = _fraction(self.centre + radius * places[0], radius, origin, direction)
 
         angle = 2 * math.pi * u
-        normal = _towards(2 * dr.sqrt(dr.clip((v - fraction) / (1 - fraction), 0, 1)) - 1, angle, side)
+        normal = _towards(
+            2 * dr.sqrt(dr.clip((v - fraction) / (1 - fraction), 0, 1)) - 1, angle, side
+        )
         for number, place in enumerate(places):
             chord = dr.clip(2 * v / fraction - number, 0, 1)  # over the diameter
             chosen = (v < fraction) & ((v < 0.5 * fraction) == (number == 0))
@@ -237,15 +277,25 @@ class Ball:
         return LightSample(self.centre + normal * radius, normal, density)
 
 
-#: Emitting surfaces: `facing(u, v, place)` samples points for surfaces, `towards(u, v, origin, direction)` for rays.
+#: Emitting surfaces: `facing(u, v, place)` samples points for surfaces, `towards(u, v,
+#: origin, direction)` for rays.
 Emitting = Triangles | Flat | Ball
 
 
 def emitting(light: ReferenceAreaLight) -> Emitting:
     """Return the emitting surface of an area light, as numbers on the device."""
-    centre, across, up, normal = (mi.Vector3d(*map(float, vector)) for vector in (light.centre, *light.frame))
+    centre, across, up, normal = (
+        mi.Vector3d(*map(float, vector)) for vector in (light.centre, *light.frame)
+    )
     if light.kind in ("rectangle", "disk"):
-        return Flat(centre, across, up, normal, (float(light.half[0]), float(light.half[1])), light.kind == "disk")
+        return Flat(
+            centre,
+            across,
+            up,
+            normal,
+            (float(light.half[0]), float(light.half[1])),
+            light.kind == "disk",
+        )
     if light.kind == "sphere":
         return Ball(centre, light.radius)
     corners = light.triangles
@@ -268,7 +318,9 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
 
 
 def _fraction(place, radius: float, origin, direction):
-    """Return the fraction of points about a place of a light: a half where the ray meets it, few where it is far."""
+    """Return the fraction of points about a place of a light: a half where the ray meets
+    it, few where it is far.
+    """
     offset = place - origin
     gap = dr.norm(offset - direction * dr.dot(offset, direction)) / radius
     return 0.5 / (1 + _FADE * gap * gap)

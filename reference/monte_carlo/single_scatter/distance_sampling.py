@@ -1,42 +1,48 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sampling distances along a camera ray, in Dr.Jit: equi-angular, free-flight, and the two combined.
+"""Sampling distances along a camera ray, in Dr.Jit: equi-angular,
+free-flight, and the two combined.
 
-A *span* is a part of a ray between s0 and s1 = s0 + length, both measured from the foot of the perpendicular from the
-light, so that r^2 = h^2 + s^2; s1 may be infinite. Distances are sampled as y = s - s0 in [0, length].
+A *span* is a part of a ray between s0 and s1 = s0 + length, both measured from the foot of the
+perpendicular from the light, so that r^2 = h^2 + s^2; s1 may be infinite. Distances are sampled as
+y = s - s0 in [0, length].
 
-Equi-angular (Kulla and Fajardo 2012, section 4; densities there over the same span): the angle delta at the light from
-the start of the span is uniform, which gives a density proportional to 1/r^2. With r0 = sqrt(h^2 + s0^2) and the
-tangent of a difference of angles,
+Equi-angular (Kulla and Fajardo 2012, section 4; densities there over the same span): the angle
+delta at the light from the start of the span is uniform, which gives a density proportional to
+1/r^2. With r0 = sqrt(h^2 + s0^2) and the tangent of a difference of angles,
 
     tan(delta) = h y / (r0^2 + s0 y)        the angle between s0 and s0 + y, by the cross and dot products
     y = r0^2 sin(delta) / (h cos(delta) - s0 sin(delta))
     pdf(y) = h / (range r^2),               range = delta(length).
 
-No angle is subtracted from another: the range of a short or distant span keeps all its digits, in single precision too.
+No angle is subtracted from another: the range of a short or distant span keeps all its digits,
+in single precision too.
 
-Free-flight: the exponential density sigma exp(-sigma y) / (1 - exp(-sigma length)), truncated to the span. With
-t = tanh(sigma length / 2), 1 - exp(-sigma length) = 2 t / (1 + t), and -log(1 - z) = 2 atanh(z / (2 - z)) gives
+Free-flight: the exponential density sigma exp(-sigma y) / (1 - exp(-sigma length)), truncated to
+the span. With t = tanh(sigma length / 2), 1 - exp(-sigma length) = 2 t / (1 + t), and -log(1 - z) =
+2 atanh(z / (2 - z)) gives
 
     y = 2 atanh(u t / (1 + t (1 - u))) / sigma,
 
-again free of cancellation, down to sigma length = 0, the uniform density. Where the extinction depends on the channel,
-the density is the mean over the channels (spectral multiple importance sampling).
+again free of cancellation, down to sigma length = 0, the uniform density. Where the extinction
+depends on the channel, the density is the mean over the channels (spectral multiple importance
+sampling).
 
-Combined: the density is the mean of the two. The estimator f(y)/pdf(y) is then the balance heuristic with even odds
-(Veach 1997, theorem 9.4): sum over both techniques of the weight pdf_t/(pdf_1 + pdf_2) times f/pdf_t. Its variance is
-finite for every ray that does not meet the light: f r^2 is bounded (by sigma_s I max p) and pdf r^2 >= h/(2 range),
-whatever the free-flight density and whatever channel f is of.
+Combined: the density is the mean of the two. The estimator f(y)/pdf(y) is then the balance
+heuristic with even odds (Veach 1997, theorem 9.4): sum over both techniques of the weight
+pdf_t/(pdf_1 + pdf_2) times f/pdf_t. Its variance is finite for every ray that does not meet the
+light: f r^2 is bounded (by sigma_s I max p) and pdf r^2 >= h/(2 range), whatever the free-flight
+density and whatever channel f is of.
 
-Nothing falls with the distance to a light from infinity: what varies along a stretch of length d is exp(-sigma y) of
-the camera ray, the transmittance of the segment, which may fall or rise, and shadows. There the density is the mean of
-the uniform one, 1/d, and of free flights. Half of the unit interval goes to the former, half to the latter: with n
-samples in n cells either technique is stratified by itself. As the density is nowhere below 1/(2 d), the estimator is
-bounded.
+Nothing falls with the distance to a light from infinity: what varies along a stretch of length d is
+exp(-sigma y) of the camera ray, the transmittance of the segment, which may fall or rise, and
+shadows. There the density is the mean of the uniform one, 1/d, and of free flights. Half of the
+unit interval goes to the former, half to the latter: with n samples in n cells either technique is
+stratified by itself. As the density is nowhere below 1/(2 d), the estimator is bounded.
 
 References
 ----------
-C. Kulla and M. Fajardo 2012, Importance sampling techniques for path tracing in participating media.
-E. Veach 1997, Robust Monte Carlo methods for light transport simulation, chapter 9.
+C. Kulla and M. Fajardo 2012, Importance sampling techniques for path tracing in participating
+media. E. Veach 1997, Robust Monte Carlo methods for light transport simulation, chapter 9.
 """
 
 import math
@@ -47,11 +53,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-_MEAN_FREE_PATHS = 60.0  # free flights are cut there: 1e-26 of them are longer, and the other technique goes on
-# By how much samples may fall beside a spot's cone [rad]: above double precision's rounding, and so little that it does
-# not matter that hardly any sample ever does. (A strip that 1 batch in 100 feels is a bias in all the others.)
+# free flights are cut there: 1e-26 of them are longer, and the other technique goes on
+_MEAN_FREE_PATHS = 60.0
+# By how much samples may fall beside a spot's cone [rad]: above double precision's rounding, and so
+# little that it does not matter that hardly any sample ever does. (A strip that 1 batch in 100
+# feels is a bias in all the others.)
 _CONE_MARGIN = 1e-8
-_FAR = 1e30  # where a sample at the very end of an unbounded ray goes; nothing is transmitted from there [m]
+# where a sample at the very end of an unbounded ray goes; nothing is transmitted from there [m]
+_FAR = 1e30
 _CDF_TOLERANCE = 3e-8  # how exactly the mixture is inverted: a rounding of what samplers draw
 _STEPS = 60  # most take five; every fourth halves the bracket
 _LEAST_DEPTH = 1e-12  # the exponential of a thinner span is uniform to the last bit
@@ -68,7 +77,9 @@ class Approach:
 
 @dataclass(frozen=True)
 class Span:
-    """A part of a ray as a light sees it; of double precision, since a short part far out is a small difference."""
+    """A part of a ray as a light sees it; of double precision, since a short part far
+    out is a small difference.
+    """
 
     height: Any  #: distance of the light from the ray, above 0 [m]
     start: Any  #: s0, from the foot [m]
@@ -78,8 +89,8 @@ class Span:
 def closest_approach(origin, direction, position) -> Approach:
     """Return foot, height and normal of rays in double precision.
 
-    `origin`, `direction`: rays, arrays of double precision; `direction` has unit length; `position`: the light's
-    position, of double precision.
+    `origin`, `direction`: rays, arrays of double precision; `direction` has unit length;
+    `position`: the light's position, of double precision.
 
     Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
     """
@@ -91,17 +102,21 @@ def closest_approach(origin, direction, position) -> Approach:
 
 
 def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[Any, Any]:
-    """Return the ends of the part of a line inside a spot's cone, as distances from the foot; empty if they swap.
+    """Return the ends of the part of a line inside a spot's cone, as distances from the
+    foot; empty if they swap.
 
-    The direction from the light to the point s is w(theta) = sin(theta) direction + cos(theta) normal, with
-    tan(theta) = s/h, so that axis . w = m cos(theta - middle), with (m, middle) the polar form of
-    (axis . normal, axis . direction). It is above cos(cutoff) for |theta - middle| < acos(cos(cutoff)/m).
+    The direction from the light to the point s is w(theta) = sin(theta) direction + cos(theta)
+    normal, with tan(theta) = s/h, so that axis . w = m cos(theta - middle), with (m, middle) the
+    polar form of (axis . normal, axis . direction). It is above cos(cutoff) for |theta - middle| <
+    acos(cos(cutoff)/m).
 
-    `approach`: how the rays pass the light; `direction`: the rays' directions, of double precision; `axis`: the cone's
-    axis, a unit vector of double precision; `cutoff`: the cone's half angle [rad].
+    `approach`: how the rays pass the light; `direction`: the rays' directions, of double precision;
+    `axis`: the cone's axis, a unit vector of double precision; `cutoff`: the cone's half angle
+    [rad].
 
-    Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie outside the cone by a
-    hair: they bound where samples are drawn, and what the light sends there is the emitter's own answer.
+    Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie
+    outside the cone by a hair: they bound where samples are drawn, and what the light sends there
+    is the emitter's own answer.
     """
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
@@ -122,11 +137,15 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
 def equi_angular_range(span: Span):
     """Return the angle that the light sees the span under [rad]."""
     finite = span.length < dr.inf
-    return dr.select(finite, _angle(dr.select(finite, span.length, 1), span), dr.atan2(span.height, span.start))
+    return dr.select(
+        finite, _angle(dr.select(finite, span.length, 1), span), dr.atan2(span.height, span.start)
+    )
 
 
 def equi_angular(u, span: Span):
-    """Return distances y from the start of the span [m], uniform in the angle at the light, for u in [0, 1)."""
+    """Return distances y from the start of the span [m], uniform in the angle at
+    the light, for u in [0, 1).
+    """
     return _distance(u * equi_angular_range(span), span)
 
 
@@ -137,16 +156,21 @@ def equi_angular_pdf(y, span: Span):
 
 
 def _distance(angle, span: Span):
-    """Return how far from the start of the span the point is that the light sees at an angle from it [m]."""
+    """Return how far from the start of the span the point is that the light sees
+    at an angle from it [m].
+    """
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
-    beyond = h * cosine - s0 * sine  # r0 cos(theta): above 0, and 0 at the far end of an unbounded ray
+    # r0 cos(theta): above 0, and 0 at the far end of an unbounded ray
+    beyond = h * cosine - s0 * sine
     y = (h * h + s0 * s0) * sine / dr.maximum(beyond, 1e-30)
     return dr.minimum(dr.select(beyond > 0, y, _FAR), span.length)
 
 
 def _angle(y, span: Span):
-    """Return the angle at the light between the start of the span and the point at y, the inverse of `_distance`."""
+    """Return the angle at the light between the start of the span and the point at y,
+    the inverse of `_distance`.
+    """
     s0, h = span.start, span.height
     return dr.atan2(h * y, h * h + s0 * (s0 + y))
 
@@ -182,11 +206,15 @@ def free_flight_pdf(y, flight: FreeFlight):
 
 
 def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
-    """Return the distribution function (whose absolute error is a rounding over rate cut) and the density."""
+    """Return the distribution function (whose absolute error is a rounding over
+    rate cut) and the density.
+    """
     inside = y <= flight.cut
     survival = dr.exp(-flight.rate * y)
     scale = (1 + flight.tanh) / (2 * flight.tanh)
-    return dr.select(inside, scale * (1 - survival), 1), dr.select(inside, flight.rate * scale * survival, 0)
+    return dr.select(inside, scale * (1 - survival), 1), dr.select(
+        inside, flight.rate * scale * survival, 0
+    )
 
 
 @dataclass(frozen=True)
@@ -199,37 +227,52 @@ class Mixture:
 
 
 def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
-    """Return the mixture of both techniques; one extinction for all channels, or one for each [1/m]."""
+    """Return the mixture of both techniques; one extinction for all
+    channels, or one for each [1/m].
+    """
     flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
     return Mixture(span, equi_angular_range(span), flights)
 
 
 def mixture_pdfs(y, mixture: Mixture) -> tuple[Any, Any]:
-    """Return the terms of either technique in the mixture density at y [1/m]; their fractions are the MIS weights."""
+    """Return the terms of either technique in the mixture density at y [1/m]; their
+    fractions are the MIS weights.
+    """
     return tuple(pdf for _, pdf in _terms(y, mixture))
 
 
 def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
-    """Return the terms of equi-angular sampling and free flights in the distribution function and the density."""
+    """Return the terms of equi-angular sampling and free flights in the distribution
+    function and the density.
+    """
     h, s = mixture.span.height, mixture.span.start + y
     flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]
     fraction = 0.5 / len(flights)
-    equi = 0.5 * _angle(y, mixture.span) / mixture.range, 0.5 * h / (mixture.range * (h * h + s * s))
-    return [equi, (fraction * sum(cdf for cdf, _ in flights), fraction * sum(pdf for _, pdf in flights))]
+    equi = (
+        0.5 * _angle(y, mixture.span) / mixture.range,
+        0.5 * h / (mixture.range * (h * h + s * s)),
+    )
+    return [
+        equi,
+        (fraction * sum(cdf for cdf, _ in flights), fraction * sum(pdf for _, pdf in flights)),
+    ]
 
 
 def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
-    """Sample a distance from the mixture of both techniques by inverting its cumulative distribution.
+    """Sample a distance from the mixture of both techniques by inverting its
+    cumulative distribution.
 
-    `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the span [m] and the
-    density [1/m].
+    `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the
+    span [m] and the density [1/m].
 
-    The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were u to choose the
-    technique, a point light's peak would fall into few cells of the free flights: 50 times the variance at 64 samples.)
+    The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were
+    u to choose the technique, a point light's peak would fall into few cells of the free flights:
+    50 times the variance at 64 samples.)
 
-    The mean of several cumulative distributions takes the value u between the places where they themselves do. Between
-    those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h, and a bisection where it leaves the bracket.
-    All this is in double precision: in single, the angle has no digits left for what lies far beyond a close light.
+    The mean of several cumulative distributions takes the value u between the places where they
+    themselves do. Between those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h,
+    and a bisection where it leaves the bracket. All this is in double precision: in single, the
+    angle has no digits left for what lies far beyond a close light.
     """
     span, u = mixture.span, mi.Float64(u)
     low = high = u * mixture.range
@@ -251,16 +294,20 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
         return number + 1, searching, low, high, dr.select(searching, better, angle)
 
     state = (mi.UInt32(0), dr.full(mi.Bool, True, dr.width(low)), low, high, 0.5 * (low + high))
-    angle = dr.while_loop(state, lambda number, searching, *_: searching, improve, label="inverse of the mixture")[-1]
+    angle = dr.while_loop(
+        state, lambda number, searching, *_: searching, improve, label="inverse of the mixture"
+    )[-1]
     y = _distance(angle, span)
     return y, sum(mixture_pdfs(y, mixture))
 
 
 def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
-    """Sample a distance for a light from infinity, by the mean of the uniform density and of free flights.
+    """Sample a distance for a light from infinity, by the mean of the uniform
+    density and of free flights.
 
-    `u`: uniform in [0, 1); `length`: of the stretch, finite and above 0 [m]; `sigma_t`: one extinction for all
-    channels, or one for each [1/m]. Returns distances from its start [m] and their density [1/m].
+    `u`: uniform in [0, 1); `length`: of the stretch, finite and above 0 [m]; `sigma_t`: one
+    extinction for all channels, or one for each [1/m]. Returns distances from its start [m] and
+    their density [1/m].
     """
     u, length = mi.Float64(u), mi.Float64(length)
     flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]

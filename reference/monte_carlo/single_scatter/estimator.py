@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Light scattered once into camera rays: the estimator of the integrator `single-scatter`, in Dr.Jit.
+r"""Light scattered once into camera rays: the estimator of the integrator
+`single-scatter`, in Dr.Jit.
 
 For each light and each medium that a ray crosses, from x0 to x1,
 
     L = int_{x0}^{x1} T(0, x) sigma_s p(cos)/(4 pi) E V T(x, light) dx
 
-(T transmittance, V visibility) is estimated at distances that the medium draws. E is the irradiance of a light at the
-point, I/r^2 for a light at a place. Area lights and a sky are integrals over their points and directions: each sample
-has its own, from a Kronecker sequence with a random start. A surface at the end of the ray adds f cos E V T T, for such
-lights as the mean over samples. Lights come from `reference.monte_carlo.single_scatter.sources`, transmittances from
-the medium (`reference.monte_carlo.single_scatter.stretches.Part`); phase function, scattering and material f come from
-Mitsuba's plugins alone.
+(T transmittance, V visibility) is estimated at distances that the medium draws. E is the irradiance
+of a light at the point, I/r^2 for a light at a place. Area lights and a sky are integrals over
+their points and directions: each sample has its own, from a Kronecker sequence with a random start.
+A surface at the end of the ray adds f cos E V T T, for such lights as the mean over samples. Lights
+come from `reference.monte_carlo.single_scatter.sources`, transmittances from the medium
+(`reference.monte_carlo.single_scatter.stretches.Part`); phase function, scattering and material f
+come from Mitsuba's plugins alone.
 
-In a scene whose extinction depends on the channel all channels use the same distances, with the density of the mixture
-over the channels, so that no channel's variance can become infinite.
+In a scene whose extinction depends on the channel all channels use the same distances, with the
+density of the mixture over the channels, so that no channel's variance can become infinite.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +32,13 @@ from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
     step_beyond,
 )
 from airlight.reference.monte_carlo.single_scatter.sources import Source
-from airlight.reference.monte_carlo.single_scatter.stretches import Part, Ray, Stretch, cell_of, place_of
+from airlight.reference.monte_carlo.single_scatter.stretches import (
+    Part,
+    Ray,
+    Stretch,
+    cell_of,
+    place_of,
+)
 from airlight.reference.monte_carlo.single_scatter.varying_media import varying_part
 from airlight.reference.scene.varying import VaryingMedium
 
@@ -44,13 +52,15 @@ class Task:
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
     start: Any  #: pointer to the medium in which camera rays start
-    varying: VaryingMedium | None = None  #: the same, where its extinction differs from place to place
+    #: the same, where its extinction differs from place to place
+    varying: VaryingMedium | None = None
 
 
 def ray_light(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     """Return airlight and lit surface along camera rays [W/(m^2 sr)].
 
-    `task`: what is traced; `sampler`: Mitsuba's sampler, with one stream for each ray; `ray`: the rays; `active`: mask.
+    `task`: what is traced; `sampler`: Mitsuba's sampler, with one stream for each ray; `ray`:
+    the rays; `active`: mask.
     """
     if task.varying is None:
         return _through_media(task, sampler, ray, active)
@@ -65,21 +75,27 @@ def _next_hit(task: Task, ray: Ray, done, active):
     """Return the hits of rays from some distance on."""
     if not task.around.surfaces:
         return dr.zeros(mi.SurfaceInteraction3f, dr.width(active))
-    return task.around.scene.ray_intersect(mi.Ray3f(ray.origin + ray.direction * done, ray.direction), active)
+    return task.around.scene.ray_intersect(
+        mi.Ray3f(ray.origin + ray.direction * done, ray.direction), active
+    )
 
 
 def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     """Follow camera rays from boundary to boundary, and add up what each stretch sends."""
 
     def walk(walking, sampler, done, start, depth, medium, airlight, surface):
-        """Add the stretch to the next thing on the way, `done` being where the ray goes on, `start` the boundary."""
+        """Add the stretch to the next thing on the way, `done` being where the ray goes
+        on, `start` the boundary.
+        """
         hit = _next_hit(task, ray, done, walking)
         met = walking & hit.is_valid()
         end = dr.select(met, done + hit.t, dr.inf)
         sigma_s, sigma_t = coefficients(medium, walking)
         rates = [sigma_t[0]] if task.grey else list(sigma_t)
         ends = mi.Float64(start), mi.Float64(end)
-        stretch = Stretch(task.around, *ends, medium, dr.max(sigma_s) > 0, depth, sigma_t, rates, at_camera)
+        stretch = Stretch(
+            task.around, *ends, medium, dr.max(sigma_s) > 0, depth, sigma_t, rates, at_camera
+        )
         sent, sampler = _airlight(known, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)
         left, sampler = _surface(known, sampler, ray, hit, end, stretch, met & ~passed)
@@ -106,17 +122,24 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
         return walk(*state)[-2:]
     # The medium at a light that stays is looked for once.
     places = (
-        replace(each, medium=medium_at(task.around, mi.Point3f(each.position), ray.origin, at_camera, active))
+        replace(
+            each,
+            medium=medium_at(task.around, mi.Point3f(each.position), ray.origin, at_camera, active),
+        )
         if each.position is not None
         else each
         for each in task.sources
     )
     known = replace(task, sources=tuple(places))
-    return dr.while_loop(state, lambda walking, *_: walking, walk, label="camera ray through media")[-2:]
+    return dr.while_loop(
+        state, lambda walking, *_: walking, walk, label="camera ray through media"
+    )[-2:]
 
 
 def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, Any]:
-    """Estimate what all lights send from a part of the rays: for each a loop over the cells of the unit interval."""
+    """Estimate what all lights send from a part of the rays: for each a loop over the
+    cells of the unit interval.
+    """
     total = dr.zeros(mi.Spectrum, dr.width(active))
     active = active & part.scatters
     for source in task.sources:
@@ -128,34 +151,49 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
             sample = source.on_ray(u, place_of(index, start), ray, part, active)
             used, point = sample.counts, sample.point
             sigma_s, _, _ = part.medium.get_scattering_coefficients(point, used)
-            phase, _ = part.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, sample.towards, used)
+            phase, _ = part.medium.phase_function().eval_pdf(
+                mi.PhaseFunctionContext(), point, sample.towards, used
+            )
             kept, sampler = part.kept(sample.x, point, sample.path, ray, sampler, used)
             value = sigma_s * phase * sample.value * kept * width
             return index + 1, total + dr.select(used, value, 0), sampler
 
         state = (mi.UInt32(0), total, sampler)
-        _, total, sampler = dr.while_loop(state, lambda i, *_: i < task.samples, add_sample, label="distances")
+        _, total, sampler = dr.while_loop(
+            state, lambda i, *_: i < task.samples, add_sample, label="distances"
+        )
     return total, sampler
 
 
 def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple[Any, Any]:
-    """Return the light that the surface at the end of a part of the rays, x [m] from the camera, reflects."""
+    """Return the light that the surface at the end of a part of the rays, x [m]
+    from the camera, reflects.
+    """
     total = dr.zeros(mi.Spectrum, dr.width(active))
     if not task.around.surfaces:
         return total, sampler
     x = mi.Float64(dr.select(active, x, part.start))
     for source in task.sources:
-        start, count = sampler.next_2d(active), task.samples if source.varies or part.estimated else 1
+        start, count = (
+            sampler.next_2d(active),
+            task.samples if source.varies or part.estimated else 1,
+        )
 
         def add_sample(index, total, sampler, source: Source = source, start=start, count=count):
             towards, path, irradiance = source.on_surface(place_of(index, start), hit, active)
             material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
             kept, sampler = part.kept(x, hit, path, ray, sampler, active)
-            return index + 1, total + dr.select(active, material * irradiance * kept / count, 0), sampler
+            return (
+                index + 1,
+                total + dr.select(active, material * irradiance * kept / count, 0),
+                sampler,
+            )
 
         state = (mi.UInt32(0), total, sampler)
         if count == 1:
             _, total, sampler = add_sample(*state)
         else:
-            _, total, sampler = dr.while_loop(state, lambda i, *_, n=count: i < n, add_sample, label="surfaces")
+            _, total, sampler = dr.while_loop(
+                state, lambda i, *_, n=count: i < n, add_sample, label="surfaces"
+            )
     return total, sampler

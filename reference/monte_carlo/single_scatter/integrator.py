@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`single-scatter`: batches of an estimator of exactly one scattering, in the medium or on a surface.
+"""`single-scatter`: batches of an estimator of exactly one scattering, in
+the medium or on a surface.
 
-`reference.monte_carlo.single_scatter.estimator` has the integral along a ray and its estimate. The integrator checks
-`reference.quadrature`. The two share facts that `reference.scene` reads (rays through the pixel centres, shapes and
-radiance of area lights, numbers of media) and Mitsuba's ray casting, but no derivation beyond the integral itself.
+`reference.monte_carlo.single_scatter.estimator` has the integral along a ray and its estimate. The
+integrator checks `reference.quadrature`. The two share facts that `reference.scene` reads (rays
+through the pixel centres, shapes and radiance of area lights, numbers of media) and Mitsuba's ray
+casting, but no derivation beyond the integral itself.
 
-The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
-itself at a random place, a new one for each light and medium. The estimate is unbiased, its error falls as n^-1.5
-where the integrand is smooth and as 1/n at the edge of a shadow, and batches of different seeds are independent.
+The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the
+grid of cells is itself at a random place, a new one for each light and medium. The estimate is
+unbiased, its error falls as n^-1.5 where the integrand is smooth and as 1/n at the edge of a
+shadow, and batches of different seeds are independent.
 
-Rounding: a ray's foot and height are computed in double precision; everything after that is relative to the light, in
-the variant's precision. Sums over at most 256 samples are single, over batches double.
+Rounding: a ray's foot and height are computed in double precision; everything after that is
+relative to the light, in the variant's precision. Sums over at most 256 samples are single, over
+batches double.
 """
 
 from dataclasses import replace
@@ -33,10 +37,10 @@ _RAYS = 1 << 20  # camera rays in one kernel
 def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> Batches:
     """Trace one batch along the pixel-centre rays, from the pinhole.
 
-    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
-    each ray, light and medium, each from a point of its own of an area light, at most 256. Returns Batches:
-    airlight and surface of every pixel [W/(m^2 sr)]. The surface is sampled under area lights and a sky
-    alone: without these all batches agree on it.
+    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
+    distances sampled for each ray, light and medium, each from a point of its own of an area light,
+    at most 256. Returns Batches: airlight and surface of every pixel [W/(m^2 sr)]. The surface is
+    sampled under area lights and a sky alone: without these all batches agree on it.
     """
     check_samples(samples)
     task = _task(reference, samples)
@@ -49,12 +53,17 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
         count = chunk.stop - chunk.start
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)
-        ray = double_ray(mi.Point3d(*(float(c) for c in reference.origin)), mi.Vector3d(reference.direction[chunk].T))
+        ray = double_ray(
+            mi.Point3d(*(float(c) for c in reference.origin)),
+            mi.Vector3d(reference.direction[chunk].T),
+        )
         layers = dr.zeros(mi.Spectrum, count), dr.zeros(mi.Spectrum, count)
-        # One light after the other: lights of one structure share a compiled kernel, while a kernel of many lights
-        # would hold a loop for each.
+        # One light after the other: lights of one structure share a compiled kernel, while a kernel
+        # of many lights would hold a loop for each.
         for source in task.sources:
-            sent = ray_light(replace(task, sources=(source,)), sampler, ray, dr.full(mi.Bool, True, count))
+            sent = ray_light(
+                replace(task, sources=(source,)), sampler, ray, dr.full(mi.Bool, True, count)
+            )
             layers = layers[0] + sent[0], layers[1] + sent[1]
             sampler.schedule_state()
             dr.eval(layers)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Lights for the estimator: the light that one sample on a camera ray, or on a surface, receives.
 
-A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2 density), with the
-density of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a
-point y for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w the unit
-vector from y. The plane of y clips the ray: points behind it get no light from y. A sun and a sky have an irradiance,
-and a sky has a direction for each sample. Mitsuba's emitters compute the emission, except for area lights, whose
-points are drawn by `reference.monte_carlo.single_scatter.area_sampling`, not by Mitsuba's `sample_direction`.
+A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2
+density), with the density of the distances along the ray
+(`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a point y for each
+sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w the unit
+vector from y. The plane of y clips the ray: points behind it get no light from y. A sun and a sky
+have an irradiance, and a sky has a direction for each sample. Mitsuba's emitters compute the
+emission, except for area lights, whose points are drawn by
+`reference.monte_carlo.single_scatter.area_sampling`, not by Mitsuba's `sample_direction`.
 """
 
 import math
@@ -18,15 +20,25 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.reference.monte_carlo.single_scatter.area_sampling import Emitting, LightSample, emitting
+from airlight.reference.monte_carlo.single_scatter.area_sampling import (
+    Emitting,
+    LightSample,
+    emitting,
+)
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import step_beyond
-from airlight.reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
+    Approach,
+    Span,
+    closest_approach,
+    cone_ends,
+)
 from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
 from airlight.reference.scene.read import ReferenceScene, whole_scene
 
-_FARTHEST = 1e15  # of places that light is scattered at [m]: squares of longer ways overflow in single precision
+# of places that light is scattered at [m]: squares of longer ways overflow in single precision
+_FARTHEST = 1e15
 _LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
 
 
@@ -38,23 +50,30 @@ class Sample:
     point: Any  #: the point of the medium
     towards: Any  #: unit vectors to the light
     path: Path
-    value: Any  #: irradiance across the path, were nothing in its way, over the density of the sample
+    #: irradiance across the path, were nothing in its way, over the density of the sample
+    value: Any
     counts: Any  #: mask
 
 
 class _Near(ABC):
-    """Lights at places: a subclass has points, says what these send, and what part of a ray they could light."""
+    """Lights at places: a subclass has points, says what these send, and what part
+    of a ray they could light.
+    """
 
     position: Any = None  # of all samples, where they have one
     medium: Any = None  # pointer to what every path begins in, where that is known
 
     @abstractmethod
     def point(self, numbers, to: Ray | Any) -> LightSample:
-        """Return the points of samples with these numbers, for rays or for places of double precision."""
+        """Return the points of samples with these numbers, for rays or for
+        places of double precision.
+        """
 
     @abstractmethod
     def sent(self, point: LightSample, at, from_light) -> Any:
-        """Return the intensity towards places in unit directions, over the density of the points [W/sr]."""
+        """Return the intensity towards places in unit directions, over the
+        density of the points [W/sr].
+        """
 
     @abstractmethod
     def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
@@ -78,7 +97,9 @@ class _Near(ABC):
         from_light = way / mi.Float(dr.sqrt(square))
         there = point_on(ray, mi.Point3f(light.position) + way)
         used &= (density > 0) & (square < _FARTHEST * _FARTHEST)
-        value = self.sent(light, there, from_light) * mi.Float(dr.select(used, 1 / (square * density), 0))
+        value = self.sent(light, there, from_light) * mi.Float(
+            dr.select(used, 1 / (square * density), 0)
+        )
         return Sample(low + y, there, -from_light, self._path(light, way), value, used)
 
     def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
@@ -182,12 +203,18 @@ class FarSource:
         sample, irradiance = self.emitter.sample_direction(point, mi.Point2f(*numbers), used)
         path = Path(sample.p, -sample.d, sample.dist, point.p)
         used &= density > 0
-        return Sample(x, point, sample.d, path, irradiance * mi.Float(dr.select(used, 1 / density, 0)), used)
+        return Sample(
+            x, point, sample.d, path, irradiance * mi.Float(dr.select(used, 1 / density, 0)), used
+        )
 
     def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
         """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
         sample, irradiance = self.emitter.sample_direction(hit, mi.Point2f(*numbers), active)
-        return sample.d, Path(sample.p, -sample.d, sample.dist, hit.spawn_ray(sample.d).o), irradiance
+        return (
+            sample.d,
+            Path(sample.p, -sample.d, sample.dist, hit.spawn_ray(sample.d).o),
+            irradiance,
+        )
 
 
 Source = PointSource | AreaSource | FarSource
@@ -201,7 +228,10 @@ def is_sky(emitter) -> bool:
 def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     """Return the lights of a scene."""
     emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
-    wide = [AreaSource(emitting(light), mi.Color3f(*map(float, light.radiance))) for light in reference.area]
+    wide = [
+        AreaSource(emitting(light), mi.Color3f(*map(float, light.radiance)))
+        for light in reference.area
+    ]
     return (*map(_source, emitters), *wide)
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Camera rays, their parts in media, ways from lights to points on them, and cells of samples.
 
-`Part` is the interface of a medium on its part of the rays. A new medium is another `Part`, in its own file.
+`Part` is the interface of a medium on its part of the rays. A new medium is another
+`Part`, in its own file.
 """
 
 from abc import ABC, abstractmethod
@@ -12,7 +13,12 @@ from typing import Any, ClassVar
 import drjit as dr
 import mitsuba as mi
 
-from airlight.reference.monte_carlo.single_scatter.boundary_walk import Segment, Surroundings, medium_at, transmittance
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
+    Segment,
+    Surroundings,
+    medium_at,
+    transmittance,
+)
 from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     mixture_of,
@@ -20,7 +26,8 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     sample_stretch,
 )
 
-_STEPS = (0.7548776662466927, 0.5698402909980532)  # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
+# 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
+_STEPS = (0.7548776662466927, 0.5698402909980532)
 
 
 @dataclass(frozen=True)
@@ -44,9 +51,11 @@ class Path:
     medium: Any = None  #: pointer to what they begin in; None: not known
 
     def shadow_ray(self) -> tuple[Any, Any, Any]:
-        """Return from where rays look for what stands in the way, in which unit direction, and how far [m].
+        """Return from where rays look for what stands in the way, in which unit
+        direction, and how far [m].
 
-        Rays from afar lose digits: a ball of 1 m, met from 200 m away, would shadow a third of itself.
+        Rays from afar lose digits: a ball of 1 m, met from 200 m away, would
+        shadow a third of itself.
         """
         if self.end is None:
             return self.begin, self.away, self.length
@@ -66,10 +75,11 @@ class Part(ABC):
 
     @abstractmethod
     def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
-        """Sample distances from `low`, a distance along the rays, up to a length from there [m], in double precision.
+        """Sample distances from `low`, a distance along the rays, up to a length from there
+        [m], in double precision.
 
-        `u` is uniform in [0, 1); `span`: the same part as a light at a place sees it, None for one that is infinitely
-        far. Returns distances [m] and their density [1/m].
+        `u` is uniform in [0, 1); `span`: the same part as a light at a place sees it, None for one
+        that is infinitely far. Returns distances [m] and their density [1/m].
         """
 
     @abstractmethod
@@ -103,7 +113,9 @@ class Stretch(Part):
         elif at_light is None:
             at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
         media = Segment(at_light, self.sigma_t)
-        segment = transmittance(self.around, path.begin, path.away, path.length, media=media, active=active)
+        segment = transmittance(
+            self.around, path.begin, path.away, path.length, media=media, active=active
+        )
         return segment * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
 
 
@@ -116,9 +128,10 @@ def double_ray(origin, direction) -> Ray:
 def cell_of(number, shift, count: int) -> tuple[Any, Any]:
     """Return where a cell of the unit interval begins, and its width.
 
-    All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift` in [0, 1) says. So
-    the edge of a shadow lies anywhere in its cell from batch to batch; in cells that stay, an edge close to the end of
-    one would be felt so rarely that no spread between batches could tell.
+    All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift`
+    in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch; in cells
+    that stay, an edge close to the end of one would be felt so rarely that no spread between
+    batches could tell.
     """
     if count == 1:
         return mi.Float(0), mi.Float(1)
@@ -128,7 +141,9 @@ def cell_of(number, shift, count: int) -> tuple[Any, Any]:
 
 
 def place_of(index, start) -> tuple[Any, Any]:
-    """Return a point of the unit square, given its number and where the sequence, Kronecker's, starts."""
+    """Return a point of the unit square, given its number and where the
+    sequence, Kronecker's, starts.
+    """
     number = mi.Float64(index)
     u, v = (mi.Float64(begin) + number * step for begin, step in zip(start, _STEPS))
     return u - dr.floor(u), v - dr.floor(v)

@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Camera rays in media whose extinction differs from place to place: height fog and density grids.
 
-**Height fog.** Mitsuba's plugin says the density, antiderivatives the optical depths. With an antiderivative G of the
-density over the height, constant beyond floor and cap, the optical depth of a segment of length l between two heights
-is l (G(z_1) - G(z_0))/(z_1 - z_0), and up to a sun at the height mu it is (G(cap) - G(z))/mu. A sky shines from below
-too: then it is (G(z) - G(floor))/|mu|. For a layer
+**Height fog.** Mitsuba's plugin says the density, antiderivatives the optical depths. With an
+antiderivative G of the density over the height, constant beyond floor and cap, the optical depth of
+a segment of length l between two heights is l (G(z_1) - G(z_0))/(z_1 - z_0), and up to a sun at the
+height mu it is (G(cap) - G(z))/mu. A sky shines from below too: then it is (G(z) - G(floor))/|mu|.
+For a layer
 
     G(z) = -sigma_i H_i exp(-(z - z_i)/H_i),     clamped below z_i:  sigma_i (z - z_i - H_i).
 
-Where the heights are as good as one, the depth is the density between them times l. (The quadrature takes the lower end
-and (1 - e^-u)/u.) A free flight has the density sigma exp(-tau)/(1 - exp(-tau_end)): tau is inverted by bisection.
-Under a sun every distance is one: the estimate is the transmittance of its path, and bounded. Under a light at a place
-one half of the samples are equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
+Where the heights are as good as one, the depth is the density between them times l. (The quadrature
+takes the lower end and (1 - e^-u)/u.) A free flight has the density sigma exp(-tau)/(1 -
+exp(-tau_end)): tau is inverted by bisection. Under a sun every distance is one: the estimate is the
+transmittance of its path, and bounded. Under a light at a place one half of the samples are
+equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
 
-**Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own majorant m (Novak, Selle,
-Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson process of the density m. No cell of the grid
-and no optical depth is known here. Distances are equi-angular about lights at places and even under suns and skies,
-between the ends of the box. Integrands are bounded: over the angle at a place sigma_t T_1 T_2 p height, under a sun
-sigma_t T_1 T_2 p.
+**Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own
+majorant m (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson
+process of the density m. No cell of the grid and no optical depth is known here. Distances are
+equi-angular about lights at places and even under suns and skies, between the ends of the box.
+Integrands are bounded: over the angle at a place sigma_t T_1 T_2 p height, under a sun sigma_t T_1
+T_2 p.
 """
 
 from dataclasses import dataclass
@@ -27,7 +30,11 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings, unblocked
-from airlight.reference.monte_carlo.single_scatter.distance_sampling import Span, equi_angular, equi_angular_pdf
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
+    Span,
+    equi_angular,
+    equi_angular_pdf,
+)
 from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 
@@ -45,7 +52,9 @@ def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance
         ends = [(z - height) / rise for z in (medium.floor, medium.cap)]
         level, inside = rise == 0, (height >= medium.floor) & (height <= medium.cap)
         first = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
-        last = dr.select(level, dr.select(inside, _FARTHEST, 0), dr.clip(dr.maximum(*ends), 0, _FARTHEST))
+        last = dr.select(
+            level, dr.select(inside, _FARTHEST, 0), dr.clip(dr.maximum(*ends), 0, _FARTHEST)
+        )
         last = dr.minimum(last, mi.Float64(distance))
         return _FogPart(around, first, last, plugin, last > first, medium, up, height, rise)
     meets, near, far = plugin.intersect_aabb(mi.Ray3f(ray.origin, ray.direction))
@@ -64,7 +73,9 @@ class _FogPart(Part):
     rise: Any  # vertical component of the directions
 
     def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
-        """Sample free flights, for a light at a place half of the distances by the angle at it; see `Part`."""
+        """Sample free flights, for a light at a place half of the distances by the
+        angle at it; see `Part`.
+        """
         u = mi.Float64(u)
         before = self._depth_to(low)
         whole = 1 - dr.exp(before - self._depth_to(low + length))
@@ -77,7 +88,9 @@ class _FogPart(Part):
             return number + 1, dr.select(short, middle, below), dr.select(short, above, middle)
 
         state = (mi.UInt32(0), mi.Float64(low), mi.Float64(low + length))
-        found = dr.while_loop(state, lambda number, *_: number < _BISECTIONS, halve, label="inverse of the depth")
+        found = dr.while_loop(
+            state, lambda number, *_: number < _BISECTIONS, halve, label="inverse of the depth"
+        )
         y = 0.5 * (found[1] + found[2]) - low
         if span is not None:
             y = dr.select(u < 0.5, equi_angular(own, span), y)
@@ -90,7 +103,9 @@ class _FogPart(Part):
         """Return the transmittance of both ways; see `Part`."""
         z = dr.dot(mi.Vector3d(point.p), self.up)
         if path.end is None:
-            depth = self._depth(z, dr.dot(mi.Vector3d(path.begin), self.up), mi.Float64(path.length))
+            depth = self._depth(
+                z, dr.dot(mi.Vector3d(path.begin), self.up), mi.Float64(path.length)
+            )
         else:
             depth = self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
         left = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
@@ -109,12 +124,18 @@ class _FogPart(Part):
         middle = 0.5 * (z0 + z1)
         inside = (middle >= fog.floor) & (middle <= fog.cap)
         there = dr.select(inside, length * self._density(middle), 0)
-        return dr.select(level, there, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise)
+        return dr.select(
+            level, there, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise
+        )
 
     def _depth_beyond(self, z, rise):
-        """Return the optical depth from heights [m] out of the fog; `rise`: vertical, of unit directions."""
+        """Return the optical depth from heights [m] out of the fog; `rise`:
+        vertical, of unit directions.
+        """
         there = self._antiderivative(z)
-        above, below = (self._antiderivative(mi.Float64(end)) for end in (self.fog.cap, self.fog.floor))
+        above, below = (
+            self._antiderivative(mi.Float64(end)) for end in (self.fog.cap, self.fog.floor)
+        )
         return dr.select(rise > 0, above - there, there - below) / dr.maximum(dr.abs(rise), 1e-30)
 
     def _antiderivative(self, z):
@@ -124,7 +145,9 @@ class _FogPart(Part):
         for sigma_t, base, scale in self.fog.layers:
             over = z - base
             fallen = -scale * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
-            total += sigma_t * (dr.select(over < 0, over - scale, fallen) if self.fog.clamped else fallen)
+            total += sigma_t * (
+                dr.select(over < 0, over - scale, fallen) if self.fog.clamped else fallen
+            )
         return total
 
     def _density(self, z):
@@ -155,10 +178,14 @@ class _GridPart(Part):
         """Return estimates of the transmittance of both ways; see `Part`."""
         camera, sampler = self._tracked((ray.origin, ray.direction, mi.Float(x)), sampler, active)
         light, sampler = self._tracked(path.shadow_ray(), sampler, active)
-        return dr.select(unblocked(self.around, *path.shadow_ray(), active), mi.Spectrum(camera * light), 0), sampler
+        return dr.select(
+            unblocked(self.around, *path.shadow_ray(), active), mi.Spectrum(camera * light), 0
+        ), sampler
 
     def _tracked(self, line: tuple[Any, Any, Any], sampler, active) -> tuple[Any, Any]:
-        """Return estimates of the transmittance along lines: origin, direction, length [m]; and the sampler."""
+        """Return estimates of the transmittance along lines: origin, direction,
+        length [m]; and the sampler.
+        """
         origin, direction, distance = line
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
         begin, end = dr.maximum(near, 0), dr.minimum(far, distance)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimates of the light of a slab by sets of orders, with standard errors from batches of photons."""
+"""Estimates of the light of a slab by sets of orders, with standard errors
+from batches of photons.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,12 +23,14 @@ _MOST_COARSE = 64  #: batches there are at least, so that standard errors are kn
 
 @dataclass(frozen=True)
 class SlabEstimate:
-    """Light of a slab by photons: values and their standard errors, (2, ..), NaN where photons give none.
+    """Light of a slab by photons: values and their standard errors, (2, ..), NaN
+    where photons give none.
 
-    `exits`: light of each set that is reflected and transmitted, and its fluence at each depth: amount, mean and rms
-    displacement [mean free paths], (2, sets, 2 + depths, 3); `totals`: reflectance and transmittance of all orders, the
-    light that was never scattered among them, (2, 2); `flux`: diffuse flux up and down at each depth for a flux of pi
-    across the beam, (2, depths, 2).
+    `exits`: light of each set that is reflected and transmitted, and its fluence at each depth:
+    amount, mean and rms displacement [mean free paths], (2, sets, 2 + depths, 3); `totals`:
+    reflectance and transmittance of all orders, the light that was never scattered among them, (2,
+    2); `flux`: diffuse flux up and down at each depth for a flux of pi across the beam, (2, depths,
+    2).
     """
 
     exits: Array
@@ -45,10 +49,11 @@ def slab_estimate(
 ) -> SlabEstimate:
     """Estimate the light of a slab by a walk of photons.
 
-    `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for a set without end; order 0 is
-    the beam; `photons`: at least two; they are walked in batches of at most `BATCH`, at least 64 if there are as many
-    photons; `seed`: the same seed gives the same numbers, whatever the number of workers; `workers`: threads;
-    `progress`: called with (fraction done, what).
+    `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for a set
+    without end; order 0 is the beam; `photons`: at least two; they are walked in batches of at most
+    `BATCH`, at least 64 if there are as many photons; `seed`: the same seed gives the same numbers,
+    whatever the number of workers; `workers`: threads; `progress`: called with (fraction done,
+    what).
     """
     batches = max(math.ceil(photons / BATCH), min(photons, _MOST_COARSE))
     sizes = [photons // batches + (number < photons % batches) for number in range(batches)]
@@ -82,7 +87,10 @@ def _by_set(counts: Counts, ranges: Sequence[tuple[int, float]]) -> list[Array]:
     """Return the sums of the orders of each range, (.., ranges, 3)."""
 
     def summed(values: Array) -> Array:
-        parts = [values[..., first : int(last) + 1 if math.isfinite(last) else None].sum(-1) for first, last in ranges]
+        parts = [
+            values[..., first : int(last) + 1 if math.isfinite(last) else None].sum(-1)
+            for first, last in ranges
+        ]
         return np.stack(parts, axis=-2)
 
     parts = counts.reflected, counts.transmitted, counts.up, counts.down, counts.fluence
@@ -90,7 +98,9 @@ def _by_set(counts: Counts, ranges: Sequence[tuple[int, float]]) -> list[Array]:
 
 
 def _amounts(batches: Array, fraction: Array) -> Array:
-    """Return means over batches, (batches, ..), weighted with their fractions of the photons, and standard errors."""
+    """Return means over batches, (batches, ..), weighted with their fractions of the
+    photons, and standard errors.
+    """
     mean = np.tensordot(fraction, batches, axes=1)
     return np.stack([mean, _standard_error(batches - mean, fraction)])
 
@@ -98,11 +108,14 @@ def _amounts(batches: Array, fraction: Array) -> Array:
 def _standard_error(residuals: Array, fraction: Array) -> Array:
     count = len(residuals)
     square = np.tensordot(fraction**2, residuals**2, axes=1)
-    return np.asarray(np.sqrt(square * count / (count - 1)) if count > 1 else np.full_like(square, np.nan))
+    return np.asarray(
+        np.sqrt(square * count / (count - 1)) if count > 1 else np.full_like(square, np.nan)
+    )
 
 
 def _exit(batches: Array, fraction: Array) -> Array:
-    """Return amount, mean and rms of (batches, 3) moments, and their errors, (2, 3); ratios by the delta method.
+    """Return amount, mean and rms of (batches, 3) moments, and their errors, (2, 3);
+    ratios by the delta method.
 
     The errors of ratios need light in several batches: below `_FEWEST` there is none to tell.
     """

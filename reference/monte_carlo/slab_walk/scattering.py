@@ -21,11 +21,14 @@ class HenyeyGreenstein:
     g: float
 
     def cosines(self, uniform: Array) -> Array:
-        """Return cosines of the scattering angle from numbers in [0, 1): the inverse of the distribution."""
+        """Return cosines of the scattering angle from numbers in [0, 1): the
+        inverse of the distribution.
+        """
         if abs(self.g) < 1e-6:
             return 1 - 2 * uniform
         g = self.g
-        # 1 - c, which keeps its digits near forward: with s = (1 - g)/(1 - g + 2 g u), c = (1 + g^2 - (1-g^2)^2/..)/2g
+        # 1 - c, which keeps its digits near forward: with s = (1 - g)/(1 - g + 2 g u), c =
+        # (1 + g^2 - (1-g^2)^2/..)/2g
         root = (1 - g * g) / (1 - g + 2 * g * uniform)
         return np.clip((1 + g * g - root * root) / (2 * g), -1.0, 1.0)
 
@@ -33,8 +36,8 @@ class HenyeyGreenstein:
 class Tabulated:
     """A phase function linear in the angle between values.
 
-    The distribution of the angle is summed exactly over cells that are finer than the table; within a cell, the cosine
-    is uniform.
+    The distribution of the angle is summed exactly over cells that are finer than the table; within
+    a cell, the cosine is uniform.
 
     `angles`: (A,), increasing from 0 to pi [rad]; `heights`: (A,), not negative, in any unit.
     """
@@ -42,7 +45,9 @@ class Tabulated:
     def __init__(self, angles: Array, heights: Array):
         parts = max(1, _CELLS // (angles.size - 1))
         fraction = np.arange(parts) / parts
-        fine = np.append((angles[:-1, None] + np.diff(angles)[:, None] * fraction).reshape(-1), angles[-1])
+        fine = np.append(
+            (angles[:-1, None] + np.diff(angles)[:, None] * fraction).reshape(-1), angles[-1]
+        )
         height = np.interp(fine, angles, heights)
         self._cosines = np.cos(fine)
         # Cosines as 1 - 2 sin^2 keep the width of the cells near forward.
@@ -55,11 +60,13 @@ class Tabulated:
         return np.interp(uniform, self._sums, self._cosines)
 
 
-def turned(directions: tuple[Array, Array, Array], cosines: Array, azimuths: Array) -> tuple[Array, Array, Array]:
+def turned(
+    directions: tuple[Array, Array, Array], cosines: Array, azimuths: Array
+) -> tuple[Array, Array, Array]:
     """Return directions that make an angle with the given ones, at an azimuth around them.
 
-    The frame around a direction has no special case at the poles (Duff, Burgess, Christensen, Hery, Kensler, Liani and
-    Villemin 2017, "Building an orthonormal basis, revisited").
+    The frame around a direction has no special case at the poles (Duff, Burgess, Christensen, Hery,
+    Kensler, Liani and Villemin 2017, "Building an orthonormal basis, revisited").
     """
     x, y, z = directions
     sines = np.sqrt(np.maximum((1 - cosines) * (1 + cosines), 0.0))

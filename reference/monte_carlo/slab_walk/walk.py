@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Photons through a slab, one flight after the other, counted by order with their distance from the point of entry.
+"""Photons through a slab, one flight after the other, counted by order with their distance
+from the point of entry.
 
-A photon enters a slab of thickness tau at the origin, flies an exponentially distributed optical length, is scattered
-by the phase function, and so on until it leaves. All photons of a batch are scattered together, so that the number of
-the flight is the order. Absorption is a weight, albedo^n at order n, which loses no photon.
+A photon enters a slab of thickness tau at the origin, flies an exponentially distributed optical
+length, is scattered by the phase function, and so on until it leaves. All photons of a batch are
+scattered together, so that the number of the flight is the order. Absorption is a weight, albedo^n
+at order n, which loses no photon.
 
-Counted for each order: what leaves above and below, with the moments 1, x and x^2 + y^2 of the place of exit; and at
-each depth the passages upwards and downwards, and the fluence, which is the sum of 1/|mu| over passages. Every flight
-counts at every plane before it with its probability to reach it, exp(-distance), whether it does or not: that has the
-same mean as to count those that do, and less noise. The fluence's variance diverges with the logarithm of the smallest
-|mu|, hence slowly: its standard error can be a little small.
+Counted for each order: what leaves above and below, with the moments 1, x and x^2 + y^2 of the
+place of exit; and at each depth the passages upwards and downwards, and the fluence, which is the
+sum of 1/|mu| over passages. Every flight counts at every plane before it with its probability to
+reach it, exp(-distance), whether it does or not: that has the same mean as to count those that do,
+and less noise. The fluence's variance diverges with the logarithm of the smallest |mu|, hence
+slowly: its standard error can be a little small.
 
-The walk shares nothing with the deterministic computation that it checks (`realtime/clouds/slab_orders/`).
+The walk shares nothing with the deterministic computation that it checks
+(`realtime/clouds/slab_orders/`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,8 +45,9 @@ class Scattering(Protocol):
 class Slab:
     """A homogeneous slab in the light of the sun.
 
-    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the sun; its light travels downwards and
-    along +x; `albedo`: in [0, 1]; `scattering`: the phase function; `depths`: in [0, tau], where passages are counted.
+    `tau`: thickness [mean free paths]; `mu0`: cosine of the zenith angle of the sun; its light
+    travels downwards and along +x; `albedo`: in [0, 1]; `scattering`: the phase function; `depths`:
+    in [0, tau], where passages are counted.
     """
 
     tau: float
@@ -54,10 +59,11 @@ class Slab:
 
 @dataclass(frozen=True)
 class Counts:
-    """Sums over the photons of a batch, by order: moments 1, x, x^2 + y^2, each weighted, over the number of photons.
+    """Sums over the photons of a batch, by order: moments 1, x, x^2 + y^2, each weighted,
+    over the number of photons.
 
-    `reflected`, `transmitted`: (3, orders), from order 0 on; `up`, `down`, `fluence`: (depths, 3, orders): passages
-    through each depth, and passages over |mu|.
+    `reflected`, `transmitted`: (3, orders), from order 0 on; `up`, `down`, `fluence`: (depths, 3,
+    orders): passages through each depth, and passages over |mu|.
     """
 
     reflected: Array
@@ -89,11 +95,14 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     return Counts(counts[0], counts[1], depths[:, 0], depths[:, 1], depths[:, 2])
 
 
-def flights(slab: Slab, photons: int, random: np.random.Generator) -> Iterator[tuple[float, Vectors, Vectors]]:
-    """Yield the flights of a batch of photons, order by order, until all have left, for tallies to count.
+def flights(
+    slab: Slab, photons: int, random: np.random.Generator
+) -> Iterator[tuple[float, Vectors, Vectors]]:
+    """Yield the flights of a batch of photons, order by order, until all have
+    left, for tallies to count.
 
-    Yields the fraction left by absorption; x, y and the depth z of the photons; and the components of their directions,
-    the third downwards, (photons,) each.
+    Yields the fraction left by absorption; x, y and the depth z of the photons; and the components
+    of their directions, the third downwards, (photons,) each.
     """
     place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
@@ -108,7 +117,9 @@ def flights(slab: Slab, photons: int, random: np.random.Generator) -> Iterator[t
 def _next_scattering(
     slab: Slab, place: Vectors, direction: Vectors, random: np.random.Generator
 ) -> tuple[Vectors, Vectors]:
-    """Return the photons that scatter in the slab once more: where they do, and where they go from there."""
+    """Return the photons that scatter in the slab once more: where they do, and
+    where they go from there.
+    """
     (x, y, z), (u, v, w) = place, direction
     flight = random.standard_exponential(x.size)
     end = z + w * flight
@@ -120,9 +131,16 @@ def _next_scattering(
 
 
 def _passages(
-    x: Array, y: Array, z: Array, direction: tuple[Array, Array, Array], which: NDArray[np.bool_], depth: float
+    x: Array,
+    y: Array,
+    z: Array,
+    direction: tuple[Array, Array, Array],
+    which: NDArray[np.bool_],
+    depth: float,
 ) -> tuple[Array, Array]:
-    """Return the expected moments of passages of some photons through a depth before them, and the same over |mu|."""
+    """Return the expected moments of passages of some photons through a depth before
+    them, and the same over |mu|.
+    """
     u, v, w = (part[which] for part in direction)
     length = (depth - z[which]) / w
     at_x, at_y = x[which] + u * length, y[which] + v * length

@@ -3,15 +3,16 @@
 
     python -m tests.evidence.certified.area_lights
 
-writes them to `validation/certified`. A point of a light sends I cos_l into the direction of the angle theta at the
-point, with cos_l = axial sin(theta) + across cos(theta): `axial` and `across` are the components of its normal along
-the ray and towards the foot of the ray. Over the part of the ray where that is positive
+writes them to `validation/certified`. A point of a light sends I cos_l into the direction of the
+angle theta at the point, with cos_l = axial sin(theta) + across cos(theta): `axial` and `across`
+are the components of its normal along the ray and towards the foot of the ray. Over the part of the
+ray where that is positive
 
     J = int exp(-sigma_t (x + r)) p(c) cos_l / r^2 dx      [1/m]
 
-is taken by tanh-sinh over x, and over w = asinh((x - foot)/h) by Gauss and Legendre with more digits; both must agree
-to 15 digits. A sphere of radiance 1 gives K of `tests.evidence.closed_forms`: over directions within its cone, and over
-distances to its surface.
+is taken by tanh-sinh over x, and over w = asinh((x - foot)/h) by Gauss and Legendre with more
+digits; both must agree to 15 digits. A sphere of radiance 1 gives K of
+`tests.evidence.closed_forms`: over directions within its cone, and over distances to its surface.
 """
 
 import json
@@ -25,7 +26,8 @@ from airlight.validation.certified.files import FOLDER
 SCHEMA = "airlight-certified-area/1"
 _DIGITS = 15
 
-#: sigma_t, foot, height, x0, x1, axial, across, g (None: isotropic); arbitrary numbers, exact in binary.
+#: sigma_t, foot, height, x0, x1, axial, across, g (None: isotropic); arbitrary
+#: numbers, exact in binary.
 POINTS: tuple[tuple[float | None, ...], ...] = (
     (0.21875, 1.5, 0.8125, 0.0, 4.25, 0.28125, -0.75, None),
     (0.21875, 1.5, 0.8125, 0.0, 4.25, 0.28125, 0.75, None),
@@ -46,19 +48,27 @@ SPHERES: tuple[tuple[float, ...], ...] = (
 def certified_rows() -> dict[str, Any]:
     """Return all rows, values with 15 digits as text."""
     names: tuple[str, ...] = ("sigma_t", "foot", "height", "x0", "x1", "axial", "across", "g")
-    points = [dict(zip(names, row, strict=True)) | {"J": _text(point_integral(*row))} for row in POINTS]
+    points = [
+        dict(zip(names, row, strict=True)) | {"J": _text(point_integral(*row))} for row in POINTS
+    ]
     names = ("sigma_t", "height", "radius", "foot", "x0", "x1")
-    spheres = [dict(zip(names, row, strict=True)) | {"K": _text(sphere_integral(*row))} for row in SPHERES]
+    spheres = [
+        dict(zip(names, row, strict=True)) | {"K": _text(sphere_integral(*row))} for row in SPHERES
+    ]
     return {"schema": SCHEMA, "points": points, "spheres": spheres}
 
 
 def point_integral(
     sigma_t: Any, foot: Any, height: Any, x0: Any, x1: Any, axial: Any, across: Any, g: Any = None
 ) -> Any:
-    """Return J [1/m] of one point of a light as an mpmath number; arguments as in `POINTS`, lengths in metres."""
+    """Return J [1/m] of one point of a light as an mpmath number; arguments as in
+    `POINTS`, lengths in metres.
+    """
 
     def by_distance() -> Any:
-        sigma, f, h, low, high, a, b = (mpf(v) for v in (sigma_t, foot, height, x0, x1, axial, across))
+        sigma, f, h, low, high, a, b = (
+            mpf(v) for v in (sigma_t, foot, height, x0, x1, axial, across)
+        )
         low, high = _lit(low, high, f, h, a, b)
 
         def integrand(x: Any) -> Any:
@@ -69,13 +79,17 @@ def point_integral(
         return mp.quad(integrand, _marks(low, high, f, h))
 
     def by_logarithm() -> Any:
-        sigma, f, h, low, high, a, b = (mpf(v) for v in (sigma_t, foot, height, x0, x1, axial, across))
+        sigma, f, h, low, high, a, b = (
+            mpf(v) for v in (sigma_t, foot, height, x0, x1, axial, across)
+        )
         low, high = (mp.asinh((x - f) / h) for x in _lit(low, high, f, h, a, b))
 
         def integrand(w: Any) -> Any:
             sine = mp.tanh(w)
             cosine = a * sine + b / mp.cosh(w)
-            return mp.exp(-sigma * (f + h * mp.exp(w))) * _phase(-sine, g) * cosine / (h * mp.cosh(w))
+            return (
+                mp.exp(-sigma * (f + h * mp.exp(w))) * _phase(-sine, g) * cosine / (h * mp.cosh(w))
+            )
 
         count = max(1, int(mp.ceil(high - low)) * 2)
         return mp.quad(integrand, mp.linspace(low, high, count + 1), method="gauss-legendre")
@@ -83,11 +97,17 @@ def point_integral(
     return _agreed(by_distance, by_logarithm)
 
 
-def sphere_integral(sigma_t: float, height: float, radius: float, foot: float, x0: float, x1: float) -> Any:
-    """Return K [m] of a sphere of radiance 1 beside a ray as an mpmath number; lengths in metres."""
+def sphere_integral(
+    sigma_t: float, height: float, radius: float, foot: float, x0: float, x1: float
+) -> Any:
+    """Return K [m] of a sphere of radiance 1 beside a ray as an mpmath
+    number; lengths in metres.
+    """
 
     def whole(inner: Callable[[Any, Any, Any], Any]) -> Any:
-        sigma, h, radius_, f, low, high = (mpf(repr(v)) for v in (sigma_t, height, radius, foot, x0, x1))
+        sigma, h, radius_, f, low, high = (
+            mpf(repr(v)) for v in (sigma_t, height, radius, foot, x0, x1)
+        )
 
         def integrand(w: Any) -> Any:
             x = f + (h - radius_) * mp.sinh(w)
@@ -104,7 +124,14 @@ def sphere_integral(sigma_t: float, height: float, radius: float, foot: float, x
         def integrand(t: Any) -> Any:
             psi = alpha * mp.sin(t)
             root = mp.sqrt(mp.fabs(radius_**2 - (d * mp.sin(psi)) ** 2))
-            return 2 * mp.pi * mp.sin(psi) * mp.exp(-sigma * (d * mp.cos(psi) - root)) * alpha * mp.cos(t)
+            return (
+                2
+                * mp.pi
+                * mp.sin(psi)
+                * mp.exp(-sigma * (d * mp.cos(psi) - root))
+                * alpha
+                * mp.cos(t)
+            )
 
         return mp.quad(integrand, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
 
@@ -115,13 +142,19 @@ def sphere_integral(sigma_t: float, height: float, radius: float, foot: float, x
             return (square / r**2 - 1) * mp.exp(-sigma * r)
 
         low, high = d - radius_, mp.sqrt(square)
-        return mp.pi / d * mp.quad(integrand, [low, mp.sqrt(low * high), high], method="gauss-legendre")
+        return (
+            mp.pi
+            / d
+            * mp.quad(integrand, [low, mp.sqrt(low * high), high], method="gauss-legendre")
+        )
 
     return _agreed(lambda: whole(over_directions), lambda: whole(over_distances))
 
 
 def _lit(low: Any, high: Any, foot: Any, height: Any, axial: Any, across: Any) -> tuple[Any, Any]:
-    """Return the part of a range of distances in which the cosine axial s + across height is positive."""
+    """Return the part of a range of distances in which the cosine axial s +
+    across height is positive.
+    """
     if axial == 0:
         return low, high if across > 0 else low
     zero = foot - across * height / axial
@@ -147,7 +180,8 @@ def _agreed(first: Callable[[], Any], second: Callable[[], Any]) -> Any:
         fine = second()
         if mp.fabs(coarse - fine) > mpf(10) ** -_DIGITS * mp.fabs(fine):
             raise ArithmeticError(
-                f"two routes give {mp.nstr(coarse, 20)} and {mp.nstr(fine, 20)}; expected {_DIGITS} equal digits"
+                f"two routes give {mp.nstr(coarse, 20)} and {mp.nstr(fine, 20)}; expected "
+                f"{_DIGITS} equal digits"
             )
         return fine
 
@@ -157,4 +191,6 @@ def _text(value: Any) -> str:
 
 
 if __name__ == "__main__":
-    (FOLDER / "certified_area_lights.json").write_text(json.dumps(certified_rows(), indent=1) + "\n")
+    (FOLDER / "certified_area_lights.json").write_text(
+        json.dumps(certified_rows(), indent=1) + "\n"
+    )

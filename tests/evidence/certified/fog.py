@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The certified fog scenes: airlight of 12 x 64 camera rays to 12 digits, with bounds and lit intervals, as JSON.
+"""The certified fog scenes: airlight of 12 x 64 camera rays to 12 digits, with bounds
+and lit intervals, as JSON.
 
     python -m tests.evidence.certified.fog      # writes validation/certified/certified_fog.json, in about ten minutes
 
@@ -7,17 +8,19 @@ The radiance of a ray is the sum over lights and lit intervals
 
     L = albedo sigma_t / (4 pi)  sum I J(x0, x1),
 
-with the intervals in closed form (`tests.evidence.certified.intervals`, 40 digits) and each J by two quadratures at two
-precisions that must agree to 15 digits (`integral.py`). All terms are positive, so the sum keeps those digits;
-what is left of the error is the rounding to the 12 digits that are written, and that is the bound.
+with the intervals in closed form (`tests.evidence.certified.intervals`, 40 digits) and each J by
+two quadratures at two precisions that must agree to 15 digits (`integral.py`). All terms are
+positive, so the sum keeps those digits; what is left of the error is the rounding to the 12 digits
+that are written, and that is the bound.
 
-In the outer part of a spot the intensity falls off with the angle beta from its axis. In the plane of ray and light the
-point at angle theta has cos(scattering angle) = -sin(theta) and lies in the direction sin(theta) d + cos(theta) n,
-hence
+In the outer part of a spot the intensity falls off with the angle beta from its axis. In the plane
+of ray and light the point at angle theta has cos(scattering angle) = -sin(theta) and lies in the
+direction sin(theta) d + cos(theta) n, hence
 
     c = cos(scattering angle),      cos(beta) = -c (axis . d) + sqrt(1 - c^2) (axis . n):
 
-the fall-off is a function of c, as the phase function is, and their product takes its place (`SpotPhase`).
+the fall-off is a function of c, as the phase function is, and their product takes
+its place (`SpotPhase`).
 """
 
 import json
@@ -69,11 +72,19 @@ _CONVENTIONS = {
     "rayleigh 3 (1 + c^2)/4; hg (1 - g^2)/(1 + g^2 - 2 g c)^1.5",
     "intensity": "radiant intensity [W/sr], of a spot that on its axis; from `beam` to `cutoff` [degrees off the axis] "
     "it falls linearly in the angle to 0",
-    "medium": "homogeneous, without bounds; sigma_t is the extinction [1/m], the scattering coefficient albedo sigma_t",
+    "medium": (
+        "homogeneous, without bounds; sigma_t is the extinction [1/m], the scattering coefficient "
+        "albedo sigma_t"
+    ),
     "occluders": "black; sphere: centre, radius; box: centre + a u + b v + c w with -1 <= a, b, c <= 1; screen: the "
     "same with u and v alone; half_edges holds u, v, w",
-    "matrix": "in a Mitsuba dictionary {'matrix': rows} stands for a transform, applied to column vectors",
-    "numbers": "inputs are JSON numbers, exact in float32 (directions: in float64); results are decimal words",
+    "matrix": (
+        "in a Mitsuba dictionary {'matrix': rows} stands for a transform, applied to column vectors"
+    ),
+    "numbers": (
+        "inputs are JSON numbers, exact in float32 (directions: in float64); results are decimal "
+        "words"
+    ),
 }
 
 
@@ -84,7 +95,8 @@ class CertifiedPixel:
     distance: str  #: to the first occluder [m]
     radiance: tuple[str, ...]  #: RGB [W/(m^2 sr)]
     bound: tuple[str, ...]  #: of the absolute errors
-    lit: tuple[tuple[tuple[str, str], ...], ...]  #: for each light: where lit intervals begin and end [m]
+    #: for each light: where lit intervals begin and end [m]
+    lit: tuple[tuple[tuple[str, str], ...], ...]
 
 
 @dataclass(frozen=True)
@@ -107,9 +119,9 @@ class SpotPhase(PhaseFunction):
 def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
     """Return the unit directions through the pixel centres, row by row, as float64 numbers.
 
-    With z the forward axis and a half width of tan(fov/2), the camera's own direction of pixel (row, column) is
-    ((7/2 - column) w, (7/2 - row) w, 1), w = 2 tan(fov/2)/8: its x axis points left. The rounded numbers count as
-    exact.
+    With z the forward axis and a half width of tan(fov/2), the camera's own direction of pixel
+    (row, column) is ((7/2 - column) w, (7/2 - row) w, 1), w = 2 tan(fov/2)/8: its x axis points
+    left. The rounded numbers count as exact.
     """
     with mp.workdps(_GEOMETRY):
         width = 2 * mp.tan(mp.radians(mpf(scene.fov)) / 2) / SIZE
@@ -120,7 +132,10 @@ def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
             half = mpf(SIZE - 1) / 2
             own = ((half - column) * width, (half - row) * width, mpf(1))
             unit_directions.append(
-                tuple(float(value) for value in unit((dot(rows[0], own), dot(rows[1], own), dot(rows[2], own))))
+                tuple(
+                    float(value)
+                    for value in unit((dot(rows[0], own), dot(rows[1], own), dot(rows[2], own)))
+                )
             )
     return tuple(unit_directions)
 
@@ -128,8 +143,8 @@ def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
 def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel:
     """Certify the airlight along one ray from the scene's camera.
 
-    Valid for cameras and lights outside of all occluders, and rays that do not meet a light. Takes about a third of a
-    second for each light and colour of the extinction.
+    Valid for cameras and lights outside of all occluders, and rays that do not meet a light. Takes
+    about a third of a second for each light and colour of the extinction.
     """
     with mp.workdps(_GEOMETRY):
         origin, d = vector([row[3] for row in scene.camera[:3]]), unit(vector(direction))
@@ -139,16 +154,26 @@ def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel
             parts = lit_parts(origin, d, end=end, light=light, occluders=scene.occluders)
             lit.append(_joined(parts))
             for channel, integral in enumerate(_integrals(scene, light, (origin, d), parts)):
-                factor = mp.mpf(scene.albedo[channel]) * scene.sigma_t[channel] * light.intensity[channel] / (4 * mp.pi)
+                factor = (
+                    mp.mpf(scene.albedo[channel])
+                    * scene.sigma_t[channel]
+                    * light.intensity[channel]
+                    / (4 * mp.pi)
+                )
                 total[channel] += factor * integral
         words = [_rounded(value) for value in total]
         intervals = tuple(
-            tuple((_word(low), _word(high)) for low, high in intervals_of_light) for intervals_of_light in lit
+            tuple((_word(low), _word(high)) for low, high in intervals_of_light)
+            for intervals_of_light in lit
         )
-        return CertifiedPixel(_word(end), tuple(w for w, _ in words), tuple(b for _, b in words), intervals)
+        return CertifiedPixel(
+            _word(end), tuple(w for w, _ in words), tuple(b for _, b in words), intervals
+        )
 
 
-def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], parts: list) -> list[Number]:
+def _integrals(
+    scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], parts: list
+) -> list[Number]:
     """Return the sum of J over the lit parts of a ray for each colour [1/m]."""
     origin, d = ray
     towards = minus(vector(light.position), origin)
@@ -159,14 +184,18 @@ def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], par
     if light.beam < light.cutoff:
         (axis, _), *_ = spot_cones(light)
         normal = cross(across, d)  # from the light to the foot point: (t x d) x d = (t . d) d - t
-        faint = SpotPhase(plain, dot(axis, d), dot(axis, normal) / height, (light.beam, light.cutoff))
+        faint = SpotPhase(
+            plain, dot(axis, d), dot(axis, normal) / height, (light.beam, light.cutoff)
+        )
     integrals: list[Number] = []
     for channel, sigma_t in enumerate(scene.sigma_t):
         if channel and sigma_t == scene.sigma_t[0]:
             integrals.append(integrals[0])
             continue
         terms = [
-            integrate_certified(foot, height, low, high, sigma_t, faint if dim else plain, digits=_INTEGRAL)
+            integrate_certified(
+                foot, height, low, high, sigma_t, faint if dim else plain, digits=_INTEGRAL
+            )
             for low, high, dim in parts
         ]
         integrals.append(mp.fsum(terms))
@@ -188,7 +217,9 @@ def _word(value: Number) -> str:
 
 
 def _rounded(value: Number) -> tuple[str, str]:
-    """Return a radiance in 12 digits and the bound of its error: half a unit of the last digit, and 1e-14 of it."""
+    """Return a radiance in 12 digits and the bound of its error: half a unit of the
+    last digit, and 1e-14 of it.
+    """
     if value == 0:
         return "0", "0"
     exponent = int(mp.floor(mp.log10(value)))
@@ -241,7 +272,10 @@ def to_json(data: dict[str, Any]) -> str:
     for scene in data["scenes"]:
         lines = [f"  {json.dumps(name)}: {_lines(name, value)}" for name, value in scene.items()]
         scenes.append(" {\n" + ",\n".join(lines) + "\n }")
-    head = "".join(f"{json.dumps(name)}: {json.dumps(data[name], indent=1)},\n" for name in ("schema", "conventions"))
+    head = "".join(
+        f"{json.dumps(name)}: {json.dumps(data[name], indent=1)},\n"
+        for name in ("schema", "conventions")
+    )
     return "{" + head + '"scenes": [\n' + ",\n".join(scenes) + "\n]}\n"
 
 

@@ -1,31 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Exact lit intervals of camera rays among spheres, boxes and screens, in mpmath.
 
-A point X(x) = origin + x d of a ray is lit where the open segment from the light L to X meets no occluder and, for a
-spot, X lies in the cone. As x grows this can only change at the distances below, all in closed form. Write
-u(x) = X - L = a + x d with a = origin - L; the ray ends where it enters the first occluder.
+A point X(x) = origin + x d of a ray is lit where the open segment from the light L to X meets no
+occluder and, for a spot, X lies in the cone. As x grows this can only change at the distances
+below, all in closed form. Write u(x) = X - L = a + x d with a = origin - L; the ray ends where it
+enters the first occluder.
 
-**Sphere** of centre C and radius R. With v = C - L and T^2 = |v|^2 - R^2, the squared length of the tangents from L,
-the tangents make the angle acos(T/|v|) with v: u lies on their cone where u . v = |u| T, hence on the roots of
+**Sphere** of centre C and radius R. With v = C - L and T^2 = |v|^2 - R^2, the squared length of the
+tangents from L, the tangents make the angle acos(T/|v|) with v: u lies on their cone where u . v =
+|u| T, hence on the roots of
 
     (u . v)^2 = T^2 |u|^2.                                                                                      (cone)
 
-On a line through L inside the cone, L is in front of the sphere; a ray changes from in front of the sphere to behind it
-either across the cone or through the sphere, and then it has ended.
+On a line through L inside the cone, L is in front of the sphere; a ray changes from in front of the
+sphere to behind it either across the cone or through the sphere, and then it has ended.
 
-**Cone** of a spot: the same equation with v the axis, of unit length, and T the cosine of the half angle.
+**Cone** of a spot: the same equation with v the axis, of unit length, and T the
+cosine of the half angle.
 
-**Box and screen.** The shadow of a convex body is bounded by itself and by the planes through L and its silhouette
-edges. The ray crosses the plane through L and an edge from A to B where det(u, A - L, B - L) = 0, which is linear:
+**Box and screen.** The shadow of a convex body is bounded by itself and by the planes through L and
+its silhouette edges. The ray crosses the plane through L and an edge from A to B where det(u, A -
+L, B - L) = 0, which is linear:
 
     x = -det(a, A - L, B - L) / det(d, A - L, B - L).                                                           (edge)
 
-All edges are taken; those that are no silhouettes only add distances at which nothing changes. The same holds for the
-other half of a cone and for the other side of a plane.
+All edges are taken; those that are no silhouettes only add distances at which nothing changes. The
+same holds for the other half of a cone and for the other side of a plane.
 
-Between two neighbours of all these distances a ray is lit or dark as a whole. The definition itself, evaluated in the
-middle for the segment against every occluder, tells which. Nothing here is shared with
-`reference.visibility.shadows`, which projects triangles on the plane of ray and light, nor with the casting of rays.
+Between two neighbours of all these distances a ray is lit or dark as a whole. The definition
+itself, evaluated in the middle for the segment against every occluder, tells which. Nothing here is
+shared with `reference.visibility.shadows`, which projects triangles on the plane of ray and light,
+nor with the casting of rays.
 """
 
 from collections.abc import Sequence
@@ -44,7 +49,9 @@ _SAME = 1e-25  # distances closer than this count as equal [m]: they come with 4
 
 
 def vector(values: Sequence[float]) -> Vector:
-    """Return `values`, (3,) in any unit such as [m], as a vector of mpmath numbers; floats count as exact."""
+    """Return `values`, (3,) in any unit such as [m], as a vector of mpmath
+    numbers; floats count as exact.
+    """
     x, y, z = (mpf(value) for value in values)
     return x, y, z
 
@@ -76,18 +83,25 @@ def unit(v: Vector) -> Vector:
 
 
 def ray_end(origin: Vector, direction: Vector, occluders: Sequence[Occluder]) -> Number:
-    """Return the distance at which a ray enters the first occluder [m], infinite if it meets none."""
+    """Return the distance at which a ray enters the first occluder [m],
+    infinite if it meets none.
+    """
     crossed = [_crossed(shape, origin, direction, mp.inf) for shape in occluders]
     return min((part[0] for part in crossed if part is not None), default=mp.inf)
 
 
 def lit_parts(
-    origin: Vector, direction: Vector, *, end: Number, light: FogLight, occluders: Sequence[Occluder]
+    origin: Vector,
+    direction: Vector,
+    *,
+    end: Number,
+    light: FogLight,
+    occluders: Sequence[Occluder],
 ) -> list[tuple[Number, Number, bool]]:
     """Return the lit parts of a ray.
 
-    Valid for cameras and lights outside of all occluders, and cut-off angles below 90 degrees. The result has nearly
-    the working precision, half of it where a ray all but touches a cone.
+    Valid for cameras and lights outside of all occluders, and cut-off angles below 90 degrees. The
+    result has nearly the working precision, half of it where a ray all but touches a cone.
     """
     place = vector(light.position)
     start = minus(origin, place)
@@ -96,13 +110,19 @@ def lit_parts(
     for axis, cosine in cones:
         cuts += _cone_crossings(start, direction, axis, cosine * cosine)
     marks = [mp.zero]
-    marks += [x for before, x in pairwise([mp.zero, *sorted(cuts)]) if max(before, 0) + _SAME < x < end - _SAME]
+    marks += [
+        x
+        for before, x in pairwise([mp.zero, *sorted(cuts)])
+        if max(before, 0) + _SAME < x < end - _SAME
+    ]
     parts: list[tuple[Number, Number, bool]] = []
     for low, high in pairwise([*marks, end]):
         middle = (low + high) / 2 if mp.isfinite(high) else 2 * low + 1
         u = along(start, middle, direction)
         inside = [dot(u, axis) > cosine * mp.sqrt(dot(u, u)) for axis, cosine in cones]
-        if (inside and not inside[0]) or any(_crossed(shape, place, u, mp.one) for shape in occluders):
+        if (inside and not inside[0]) or any(
+            _crossed(shape, place, u, mp.one) for shape in occluders
+        ):
             continue
         faint = len(inside) == 2 and not inside[1]
         if parts and parts[-1][1] == low and parts[-1][2] == faint:
@@ -112,7 +132,9 @@ def lit_parts(
 
 
 def spot_cones(light: FogLight) -> list[tuple[Vector, Number]]:
-    """Return axis and cosine of the half angle of a spot's cut-off and, if it is narrower, of its beam."""
+    """Return axis and cosine of the half angle of a spot's cut-off and, if it
+    is narrower, of its beam.
+    """
     if light.matrix is None:
         return []
     axis = unit(vector([row[2] for row in light.matrix[:3]]))
@@ -120,10 +142,13 @@ def spot_cones(light: FogLight) -> list[tuple[Vector, Number]]:
     return [(axis, mp.cos(mp.radians(mpf(angle)))) for angle in angles]
 
 
-def _crossed(shape: Occluder, start: Vector, step: Vector, longest: Number) -> tuple[Number, Number] | None:
+def _crossed(
+    shape: Occluder, start: Vector, step: Vector, longest: Number
+) -> tuple[Number, Number] | None:
     """Return the fractions of `step` between which the line is in a shape.
 
-    None unless it enters between 0 and `longest`: both ends of the segment are outside of the shape.
+    None unless it enters between 0 and `longest`: both ends of the segment
+    are outside of the shape.
     """
     if isinstance(shape, FogSphere):
         towards = minus(start, vector(shape.centre))
@@ -157,11 +182,19 @@ def _coordinates(edges: Sequence[Vector], point: Vector) -> list[Number]:
     """Return a, b, c with point = a u + b v + c w, by Cramer's rule."""
     u, v, w = edges
     volume = dot(u, cross(v, w))
-    return [dot(point, cross(v, w)) / volume, dot(point, cross(w, u)) / volume, dot(point, cross(u, v)) / volume]
+    return [
+        dot(point, cross(v, w)) / volume,
+        dot(point, cross(w, u)) / volume,
+        dot(point, cross(u, v)) / volume,
+    ]
 
 
-def _shadow_crossings(shape: Occluder, place: Vector, start: Vector, direction: Vector) -> list[Number]:
-    """Return where a ray crosses the cone or the planes that bound a shadow; `start` is its origin from the light."""
+def _shadow_crossings(
+    shape: Occluder, place: Vector, start: Vector, direction: Vector
+) -> list[Number]:
+    """Return where a ray crosses the cone or the planes that bound a shadow; `start` is
+    its origin from the light.
+    """
     if isinstance(shape, FogSphere):
         v = minus(vector(shape.centre), place)
         return _cone_crossings(start, direction, v, dot(v, v) - mpf(shape.radius) ** 2)

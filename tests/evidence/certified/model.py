@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parts of a certified fog scene, how Mitsuba reads it, and the twelve scenes of the file.
 
-Every number is exact in float32, so that renderers in single precision render the very scene that was certified:
-coordinates are multiples of 1/1024 m, which makes the corners of boxes exact as well. Rotations cannot be exact; the
-matrices of cameras and spots are those of the file, and count as given. Occluders are black, hence all light in an
-image is airlight.
+Every number is exact in float32, so that renderers in single precision render the very scene that
+was certified: coordinates are multiples of 1/1024 m, which makes the corners of boxes exact as
+well. Rotations cannot be exact; the matrices of cameras and spots are those of the file, and count
+as given. Occluders are black, hence all light in an image is airlight.
 """
 
 import json
@@ -57,7 +57,8 @@ class FogLight:
     intensity: Point  #: on the axis, RGB [W/sr]
     matrix: Matrix | None = None  #: of a spot, light to world; its third column is the axis
     cutoff: float = 180.0  #: of a spot: half angle of the cone [degrees]
-    beam: float = 180.0  #: of a spot: half angle of full intensity [degrees]; linear in the angle up to the cut-off
+    #: of a spot: half angle of full intensity [degrees]; linear in the angle up to the cut-off
+    beam: float = 180.0
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,9 @@ def _scene(given: dict[str, Any]) -> FogScene:
             cone = {"matrix": matrix, "cutoff": light["cutoff"], "beam": light["beam"]}
         lights.append(FogLight(_tuples(light["position"]), _tuples(light["intensity"]), **cone))
     kinds = {"sphere": FogSphere, "box": FogBox, "screen": FogScreen}
-    shapes = [{name: _tuples(value) for name, value in shape.items()} for shape in given["occluders"]]
+    shapes = [
+        {name: _tuples(value) for name, value in shape.items()} for shape in given["occluders"]
+    ]
     return FogScene(
         given["name"],
         given["words"],
@@ -111,9 +114,11 @@ def _tuples(value: Any) -> Any:
 
 
 def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
-    """Return a scene for `mi.load_dict` as plain JSON; each ``{"matrix": rows}`` stands for a transform.
+    """Return a scene for `mi.load_dict` as plain JSON; each ``{"matrix":
+    rows}`` stands for a transform.
 
-    Mitsuba takes colours above 1 for lights alone, so the extinction comes as a colour and a power of 4 that scales it.
+    Mitsuba takes colours above 1 for lights alone, so the extinction comes as a colour and a
+    power of 4 that scales it.
     """
     scale = 1.0
     while max(scene.sigma_t) > scale:
@@ -140,11 +145,15 @@ def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
         },
     }
     entries |= {f"light{number}": _light_dict(light) for number, light in enumerate(scene.lights)}
-    return entries | {f"occluder{number}": _shape_dict(shape) for number, shape in enumerate(scene.occluders)}
+    return entries | {
+        f"occluder{number}": _shape_dict(shape) for number, shape in enumerate(scene.occluders)
+    }
 
 
 def load_fog(scene: dict[str, Any]) -> Any:
-    """Return the `mi.Scene` of a dictionary of `mitsuba_dict`, its matrices made transforms; entries may be changed."""
+    """Return the `mi.Scene` of a dictionary of `mitsuba_dict`, its matrices made
+    transforms; entries may be changed.
+    """
 
     def converted(value: Any) -> Any:
         if not isinstance(value, dict):
@@ -166,7 +175,12 @@ def _light_dict(light: FogLight) -> dict[str, Any]:
 
 def _shape_dict(shape: FogSphere | FogBox | FogScreen) -> dict[str, Any]:
     if isinstance(shape, FogSphere):
-        return {"type": "sphere", "center": list(shape.centre), "radius": shape.radius, "bsdf": _BLACK}
+        return {
+            "type": "sphere",
+            "center": list(shape.centre),
+            "radius": shape.radius,
+            "bsdf": _BLACK,
+        }
     columns = [*shape.half_edges, shape.centre]
     if isinstance(shape, FogScreen):
         normal = unit(np.cross(*shape.half_edges).tolist())

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Make the certified CSV files again: `python -m tests.evidence.certified.write NAME ...`, all of them without a name.
+"""Make the certified CSV files again: `python -m tests.evidence.certified.write NAME ...`,
+all of them without a name.
 
-The inputs of a row stay as they are; its certified cells are computed from them, and the file is written whole. Lines
-that change are printed. All files take some hours: most of the time goes to droplets with sizes, for which a processor
-may round the sums of Mie's series differently, in the 16th digit.
+The inputs of a row stay as they are; its certified cells are computed from them, and the file is
+written whole. Lines that change are printed. All files take some hours: most of the time goes to
+droplets with sizes, for which a processor may round the sums of Mie's series differently, in the
+16th digit.
 """
 
 import csv
@@ -25,12 +27,19 @@ _RAY = ("t", "h", "x0", "x1", "sigma_t")
 def _droplets(row: Row) -> dict[str, str]:
     """Two quadratures that agree to 18 digits."""
     ray = (float(row[name]) for name in _RAY)
-    return {"value": str(mp.nstr(integrate_certified(*ray, phase_from_words(row["phase"]), digits=18), 18))}
+    return {
+        "value": str(
+            mp.nstr(integrate_certified(*ray, phase_from_words(row["phase"]), digits=18), 18)
+        )
+    }
 
 
 def _slopes(row: Row) -> dict[str, str]:
     """The integral and its central differences, to 17 digits."""
-    ray, phase = [float(row[name]) for name in _RAY], phase_from_words(row["phase"], g=float(row["g"]))
+    ray, phase = (
+        [float(row[name]) for name in _RAY],
+        phase_from_words(row["phase"], g=float(row["g"])),
+    )
     numbers = [integrate_certified(*ray, phase, digits=17), *certified_slopes(*ray, phase)]
     names = ["value", *(f"d{name}" for name in SLOPES)]
     return {name: str(mp.nstr(number, 17)) for name, number in zip(names, numbers, strict=True)}
@@ -38,7 +47,10 @@ def _slopes(row: Row) -> dict[str, str]:
 
 #: The function that computes the certified cells of a row, by file.
 MAKERS: dict[str, Callable[[Row], dict[str, str]]] = {
-    **{name: lambda row: {"value": airlight_integral.value(row)} for name in airlight_integral.FILES},
+    **{
+        name: lambda row: {"value": airlight_integral.value(row)}
+        for name in airlight_integral.FILES
+    },
     "airlight_integral_droplets.csv": _droplets,
     "airlight_slopes.csv": _slopes,
     "height_fog_rays.csv": lambda row: {"value": height_fog.value(row)},
@@ -53,7 +65,9 @@ def write(path: Path, make: Callable[[Row], dict[str, str]]) -> list[int]:
         writer = csv.DictWriter(file, header, lineterminator="\n")
         writer.writeheader()
         writer.writerows(made)
-    return [line for line, (old, new) in enumerate(zip(rows, made, strict=True), start=2) if old != new]
+    return [
+        line for line, (old, new) in enumerate(zip(rows, made, strict=True), start=2) if old != new
+    ]
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of the oracle of light volumes: the height field of a shadow map in float64, and rays over a face.
+"""Parts of the oracle of light volumes: the height field of a shadow map in
+float64, and rays over a face.
 
 See `tests.evidence.oracles.light_volume` for the derivation.
 """
@@ -22,9 +23,12 @@ class HeightField:
     """The height field of a light's shadow map."""
 
     size: int  #: texels on a side
-    heights: Array  #: 1 / planar depth at the corners of the texels, (faces, size + 1, size + 1) by v, u [1/m]
-    coordinates: Array  #: matrices that give a, b, c of a vector a across + b up + c axis, (faces, 3, 3)
-    walls: Array | None = None  #: on the bottom, top, left and right of a texel, (faces, size, size, 4), NaN for none
+    #: 1 / planar depth at the corners of the texels, (faces, size + 1, size + 1) by v, u [1/m]
+    heights: Array
+    #: matrices that give a, b, c of a vector a across + b up + c axis, (faces, 3, 3)
+    coordinates: Array
+    #: on the bottom, top, left and right of a texel, (faces, size, size, 4), NaN for none
+    walls: Array | None = None
 
     @property
     def is_cube(self) -> bool:
@@ -35,13 +39,15 @@ class HeightField:
 def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None) -> HeightField:
     """Return the height field of a shadow map.
 
-    With k = axis + u across + v up the first surface is at k / s = k distance / |k| from the light, so s = |k| /
-    distance, and 0 where the distance is infinite.
+    With k = axis + u across + v up the first surface is at k / s = k distance / |k| from the light,
+    so s = |k| / distance, and 0 where the distance is infinite.
     """
     size = shadow_map.size
     distance = np.array(shadow_map.distance, dtype=np.float64)
     if not np.all(distance > 0):
-        raise InputError(f"shadow map: got a distance of {np.min(distance):g}, expected distances above 0 [m]")
+        raise InputError(
+            f"shadow map: got a distance of {np.min(distance):g}, expected distances above 0 [m]"
+        )
     frames = _frames(shadow_map)
     at = np.linspace(-1.0, 1.0, size + 1)
     v, u = np.meshgrid(at, at, indexing="ij")
@@ -50,8 +56,12 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
     coordinates = np.asarray(np.linalg.inv(np.swapaxes(frames, 1, 2)), dtype=np.float64)
     if walls is None:
         return HeightField(size, heights, coordinates)
-    number = walls.reshape(len(frames), size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32) & 0xFF
-    return HeightField(size, heights, coordinates, np.where(number > 0, (number - 0.5) / PLACES, np.nan))
+    number = (
+        walls.reshape(len(frames), size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32) & 0xFF
+    )
+    return HeightField(
+        size, heights, coordinates, np.where(number > 0, (number - 0.5) / PLACES, np.nan)
+    )
 
 
 def _frames(shadow_map: ShadowMap) -> Array:
@@ -75,7 +85,9 @@ class Path:
     height: Array  #: (rays,) [m]
 
 
-def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array) -> tuple[Index, Array]:
+def by_ray(
+    first: Index, first_angle: Array, second: Index, second_angle: Array
+) -> tuple[Index, Array]:
     """Join two lists of angles of rays and sort them by ray and angle."""
     ray, angle = np.concatenate([first, second]), np.concatenate([first_angle, second_angle])
     order = np.lexsort((angle, ray))
@@ -83,5 +95,7 @@ def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array)
 
 
 def zero_angle(cosine: Array, sine: Array) -> Array:
-    """Return where `cosine` cos(theta) + `sine` sin(theta) = 0, from -pi/2 to pi/2 [rad], in the shape of both."""
+    """Return where `cosine` cos(theta) + `sine` sin(theta) = 0, from -pi/2 to pi/2
+    [rad], in the shape of both.
+    """
     return np.arctan2(np.where(sine < 0, cosine, -cosine), np.abs(sine))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light maps of clouds, and the collector search on shapes and with transports whose fixed points are known."""
+"""Light maps of clouds, and the collector search on shapes and with transports
+whose fixed points are known.
+"""
 
 import drjit as dr
 import mitsuba as mi
@@ -40,7 +42,9 @@ def _vectors(points):
 
 @pytest.mark.claim("collector-slopes", tolerance="1e-4 of the cosine, against 0.05 by unit normals")
 def test_normals_of_levels_are_those_of_mean_slopes(variant):
-    """Through a saw tooth whose steep sides hide, the mean plane is level: unit normals lean to the light."""
+    """Through a saw tooth whose steep sides hide, the mean plane is level: unit
+    normals lean to the light.
+    """
     scene = read(clear_scene(lamp=sun((0.0, 0.0, -1.0)), cube=cube()), "single")
     basis = filtered_map([_saw()], scene.lights[0]).projection.basis
     width = 2 * float(np.linalg.norm(np.array(basis[0]))) / SIZE
@@ -50,7 +54,9 @@ def test_normals_of_levels_are_those_of_mean_slopes(variant):
 
 
 def _saw(width=1.0):
-    """Return a surface that rises by a texel's width a texel, eight texels long, and falls back in a step."""
+    """Return a surface that rises by a texel's width a texel, eight texels long,
+    and falls back in a step.
+    """
     count = SIZE * SIZE
     column = np.arange(count) % SIZE
     return LitSurfaces(
@@ -68,7 +74,9 @@ def test_levels_are_means_over_the_cloud_alone(variant):
     in_rows = np.argsort(np.array(surfaces.place))
     parts = (np.array(value)[in_rows] for value in (surfaces.there, surfaces.front, surfaces.back))
     there, front, back = (part.reshape(SIZE, SIZE) for part in parts)
-    normal = np.array(slope_normals(surfaces, light_map.projection)).T[in_rows].reshape(SIZE, SIZE, 3)
+    normal = (
+        np.array(slope_normals(surfaces, light_map.projection)).T[in_rows].reshape(SIZE, SIZE, 3)
+    )
     level, checked = 3, 0
     side = 2**level
     basis = [np.array(vector, dtype=float).ravel() for vector in light_map.projection.basis]
@@ -84,7 +92,9 @@ def test_levels_are_means_over_the_cloud_alone(variant):
         np.testing.assert_allclose(surface.cover[0], there[square].mean(), rtol=1e-4)
         mean = normal[square][there[square]].mean(axis=0)
         np.testing.assert_allclose(np.array(surface.normal).ravel(), unit(mean), atol=1e-4)
-        np.testing.assert_allclose(surface.thickness[0], (front - back)[square][there[square]].mean(), rtol=1e-3)
+        np.testing.assert_allclose(
+            surface.thickness[0], (front - back)[square][there[square]].mean(), rtol=1e-3
+        )
         rows, columns = np.nonzero(there[square])
         place = np.stack([columns + column * side, rows + row * side], axis=1).mean(axis=0)
         expected = (2 * place + 1) / SIZE - 1
@@ -105,12 +115,14 @@ def test_beside_the_cloud_is_what_is_nearest_of_it(variant, width):
     surface = filtered_surface(light_map, _vectors(points), dr.opaque(mi.Float, width))
     for value in (surface.cover, surface.middle, surface.thickness, surface.normal):
         assert np.isfinite(np.array(value)).all()
-    assert (np.linalg.norm(np.array(surface.middle).T - MIDDLE, axis=1) < 0.51 * np.linalg.norm(SIDES)).all()
+    assert (
+        np.linalg.norm(np.array(surface.middle).T - MIDDLE, axis=1) < 0.51 * np.linalg.norm(SIDES)
+    ).all()
     assert (np.array(surface.normal).T @ unit(ALONG) < 0).all()
     assert (np.array(surface.thickness) > 0).all()
 
 
-# Collectors ----------------------------------------------------------------------------------------------------------
+# Collectors ---------------------------------------------------------------------------------------
 
 
 SLAB_TURN = np.asarray(rotation((0.2, 1.0, 0.4), 21.0))
@@ -143,34 +155,40 @@ def _search(light_map, transport, points, towards, *, behind=100.0, **options):
 
 
 def _recording(slabs):
-    """Return a transport whose collector stands at (0.7, -0.2) from the foot, and which notes what it is asked."""
+    """Return a transport whose collector stands at (0.7, -0.2) from the foot, and
+    which notes what it is asked.
+    """
 
     def transport(number, t, d, mu, cos_phi, sin_phi, mu_l):
         slabs.append([t, d, mu, cos_phi, sin_phi, mu_l])
-        return d + 2 * t + 3 * mu + 5 * cos_phi * (1 - mu * mu) + 7 * sin_phi * (1 - mu * mu) + 11 * mu_l, *map(
-            mi.Float, (0.7, -0.2, 0.9)
-        )
+        return d + 2 * t + 3 * mu + 5 * cos_phi * (1 - mu * mu) + 7 * sin_phi * (
+            1 - mu * mu
+        ) + 11 * mu_l, *map(mi.Float, (0.7, -0.2, 0.9))
 
     return transport
 
 
 @pytest.mark.parametrize("lit_from_below", [False, True])
 def test_a_slab_is_found_as_it_is(variant, lit_from_below):
-    """Thickness, depth, both angles and the collector, in the frame of a slab that lies askew in the world."""
+    """Thickness, depth, both angles and the collector, in the frame of a slab that
+    lies askew in the world.
+    """
     normal = SLAB_TURN[:, 2] * (-1 if lit_from_below else 1)
     horizontal = unit(SLAB_TURN @ (0.6, 0.8, 0.0))
     cosine = 0.61
     axis = horizontal * np.sqrt(1 - cosine**2) - normal * cosine
     light_map = _map(axis)
     rng = np.random.default_rng(11)
-    depths = rng.uniform(0.01, SLAB[2] - 0.01, 300)  # where the skin of a slab, 0.01 mean free paths, changes none
+    # where the skin of a slab, 0.01 mean free paths, changes none
+    depths = rng.uniform(0.01, SLAB[2] - 0.01, 300)
     plane = rng.uniform(-1.5, 1.5, (300, 2)) @ SLAB_TURN[:, :2].T
     points = SLAB_AT + plane + np.outer(0.5 * SLAB[2] - depths, normal)
     towards = rng.normal(size=(300, 3))
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     beside = np.cross(normal, horizontal)
     mu, x, y = towards @ normal, towards @ horizontal, towards @ beside
-    behind = EXTINCTION * np.where(mu < 0, depths, SLAB[2] - depths) / np.abs(mu)  # the ray is in cloud as in the slab
+    # the ray is in cloud as in the slab
+    behind = EXTINCTION * np.where(mu < 0, depths, SLAB[2] - depths) / np.abs(mu)
     light = _search(light_map, _recording([]), points, towards, behind=behind, iterations=12)
     sine = np.sqrt(1 - mu**2)
     expected = EXTINCTION * (depths + 2 * SLAB[2]) + 3 * mu + (5 * x + 7 * y) * sine + 11 * cosine
@@ -193,10 +211,16 @@ def test_as_printed_lengths_are_those_along_the_light(variant):
     point = SLAB_AT + 0.1 * normal
     below = EXTINCTION * (0.5 * SLAB[2] + 0.1)
     printed, corrected = (
-        float(_search(light_map, transport, point, normal, behind=behind, along_light=choice).radiance[0])
+        float(
+            _search(
+                light_map, transport, point, normal, behind=behind, along_light=choice
+            ).radiance[0]
+        )
         for choice, behind in ((True, below / cosine), (False, below))
     )
-    np.testing.assert_allclose(corrected, EXTINCTION * (SLAB[2] + 10 * (0.5 * SLAB[2] - 0.1)), rtol=2e-3)
+    np.testing.assert_allclose(
+        corrected, EXTINCTION * (SLAB[2] + 10 * (0.5 * SLAB[2] - 0.1)), rtol=2e-3
+    )
     np.testing.assert_allclose(printed / corrected, 3.8637, rtol=2e-3)
 
 
@@ -204,20 +228,30 @@ WEDGE_HEIGHT, WEDGE_SLOPE = 0.7, 0.05
 
 
 def _wedge(axis):
-    """Return the map of a cloud with a level face at z = 0 and a floor at -0.7 - 0.05 x: its thickness tells x."""
+    """Return the map of a cloud with a level face at z = 0 and a floor at -0.7 - 0.05
+    x: its thickness tells x.
+    """
     vertices, faces = box((12.0, 9.0, 1.0))
     vertices = np.array(vertices, dtype=float)
     below = vertices[:, 2] < 0
     vertices[:, 2] = np.where(below, -WEDGE_HEIGHT - WEDGE_SLOPE * vertices[:, 0], 0.0)
-    entry = medium_boundary("wedge", (vertices + np.array([0.0, 9.4, 0.0]), faces), {"type": "homogeneous"})
+    entry = medium_boundary(
+        "wedge", (vertices + np.array([0.0, 9.4, 0.0]), faces), {"type": "homogeneous"}
+    )
     scene = read(clear_scene(lamp=sun(axis), cube=entry))
     return light_map([mi.load_dict({"type": "scene", "cloud": entry})], scene.lights[0], 256)
 
 
 @pytest.mark.claim("collector-search", tolerance="a tenth of sigma")
-@pytest.mark.parametrize(("slope", "iterations"), [(0.6, 25), (0.0, 8), (-0.7, 12), (-1.0, 12), (-2.5, 15), (-6.0, 25)])
-def test_the_search_ends_at_the_fixed_point_whatever_the_slope_of_the_map(variant, slope, iterations):
-    """A map whose slope is -1 goes to and fro between two places for ever, one of -2.5 runs away: half steps end it."""
+@pytest.mark.parametrize(
+    ("slope", "iterations"), [(0.6, 25), (0.0, 8), (-0.7, 12), (-1.0, 12), (-2.5, 15), (-6.0, 25)]
+)
+def test_the_search_ends_at_the_fixed_point_whatever_the_slope_of_the_map(
+    variant, slope, iterations
+):
+    """A map whose slope is -1 goes to and fro between two places for ever, one of -2.5 runs
+    away: half steps end it.
+    """
     sine, fixed, slope = 0.3, 0.9, dr.opaque(mi.Float, slope)
     axis = np.array([sine, 0.0, -np.sqrt(1 - sine**2)])
     light_map = _wedge(axis)
@@ -230,5 +264,7 @@ def test_the_search_ends_at_the_fixed_point_whatever_the_slope_of_the_map(varian
         return t, (wanted - float(point[0])) * EXTINCTION, 0 * t, 0 * t + 0.3 * EXTINCTION
 
     light = _search(light_map, transport, point, [0.0, 0.0, 1.0], iterations=iterations)
-    np.testing.assert_allclose(np.array(light.collector.centre).ravel(), [fixed, 9.2, 0.0], atol=0.03)
+    np.testing.assert_allclose(
+        np.array(light.collector.centre).ravel(), [fixed, 9.2, 0.0], atol=0.03
+    )
     assert float(light.missed[0]) < 0.15

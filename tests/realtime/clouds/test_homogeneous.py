@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: crossings, depths, order 1 and opacity of homogeneous clouds of any shape are those of all their triangles."""
+"""Claim: crossings, depths, order 1 and opacity of homogeneous clouds of any shape are
+those of all their triangles.
+"""
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.clouds.march import cloud_surfaces, depths_along, next_crossing, segment_through
+from airlight.realtime.clouds.march import (
+    cloud_surfaces,
+    depths_along,
+    next_crossing,
+    segment_through,
+)
 from airlight.realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_of
 from airlight.realtime.methods.published.bouthors2008 import printed_opacity, printed_step
 from airlight.realtime.numerics.array_types import aligned_array
@@ -16,7 +23,7 @@ from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, r
 
 pytestmark = pytest.mark.usefixtures("variant")
 
-# Crossings and depths ------------------------------------------------------------------------------------------------
+# Crossings and depths -----------------------------------------------------------------------------
 
 
 GREY = 0.0363
@@ -25,14 +32,19 @@ GREY = 0.0363
 def random_rays(count, seed=3, spread=200.0):
     random = np.random.default_rng(seed)
     direction = random.normal(size=(count, 3))
-    return random.uniform(-spread, spread, (count, 3)), direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    return random.uniform(-spread, spread, (count, 3)), direction / np.linalg.norm(
+        direction, axis=1, keepdims=True
+    )
 
 
 def depths_of(scene, origin, direction, end, precision="single"):
     read = read_scene(scene, precision)
     Float = type(read.camera.origin.x)
     Vector = type(read.camera.origin)
-    arrays = (Vector(*(aligned_array(Float, column) for column in values.T)) for values in (origin, direction))
+    arrays = (
+        Vector(*(aligned_array(Float, column) for column in values.T))
+        for values in (origin, direction)
+    )
     rays = cloud_surfaces(read), read.medium.clouds, *arrays, dr.opaque(Float, end)
     depths = depths_along(*rays, stride=None, seen=False)
     return [np.array(depth, dtype=np.float64) for depth in depths]
@@ -41,7 +53,9 @@ def depths_of(scene, origin, direction, end, precision="single"):
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("end", [np.inf, 170.0])
 def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
-    """Rays start inside and outside and cross the ring up to four times; float32 rounds 400 m to 2e-5 m."""
+    """Rays start inside and outside and cross the ring up to four times;
+    float32 rounds 400 m to 2e-5 m.
+    """
     origin, direction = random_rays(400)
     (depth,) = depths_of(loaded(), origin, direction, end, precision)
     expected = [GREY * length_inside(ring(), *ray, end) for ray in zip(origin, direction)]
@@ -50,11 +64,16 @@ def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
 
 
 def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
-    """Segments start where camera rays enter and leave: inwards the whole chord counts, outwards nothing."""
+    """Segments start where camera rays enter and leave: inwards the whole chord
+    counts, outwards nothing.
+    """
     read = read_scene(loaded())
     surfaces = cloud_surfaces(read)
     origin, direction = random_rays(2000, seed=11)
-    o, d = (mi.Vector3f(*(aligned_array(mi.Float, column) for column in values.T)) for values in (origin, direction))
+    o, d = (
+        mi.Vector3f(*(aligned_array(mi.Float, column) for column in values.T))
+        for values in (origin, direction)
+    )
     first = next_crossing(surfaces, o, d, mi.Float(0))
     met = np.array(dr.isfinite(first.distance) & ~first.leaves)
     place = o + d * first.distance
@@ -71,7 +90,7 @@ def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
         assert np.array(depth)[met][:200] == pytest.approx(np.array(expected), abs=GREY * 2e-3)
 
 
-# Order 1 and opacity, by sums over small steps -----------------------------------------------------------------------
+# Order 1 and opacity, by sums over small steps ----------------------------------------------------
 
 
 COLOURED = {
@@ -95,7 +114,9 @@ def rays(count=60):
 
 
 def segments(points):
-    """Return lengths in the ring from points towards the sun [m]: where it leaves less where it enters."""
+    """Return lengths in the ring from points towards the sun [m]: where it
+    leaves less where it enters.
+    """
     vertices, faces = ring()
     a, b, c = np.moveaxis(vertices.astype(np.float32).astype(np.float64)[faces], 1, 0)
     first, second = b - a, c - a
@@ -132,7 +153,9 @@ def device(array):
 def marched(scene, origin, direction, *, steps, scales=(1.0,), integral=None):
     read = read_scene(scene)
     surfaces, clouds = cloud_surfaces(read), read.medium.clouds
-    path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf), stride=None)
+    path = cloud_rays(
+        surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf), stride=None
+    )
     segment = segment_through(surfaces, clouds, read.lights[0], stride=None)
     ones = tuple((mi.Float(1),) for _ in scales)
     beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, segment, None)
@@ -151,24 +174,34 @@ def few():
 
 @pytest.mark.claim("cloud-single-scattering", tolerance="0.5 % relative RMSE")
 def test_order_one_with_64_steps(few):
-    """From outside and inside, through two lobes one behind the other; the sum over 200 steps errs by less."""
+    """From outside and inside, through two lobes one behind the other; the sum
+    over 200 steps errs by less.
+    """
     origin, direction, expected = few
-    (radiance,) = marched(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)), origin, direction, steps=64)
+    (radiance,) = marched(
+        loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)), origin, direction, steps=64
+    )
     assert np.sqrt(np.mean((radiance - expected) ** 2)) < 0.005 * expected.mean()
 
 
-WALLS, GAP = ([-20.0, -13.0, -9.0], [30.0, 16.0, 14.0]), 0.002  # of a box of droplets, and another beside it [m]
+# of a box of droplets, and another beside it [m]
+WALLS, GAP = ([-20.0, -13.0, -9.0], [30.0, 16.0, 14.0]), 0.002
 
 
 @pytest.mark.claim("cloud-single-scattering", tolerance="rounding of the places, 1e-4")
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (-0.6, 0.8, 0.0), (0.28, -0.96, 0.0)])
 def test_light_along_a_wall_is_that_within_the_cloud(direction):
-    """Rays enter and leave by walls that a sun at the zenith shines along: on either side is another segment.
+    """Rays enter and leave by walls that a sun at the zenith shines along: on either
+    side is another segment.
 
     On a level ray the segment is the same everywhere, so that one step is exact.
     """
     low, high = np.array(WALLS)
-    size, middle, aside = high - low, (low + high) / 2, np.array([GAP + WALLS[1][0] - WALLS[0][0], 0, 0])
+    size, middle, aside = (
+        high - low,
+        (low + high) / 2,
+        np.array([GAP + WALLS[1][0] - WALLS[0][0], 0, 0]),
+    )
     boxes = {
         name: cloud(name, placed(box(size), middle + place), COLOURED)
         for name, place in (("cloud", 0 * aside), ("beside", aside))
@@ -181,7 +214,9 @@ def test_light_along_a_wall_is_that_within_the_cloud(direction):
     level = along[:2] != 0
     length = np.zeros(len(start))
     for place in (0 * aside, aside):
-        ends = (np.array([low, high])[:, None] + place - start)[..., :2][..., level] / along[:2][level]
+        ends = (np.array([low, high])[:, None] + place - start)[..., :2][..., level] / along[:2][
+            level
+        ]
         length += np.maximum(ends.max(axis=0).min(axis=1) - ends.min(axis=0).max(axis=1), 0)
     depth = SIGMA * length[:, None]
     expected = ALBEDO * -np.expm1(-depth) * np.exp(-SIGMA * (high[2] - 2.3)) / (4 * np.pi)
@@ -190,7 +225,9 @@ def test_light_along_a_wall_is_that_within_the_cloud(direction):
 
 
 def opacity(surfaces, clouds, *rays):
-    return opacity_of(depths_along(surfaces, clouds, *rays, stride=None, seen=False), type(clouds.albedo))
+    return opacity_of(
+        depths_along(surfaces, clouds, *rays, stride=None, seen=False), type(clouds.albedo)
+    )
 
 
 @pytest.mark.claim("cloud-opacity", tolerance="0.1 %")
@@ -198,7 +235,9 @@ def test_opacity_is_one_less_the_transmittance():
     origin, direction = rays(300)
     read = read_scene(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)))
     surfaces = cloud_surfaces(read)
-    found = opacity(surfaces, read.medium.clouds, device(origin), device(direction), mi.Float(470.0))
+    found = opacity(
+        surfaces, read.medium.clouds, device(origin), device(direction), mi.Float(470.0)
+    )
     length = np.array([length_inside(ring(), *ray, 470.0) for ray in zip(origin, direction)])
     fraction = np.array(found).T
     assert fraction == pytest.approx(1 - np.exp(-SIGMA * length[:, None]), rel=1e-3, abs=1e-5)
@@ -206,7 +245,9 @@ def test_opacity_is_one_less_the_transmittance():
 
 @pytest.mark.claim("cloud-printed-equations")
 def test_equations_as_printed_have_the_wrong_sign(few):
-    """On the slab of one step both differ from what is right by the factor -(1 + dl/dx), and by -1/kappa."""
+    """On the slab of one step both differ from what is right by the factor -(1 +
+    dl/dx), and by -1/kappa.
+    """
     origin, direction, _ = few
     scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
     (printed,) = marched(scene, origin, direction, steps=16, integral=printed_step)
@@ -215,7 +256,9 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     read = read_scene(scene)
     path = device(origin), device(direction), mi.Float(dr.inf)
     surfaces = cloud_surfaces(read)
-    length = np.array(printed_opacity(cloud_rays(surfaces, read.medium.clouds, *path, stride=None), 1)).T
+    length = np.array(
+        printed_opacity(cloud_rays(surfaces, read.medium.clouds, *path, stride=None), 1)
+    ).T
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
     fraction = np.array(opacity(surfaces, read.medium.clouds, *path)).T
     assert length[one_stretch] == pytest.approx(-fraction[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: depths and light of clouds with densities are right, and those of a homogeneous cloud where the grid is even.
+"""Claim: depths and light of clouds with densities are right, and those of a homogeneous
+cloud where the grid is even.
 
 A transport by a formula stands for the tables of `cloud-collectors`.
 """
@@ -19,7 +20,16 @@ from airlight.realtime.numerics.array_types import aligned_array
 from airlight.realtime.scene.camera import ray_directions
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.meshes import box, placed
-from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
+from tests.helpers.clouds import (
+    SUN,
+    TURN,
+    cloud,
+    cloud_scene,
+    crossings,
+    dense,
+    linear_between,
+    ring,
+)
 from tests.helpers.frames import render
 from tests.helpers.transport_formula import slabs_as_they_are
 
@@ -48,7 +58,9 @@ def transport(monkeypatch):
 def waves(voxels):
     """Return a smooth density on a grid of about so many voxels along each axis."""
     counts = (voxels, voxels + 3, voxels - 2)
-    along = [low + (high - low) * (np.arange(n) + 0.5) / n for low, high, n in zip(LOW, HIGH, counts)]
+    along = [
+        low + (high - low) * (np.arange(n) + 0.5) / n for low, high, n in zip(LOW, HIGH, counts)
+    ]
     z, y, x = np.meshgrid(along[2], along[1], along[0], indexing="ij")
     product = np.cos(WAVES[0] * x + 0.3) * np.cos(WAVES[1] * y - 0.9) * np.cos(WAVES[2] * z + 0.2)
     return np.clip(0.8 * product + 0.45, 0, 1)
@@ -56,14 +68,21 @@ def waves(voxels):
 
 def uneven(values=None, **parts):
     values = waves(13) if values is None else values
-    return mi.load_dict(cloud_scene(sun=SUN, ring=cloud("ring", ring(), dense(values, LOW, HIGH)), **parts))
+    return mi.load_dict(
+        cloud_scene(sun=SUN, ring=cloud("ring", ring(), dense(values, LOW, HIGH)), **parts)
+    )
 
 
 def even_and_homogeneous(**parts):
-    """Return scenes of a box, in which light maps that know both ends of a cloud alone know all of it."""
+    """Return scenes of a box, in which light maps that know both ends of a
+    cloud alone know all of it.
+    """
     mesh = placed(box((111.0, 97.0, 83.0)), (3.7, -2.1, 1.9), TURN)
     even = cloud("box", mesh, dense(np.ones((2, 3, 4)), LOW, HIGH))
-    return [mi.load_dict(cloud_scene(sun=SUN, box=shape, **parts)) for shape in (even, cloud("box", mesh))]
+    return [
+        mi.load_dict(cloud_scene(sun=SUN, box=shape, **parts))
+        for shape in (even, cloud("box", mesh))
+    ]
 
 
 def rendered(scene, name, precision="single", **parameters):
@@ -86,14 +105,18 @@ def exact_depths(values, read, direction, sigma_t=0.0363):
         for end, leaving in zip(distance, leaves):
             if leaving:
                 places = before + (end - before) * (np.arange(4000) + 0.5) / 4000
-                rho = linear_between(values, LOW, HIGH, origin + places[:, None] * way) / values.max()
+                rho = (
+                    linear_between(values, LOW, HIGH, origin + places[:, None] * way) / values.max()
+                )
                 depth += sigma_t * rho.mean() * (end - before)
             before = end
         depths.append(depth)
     return np.array(depths)
 
 
-@pytest.mark.claim("hypertexture-depths", tolerance="2 % of the mean with a step a voxel; falls with its square")
+@pytest.mark.claim(
+    "hypertexture-depths", tolerance="2 % of the mean with a step a voxel; falls with its square"
+)
 def test_depths_are_the_sums_of_the_grid_and_converge():
     values = waves(13)
     read, direction = rays_of(uneven(values))
@@ -114,17 +137,26 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
     assert errors[1] < 0.02
     assert errors[3] < 0.3 * errors[1]
     (seen,) = depths_along(
-        surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=dr.opaque(mi.Float, 0.25), seen=True
+        surfaces,
+        clouds,
+        read.camera.origin,
+        direction,
+        mi.Float(dr.inf),
+        stride=dr.opaque(mi.Float, 0.25),
+        seen=True,
     )
     np.testing.assert_allclose(np.exp(-np.array(seen)), np.exp(-expected), atol=2e-3)
 
 
-@pytest.mark.claim("hypertexture-even", tolerance="1e-5 of opacity, 1 % of light: the map of depths has 256 texels")
+@pytest.mark.claim(
+    "hypertexture-even", tolerance="1e-5 of opacity, 1 % of light: the map of depths has 256 texels"
+)
 @pytest.mark.parametrize("name", ["cloud-octaves", "cloud-collectors"])
 @pytest.mark.parametrize("precision", ["single", pytest.param("double", marks=pytest.mark.slow)])
 def test_an_even_grid_is_a_homogeneous_cloud(name, precision, monkeypatch):
     even, homogeneous = even_and_homogeneous(sky=SKY)
-    # A uniform sky needs a slab, which no grid has: it is a beam there. Collectors in grids count whole.
+    # A uniform sky needs a slab, which no grid has: it is a beam there.
+    # Collectors in grids count whole.
     monkeypatch.setattr(method, "Search", lambda *args, covered: Search(*args, covered=False))
     grid, plain = (rendered(scene, name, precision, sky="beams") for scene in (even, homogeneous))
     np.testing.assert_allclose(grid.extra["opacity"], plain.extra["opacity"], atol=1e-5)
@@ -137,7 +169,9 @@ def test_an_even_grid_is_a_homogeneous_cloud(name, precision, monkeypatch):
 
 
 @pytest.mark.claim("hypertexture-converges", tolerance="none: errors that shrink at least by half")
-@pytest.mark.parametrize("name", ["cloud-octaves", pytest.param("cloud-collectors", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["cloud-octaves", pytest.param("cloud-collectors", marks=pytest.mark.slow)]
+)
 def test_finer_grids_of_a_smooth_field_converge(name, monkeypatch):
     slabs_as_they_are(monkeypatch)
     images = [np.array(rendered(uneven(waves(n)), name).airlight) for n in (12, 24, 48, 96)]
@@ -148,20 +182,26 @@ def test_finer_grids_of_a_smooth_field_converge(name, monkeypatch):
 
 
 @pytest.mark.claim(
-    "hypertexture-segments", tolerance="0.05 of depth in the mean, of segments of 2.5: 256 texels, 64 layers"
+    "hypertexture-segments",
+    tolerance="0.05 of depth in the mean, of segments of 2.5: 256 texels, 64 layers",
 )
 def test_the_map_of_a_sun_holds_the_depths_of_segments():
     """In and between the limbs of the ring, where the map must know the gap."""
     read = read_scene(uneven())
     surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
     random = np.random.default_rng(3)
-    points = mi.Vector3f(*(aligned_array(mi.Float, column) for column in random.uniform(LOW, HIGH, (4000, 3)).T))
+    points = mi.Vector3f(
+        *(aligned_array(mi.Float, column) for column in random.uniform(LOW, HIGH, (4000, 3)).T)
+    )
     stride = dr.opaque(mi.Float, 0.25)
     (expected,) = (
-        np.array(segment) for segment in segment_through(surfaces, clouds, light, stride=stride)(points, True)
+        np.array(segment)
+        for segment in segment_through(surfaces, clouds, light, stride=stride)(points, True)
     )
     found = (
-        0.0363 * waves(13).max() * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))
+        0.0363
+        * waves(13).max()
+        * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))
     )
     assert expected.max() > 2
     deep = expected > 0.1
@@ -173,7 +213,9 @@ def test_maps_of_further_clouds_compile_nothing():
     """The number of a cloud is data, and no part of the code of a kernel."""
     shapes = {
         f"cloud-{x:g}": cloud(
-            f"cloud-{x:g}", placed(box((40.0, 50.0, 30.0)), (x, 0.0, 0.0), TURN), dense(waves(5), LOW, HIGH)
+            f"cloud-{x:g}",
+            placed(box((40.0, 50.0, 30.0)), (x, 0.0, 0.0), TURN),
+            dense(waves(5), LOW, HIGH),
         )
         for x in (-80.0, 0.0, 80.0)
     }
@@ -191,10 +233,18 @@ def test_the_surface_is_where_the_density_passes_the_threshold():
     read, direction = rays_of(uneven(values), "double")
     surfaces, clouds = cloud_surfaces(read), read.medium.clouds
     met = dense_surface(
-        surfaces, clouds, read.camera.origin, direction, mi.Float64(dr.inf), threshold=0.5, stride=mi.Float64(0.1)
+        surfaces,
+        clouds,
+        read.camera.origin,
+        direction,
+        mi.Float64(dr.inf),
+        threshold=0.5,
+        stride=mi.Float64(0.1),
     )
     there = np.isfinite(np.array(met.distance))
-    points = np.array(read.camera.origin + direction * dr.select(dr.isfinite(met.distance), met.distance, 0)).T
+    points = np.array(
+        read.camera.origin + direction * dr.select(dr.isfinite(met.distance), met.distance, 0)
+    ).T
     rho = linear_between(values / values.max(), LOW, HIGH, points)
     # Where the hull cuts a denser place it is the surface.
     assert (np.abs(rho[there] - 0.5) < 5e-3).sum() > 5

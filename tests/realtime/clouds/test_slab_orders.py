@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: radiance by sets of orders is that of photons and sums to DISORT's, and fractions of a uniform sky add up."""
+"""Claim: radiance by sets of orders is that of photons and sums to DISORT's, and fractions
+of a uniform sky add up.
+"""
 
 import math
 import warnings
@@ -22,12 +24,13 @@ from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
 from airlight.reference.monte_carlo.slab_walk.walk import Slab, flights
 from airlight.validation.slab.moments import FLUENCE, UP, SlabOrders, order_sets
 
-# Photons by directions -----------------------------------------------------------------------------------------------
+# Photons by directions ----------------------------------------------------------------------------
 
 
 Array = NDArray[np.float64]
 
-_BATCH, _FEWEST = 25_000, 64  #: photons of a batch at most; batches at least, so that errors are known to 9 %
+#: photons of a batch at most; batches at least, so that errors are known to 9 %
+_BATCH, _FEWEST = 25_000, 64
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,8 @@ def direction_estimate(
     sets
         First and last order of each set.
     mu_edges, phi_edges
-        Increasing edges of bins: mu, positive upwards, and the azimuth from 0, along the sun's light, to pi.
+        Increasing edges of bins: mu, positive upwards, and the azimuth from 0,
+        along the sun's light, to pi.
     photons
         How many at least, in equal batches.
     seed
@@ -98,9 +102,14 @@ def direction_estimate(
         return np.asarray(np.sqrt((residuals**2).sum(0) / (batches * (batches - 1))))
 
     ratios = [mean[field] / safe for field in (1, 2, 3)]
-    errors = [error((values[:, field] - ratio * values[:, 0]) / safe) for field, ratio in zip((1, 2, 3), ratios)]
+    errors = [
+        error((values[:, field] - ratio * values[:, 0]) / safe)
+        for field, ratio in zip((1, 2, 3), ratios)
+    ]
     (x, y, square), (x_error, y_error, square_error) = ratios, errors
-    return DirectionEstimate(mean[0], error(values[:, 0] - mean[0]), x, x_error, y, y_error, square, square_error)
+    return DirectionEstimate(
+        mean[0], error(values[:, 0] - mean[0]), x, x_error, y, y_error, square, square_error
+    )
 
 
 def _walk(
@@ -125,7 +134,9 @@ def _walk(
                 at_x, at_y = x[before] + u[before] * length, y[before] + v[before] * length
                 moments = (1.0, at_x, at_y * np.sign(v[before]), at_x**2 + at_y**2)
                 for field, moment in enumerate(moments):
-                    counts = np.bincount(places[before], weights * moment, shape[0] * shape[1]).reshape(shape)
+                    counts = np.bincount(
+                        places[before], weights * moment, shape[0] * shape[1]
+                    ).reshape(shape)
                     for row in rows:
                         sums[field, row, plane] += counts
     return sums / photons
@@ -135,7 +146,7 @@ def _bins(values: Array, edges: Array) -> NDArray[np.intp]:
     return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
 
 
-# Sets of orders ------------------------------------------------------------------------------------------------------
+# Sets of orders -----------------------------------------------------------------------------------
 
 
 HG = HenyeyGreensteinPhase(0.75)
@@ -159,7 +170,9 @@ def at_azimuths(modes, phi):
 def test_integrals_over_directions_are_fluence_and_flux_with_their_moments():
     tau, mu0, depth = 3.0, 0.5, 1.3
     rule = double_gauss(16)
-    modes = DirectionalMoments(HG, 0.97, rule.mu, modes=2, single=False)(tau, [mu0], [0.0, depth])[:, :, :, 0]
+    modes = DirectionalMoments(HG, 0.97, rule.mu, modes=2, single=False)(tau, [mu0], [0.0, depth])[
+        :, :, :, 0
+    ]
     slab = SlabOrders(tau, mu0, HG, 0.97, depths=[depth])
     expected, _ = order_sets(slab, SETS)
     place = int(np.argmin(np.abs(slab.panels.edges - depth)))
@@ -169,20 +182,29 @@ def test_integrals_over_directions_are_fluence_and_flux_with_their_moments():
         found = [(inside[field] * weights).sum() for field in (0, 1, 3)]
         assert found == pytest.approx(list(edges[FLUENCE, :, place]), rel=1e-6)
         upward = weights * np.maximum(rule.mu, 0)
-        assert [(top[field] * upward).sum() for field in (0, 1, 3)] == pytest.approx(list(edges[UP, :, 0]), rel=1e-5)
+        assert [(top[field] * upward).sum() for field in (0, 1, 3)] == pytest.approx(
+            list(edges[UP, :, 0]), rel=1e-5
+        )
 
 
-@pytest.mark.claim("clouds-radiance-is-disort", tolerance="1e-4 relative: single precision and 25 modes")
+@pytest.mark.claim(
+    "clouds-radiance-is-disort", tolerance="1e-4 relative: single precision and 25 modes"
+)
 def test_sums_of_sets_and_order_one_are_disort():
     tau, mu0, albedo, streams = 2.0, 0.4, 0.9, 32
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        mu, *_, radiance = pydisort(tau, albedo, 2 * streams, 0.75 ** np.arange(2 * streams), mu0, np.pi, 0.0)
+        mu, *_, radiance = pydisort(
+            tau, albedo, 2 * streams, 0.75 ** np.arange(2 * streams), mu0, np.pi, 0.0
+        )
     chosen = np.array([3, 20, streams + 10, streams - 1])
     depths, azimuths = [0.0, 0.7, tau], np.array([0.3, 2.0])
     modes = DirectionalMoments(HG, albedo, mu[chosen], modes=40)(tau, [mu0], depths)
     total = at_azimuths(modes, azimuths)[0].sum(0)[0]
-    theirs = np.array([[[radiance(z, p)[place] for p in azimuths] for place in chosen] for z in depths]) / np.pi
+    theirs = (
+        np.array([[[radiance(z, p)[place] for p in azimuths] for place in chosen] for z in depths])
+        / np.pi
+    )
     z, cosine = np.array(depths)[:, None, None], mu[chosen][:, None]
     order_one = first_order(tau, mu0, albedo, z, cosine, azimuths)
     seen = theirs > 1e-9
@@ -201,20 +223,30 @@ def first_order(tau, mu0, albedo, z, mu, phi):
 
 
 @pytest.mark.statistical
-@pytest.mark.claim("clouds-directions-are-photons", tolerance="4.5 standard errors: 1 false alarm in 1000 runs of 144")
+@pytest.mark.claim(
+    "clouds-directions-are-photons",
+    tolerance="4.5 standard errors: 1 false alarm in 1000 runs of 144",
+)
 def test_bins_of_directions_are_those_of_photons():
     tau, mu0, albedo, depth = 4.0, 0.7, 0.98, 1.5
-    mu_edges, phi_edges = np.array([-1.0, -0.8, -0.5, -0.2, 0.2, 0.5, 0.8, 1.0]), np.array([0.0, 0.6, 2.0, np.pi])
+    mu_edges, phi_edges = (
+        np.array([-1.0, -0.8, -0.5, -0.2, 0.2, 0.5, 0.8, 1.0]),
+        np.array([0.0, 0.6, 2.0, np.pi]),
+    )
     sets = [SETS[0], SETS[2], SETS[4], SETS[7]]
     slab = Slab(tau, mu0, albedo, HenyeyGreenstein(0.75), [depth])
-    walked = direction_estimate(slab, sets, mu_edges=mu_edges, phi_edges=phi_edges, photons=200_000, seed=3)
+    walked = direction_estimate(
+        slab, sets, mu_edges=mu_edges, phi_edges=phi_edges, photons=200_000, seed=3
+    )
     nodes, weights = np.polynomial.legendre.leggauss(6)
     bins = [place for place in range(7) if place != 3]  # grazing photons have no finite variance
     mu = np.concatenate([(a + b) / 2 + (b - a) / 2 * nodes for a, b in pairwise(mu_edges)])
     phi = np.concatenate([(a + b) / 2 + (b - a) / 2 * nodes for a, b in pairwise(phi_edges)])
     moments = at_azimuths(DirectionalMoments(HG, albedo, mu)(tau, [mu0], [depth]), phi)
     m0, x, y, square = (
-        np.einsum("smapb,a,b->smp", each[:, 0, 0].reshape(8, 7, 6, 3, 6), weights / 2, weights / 2)[[0, 2, 4, 7]]
+        np.einsum("smapb,a,b->smp", each[:, 0, 0].reshape(8, 7, 6, 3, 6), weights / 2, weights / 2)[
+            [0, 2, 4, 7]
+        ]
         for each in moments
     )
     for found, error, expected in (
@@ -228,7 +260,7 @@ def test_bins_of_directions_are_those_of_photons():
         assert math.sqrt(np.mean(off**2)) < 1.35
 
 
-# A uniform sky -------------------------------------------------------------------------------------------------------
+# A uniform sky ------------------------------------------------------------------------------------
 
 
 PHASE = HenyeyGreensteinPhase(0.85)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: an exported kernel has the certified values, in the languages whose tools are here, and states its error."""
+"""Claim: an exported kernel has the certified values, in the languages whose tools are
+here, and states its error.
+"""
 
 import json
 import random
@@ -28,9 +30,12 @@ QUICK = (("exact", "hg"), ("exact", "murky"), ("quadrature-16", "isotropic"))
 ALL = [(kernel, phase) for kernel in KERNELS for phase in PHASES]
 
 
-@pytest.mark.claim("exported-kernels", tolerance="5e-6 of exact; the stated figure by half, for other drivers")
+@pytest.mark.claim(
+    "exported-kernels", tolerance="5e-6 of exact; the stated figure by half, for other drivers"
+)
 @pytest.mark.parametrize(
-    ("kernel", "phase"), [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in ALL]
+    ("kernel", "phase"),
+    [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in ALL],
 )
 def test_certified_rays_and_the_stated_error(kernel, phase):
     need_opengl()
@@ -43,23 +48,34 @@ def test_certified_rays_and_the_stated_error(kernel, phase):
     assert f"{stated:.1e} on" in result.code
 
 
-# `low` and `high` err in one direction: their errors add up; `chance` is the largest that was found.
-@pytest.mark.claim("exported-kernels", tolerance="3e-5, stated, with every operation as wrong as Vulkan permits")
+# `low` and `high` err in one direction: their errors add up; `chance` is
+# the largest that was found.
+@pytest.mark.claim(
+    "exported-kernels", tolerance="3e-5, stated, with every operation as wrong as Vulkan permits"
+)
 @pytest.mark.parametrize("way", ["low", "high", "chance"])
-@pytest.mark.parametrize("phase", ["hg", *(pytest.param(name, marks=pytest.mark.slow) for name in PHASES[:4])])
+@pytest.mark.parametrize(
+    "phase", ["hg", *(pytest.param(name, marks=pytest.mark.slow) for name in PHASES[:4])]
+)
 def test_any_device_within_the_bounds_of_vulkan(phase, way):
     rng = random.Random(1)
-    signs = {"low": lambda: -1.0, "high": lambda: 1.0, "chance": lambda: rng.choice((-1.0, 1.0))}[way]
-    airlight_integral = on_loose_device(kernel_text("exact", named_phase(phase), "glsl"), iter(signs, None))
+    signs = {"low": lambda: -1.0, "high": lambda: 1.0, "chance": lambda: rng.choice((-1.0, 1.0))}[
+        way
+    ]
+    airlight_integral = on_loose_device(
+        kernel_text("exact", named_phase(phase), "glsl"), iter(signs, None)
+    )
     columns, expected = certified_rays(phase)
     every = 1 if way == "chance" else 4
     values = [airlight_integral(*ray) for ray in np.minimum(columns, 3e38).T[::every]]
     assert np.abs(values / expected[::every] - 1).max() < CONFORMING
 
 
-# Both round their exponents, to 6e-8 of depths of up to 80, in their own ways; those of quadrature-16 are sums of two
-# signs, so its bound is what the kernel in Python errs by, and 1e-5.
-@pytest.mark.claim("exported-kernels", tolerance="1e-5 from the float32 kernel; quadrature-16 its error and 1e-5")
+# Both round their exponents, to 6e-8 of depths of up to 80, in their own ways; those of
+# quadrature-16 are sums of two signs, so its bound is what the kernel in Python errs by, and 1e-5.
+@pytest.mark.claim(
+    "exported-kernels", tolerance="1e-5 from the float32 kernel; quadrature-16 its error and 1e-5"
+)
 @pytest.mark.parametrize("name", ["hg", "hazy"])
 def test_random_rays_are_those_of_the_kernel_in_python(variant, name):
     need_opengl()
@@ -68,20 +84,29 @@ def test_random_rays_are_those_of_the_kernel_in_python(variant, name):
     held = expected > 1e-30  # below, float32 loses digits to its smallest number
     assert held.sum() > 9000
     assert np.abs(values[held] / expected[held] - 1).max() < 1e-5
-    coarse, values = kernel_values(quadrature, rays, name, g), exported(name, "quadrature-16", rays, g)
+    coarse, values = (
+        kernel_values(quadrature, rays, name, g),
+        exported(name, "quadrature-16", rays, g),
+    )
     reference = true_values(rays, name, g)
     allowed = np.abs(coarse[held] / reference[held] - 1).max() + 1e-5
     assert np.abs(values[held] / reference[held] - 1).max() < allowed
 
 
 def exported(name, kernel, rays, g):
-    return exported_values(ShaderHost("export"), kernel_text(kernel, named_phase(name), "glsl"), [*rays, g])
+    return exported_values(
+        ShaderHost("export"), kernel_text(kernel, named_phase(name), "glsl"), [*rays, g]
+    )
 
 
 def test_the_rows_of_a_test_have_the_values_that_it_compares():
     need_opengl()
     code = airlight.export("exact", phase="hg-draine:20", test=True).code
-    main = "#version 430 core\n" + code + "out vec4 result;\nvoid main() { result = vec4(al_test()); }\n"
+    main = (
+        "#version 430 core\n"
+        + code
+        + "out vec4 result;\nvoid main() { result = vec4(al_test()); }\n"
+    )
     host = ShaderHost("export")
     stage = {"name": "rows", "text": main, "kind": "picture", "size": [1, 1], "format": "rgba32f"}
     host.ask("open", stages=[stage])
@@ -103,7 +128,9 @@ def test_texts_call_only_built_in_functions_that_round_as_they_should(kernel, ph
 def test_glslang_compiles_what_is_exported(tmp_path, kernel, language):
     if not shutil.which("glslangValidator"):
         pytest.skip("glslangValidator is not installed (Debian: glslang-tools)")
-    code = airlight.export(kernel, language=language.split()[0], phase="hg-draine:12", test=True).code
+    code = airlight.export(
+        kernel, language=language.split()[0], phase="hg-draine:12", test=True
+    ).code
     path = tmp_path / "text.frag"
     starts = {
         "glsl": "#version 450\nlayout(location = 0) ",
@@ -113,7 +140,9 @@ def test_glslang_compiles_what_is_exported(tmp_path, kernel, language):
         path.write_text(code + "float4 main() : SV_Target { return al_test(); }\n")
         options = ["-D", "-e", "main", "-V"]
     else:
-        path.write_text(starts[language] + "out vec4 o;\n" + code + "void main() { o = vec4(al_test()); }\n")
+        path.write_text(
+            starts[language] + "out vec4 o;\n" + code + "void main() { o = vec4(al_test()); }\n"
+        )
         options = ["-V"] if language == "glsl" else []
     command = ["glslangValidator", *options, "-S", "frag", str(path)]
     ran = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
@@ -124,7 +153,9 @@ def test_wgpu_compiles_what_is_exported():
     wgpu = pytest.importorskip("wgpu", reason="wgpu is not installed (pip install wgpu)")
     device = wgpu.gpu.request_adapter_sync().request_device_sync()
     for kernel, phase in ALL:
-        device.create_shader_module(code=airlight.export(kernel, language="wgsl", phase=phase, test=True).code)
+        device.create_shader_module(
+            code=airlight.export(kernel, language="wgsl", phase=phase, test=True).code
+        )
 
 
 @pytest.mark.parametrize(

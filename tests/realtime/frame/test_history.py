@@ -23,7 +23,7 @@ from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.realtime.methods.froxel_fog.test_method import lamp_above
 
-# Random numbers ------------------------------------------------------------------------------------------------------
+# Random numbers -----------------------------------------------------------------------------------
 
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
@@ -79,7 +79,9 @@ def test_two_runs_differ_and_one_run_repeats(noisy_scene):
     first, second, again = (render_frame(replace(renderer, run=run)).airlight for run in (0, 1, 0))
     assert np.mean(first != second) > 0.99
     np.testing.assert_array_equal(first, again)
-    np.testing.assert_array_equal(first, render_frame(frame_renderer(noisy_scene, Speckle)).airlight)
+    np.testing.assert_array_equal(
+        first, render_frame(frame_renderer(noisy_scene, Speckle)).airlight
+    )
 
 
 def test_a_method_that_does_not_say_that_it_is_noisy_is_told_so(noisy_scene):
@@ -92,7 +94,9 @@ def test_a_method_that_does_not_say_that_it_is_noisy_is_told_so(noisy_scene):
 
 
 def test_numbers_of_pixels_frames_runs_and_streams_are_even_and_independent(variant):
-    """Kolmogorov and Smirnov's test of 65 536 numbers, and the correlation of each with the one before, at 1e-4."""
+    """Kolmogorov and Smirnov's test of 65 536 numbers, and the correlation of each with
+    the one before, at 1e-4.
+    """
     pixel, count = dr.arange(mi.UInt32, 2**16), 2**16
     for words in ((pixel, 3, 5, 0), (7, pixel, 5, 0), (7, 3, pixel, 0), (7, 3, 5, pixel)):
         numbers = [np.array(mi.Float(word >> 8)) * 2.0**-24 for word in pcg4d(*words)]
@@ -107,19 +111,25 @@ def pattern(kind, *, run=0, frame=0, golden=False, size=64):
     many = not isinstance(run, int)
     pixel = dr.full(mi.UInt32, 7, len(run)) if many else dr.arange(mi.UInt32, size * size)
     noise = Noise(mi.UInt32(run), mi.UInt32(frame), blue_mask())
-    found = np.array(noise.pattern(kind, golden=golden, pixel=pixel, place=(pixel // size, pixel % size)), dtype=float)
+    found = np.array(
+        noise.pattern(kind, golden=golden, pixel=pixel, place=(pixel // size, pixel % size)),
+        dtype=float,
+    )
     return found if many else found.reshape(size, size)
 
 
 def low_fraction(values):
     """Return the mean of the spectrum below an eighth of a cycle per pixel; 1 for white noise."""
     power = np.abs(np.fft.fft2(values - values.mean())) ** 2 / values.size / values.var()
-    frequency = np.hypot(*np.meshgrid(*(np.fft.fftfreq(side) for side in values.shape), indexing="ij"))
+    frequency = np.hypot(
+        *np.meshgrid(*(np.fft.fftfreq(side) for side in values.shape), indexing="ij")
+    )
     return power[(frequency > 0) & (frequency < 1 / 8)].mean()
 
 
 @pytest.mark.claim(
-    "noise-patterns", tolerance="Kolmogorov and Smirnov at 1e-4; low fraction of the spectrum below 0.1 if blue"
+    "noise-patterns",
+    tolerance="Kolmogorov and Smirnov at 1e-4; low fraction of the spectrum below 0.1 if blue",
 )
 def test_patterns_are_even_over_the_runs_and_in_the_image(variant):
     for kind in PATTERNS:
@@ -131,13 +141,16 @@ def test_patterns_are_even_over_the_runs_and_in_the_image(variant):
         np.testing.assert_allclose(moved % 1, 3 * (np.sqrt(5) - 1) / 2 % 1, atol=2**-22)
     assert low_fraction(pattern("white")) > 0.8
     assert low_fraction(pattern("blue")) < 0.1
-    nine = np.array([np.roll(pattern("ign"), (i, j), (0, 1)) for i in range(3) for j in range(3)])[:, 2:, 2:]
-    # The nine of any 3 x 3 pixels lie about evenly: the widest gap between white ones is 0.31 in the mean.
+    nine = np.array([np.roll(pattern("ign"), (i, j), (0, 1)) for i in range(3) for j in range(3)])[
+        :, 2:, 2:
+    ]
+    # The nine of any 3 x 3 pixels lie about evenly: the widest gap between white
+    # ones is 0.31 in the mean.
     gaps = np.diff(np.sort(nine, axis=0), axis=0, append=np.sort(nine, axis=0)[:1] + 1)
     assert np.mean(gaps.max(0)) < 0.2
 
 
-# The mean with the frames before -------------------------------------------------------------------------------------
+# The mean with the frames before ------------------------------------------------------------------
 
 
 MOVED = {"camera_moved": True}
@@ -154,7 +167,9 @@ class Painted(Speckle):
         there = dr.isfinite(view.distance)
         point = view.at(dr.select(there, view.distance, 0))
         waves = 1.5 + dr.sin(2 * point)
-        return Layers(dr.select(there, view.lights[0].intensity * type(view.medium.albedo)(waves), 0))
+        return Layers(
+            dr.select(there, view.lights[0].intensity * type(view.medium.albedo)(waves), 0)
+        )
 
 
 def scene():
@@ -172,15 +187,22 @@ def frames(method, steps, *, run=0, **parameters):
 
 
 def darker(now, fraction):
-    return replace(now, lights=tuple(replace(light, intensity=light.intensity * fraction) for light in now.lights))
+    return replace(
+        now,
+        lights=tuple(replace(light, intensity=light.intensity * fraction) for light in now.lights),
+    )
 
 
 def shifted_camera(now, vector):
-    return replace(now, camera=replace(now.camera, origin=now.camera.origin + type(now.camera.origin)(*vector)))
+    return replace(
+        now, camera=replace(now.camera, origin=now.camera.origin + type(now.camera.origin)(*vector))
+    )
 
 
 @pytest.mark.claim("history-alpha-one", tolerance="none: bit by bit")
-@pytest.mark.parametrize(("reproject", "clamp"), [("none", "none"), ("surface", "range"), ("surface", "variance")])
+@pytest.mark.parametrize(
+    ("reproject", "clamp"), [("none", "none"), ("surface", "range"), ("surface", "variance")]
+)
 def test_with_alpha_one_nothing_changes(variant, reproject, clamp):
     now = scene()
     steps = [(now, {}), (now, {}), (shifted_camera(now, (0.1, 0.0, 0.0)), MOVED)]
@@ -189,12 +211,16 @@ def test_with_alpha_one_nothing_changes(variant, reproject, clamp):
     np.testing.assert_array_equal(found, plain)
 
 
-@pytest.mark.claim("history-noise", tolerance="1e-6, rounding of 40 sums; four standard errors of 10 368 values")
+@pytest.mark.claim(
+    "history-noise", tolerance="1e-6, rounding of 40 sums; four standard errors of 10 368 values"
+)
 def test_at_rest_frames_are_averaged_exponentially_and_noise_falls(variant):
     alpha, runs, steps = 0.2, 8, [(scene(), {})] * 40
     noise, mean = [], []
     for run in range(runs):
-        plain, found = (frames(m, steps, run=run, **p) for m, p in ((Speckle, {}), (SPECKLE, {"alpha": alpha})))
+        plain, found = (
+            frames(m, steps, run=run, **p) for m, p in ((Speckle, {}), (SPECKLE, {"alpha": alpha}))
+        )
         expected = plain[0]
         for image in plain[1:]:
             expected = (1 - alpha) * expected + alpha * image
@@ -203,14 +229,18 @@ def test_at_rest_frames_are_averaged_exponentially_and_noise_falls(variant):
         mean.append(found[-1] - 0.5)
     count = np.size(mean)
     # The variance of a variance of normal numbers is 2/n of its square; that of even ones is less.
-    assert np.mean(np.square(mean)) * 12 == pytest.approx(alpha / (2 - alpha), rel=4 * np.sqrt(2 / count))
+    assert np.mean(np.square(mean)) * 12 == pytest.approx(
+        alpha / (2 - alpha), rel=4 * np.sqrt(2 / count)
+    )
     assert np.mean(np.square(noise)) * 12 == pytest.approx(1, rel=4 * np.sqrt(2 / count))
 
 
 SPECKLE = with_history(Speckle)
 
 
-@pytest.mark.claim("history-ghost", tolerance="1e-4 relative: 1 - alpha to the power of the frames since")
+@pytest.mark.claim(
+    "history-ghost", tolerance="1e-4 relative: 1 - alpha to the power of the frames since"
+)
 def test_the_ghost_of_a_light_that_changed_fades_like_a_power(variant):
     bright = scene()
     dark = darker(bright, 0.25)
@@ -236,13 +266,17 @@ def test_a_clamp_leaves_no_light_brighter_than_the_pixels_around(variant):
     assert np.any(frames(with_history(Painted), steps, alpha=0.1)[1] > 2 * nine.max(0))
 
 
-@pytest.mark.claim("history-surface", tolerance="a tenth of the error of the same pixel: the blur of bilinear weights")
+@pytest.mark.claim(
+    "history-surface",
+    tolerance="a tenth of the error of the same pixel: the blur of bilinear weights",
+)
 def test_surfaces_are_followed_where_the_camera_moves(variant):
     now = scene()
     steps = [(now, {}), (shifted_camera(now, (0.31, 0.0, 0.0)), MOVED)]
     exact = frames(Painted, steps)[1]
     followed, stayed = (
-        frames(with_history(Painted), steps, alpha=0.1, reproject=reproject)[1] for reproject in ("surface", "none")
+        frames(with_history(Painted), steps, alpha=0.1, reproject=reproject)[1]
+        for reproject in ("surface", "none")
     )
     assert relative_rmse(followed, exact) < 0.1 * relative_rmse(stayed, exact)
 
@@ -261,7 +295,9 @@ def test_frames_that_sample_elsewhere_come_closer_to_a_finer_grid(variant):
     froxels = METHODS["froxel-fog"]
     fine = frames(froxels, [(now, {})], **(grid | {"slices": 384}))[0]
     alone = frames(froxels, [(now, {})], **grid)[0]
-    many = frames(find_method("froxel-fog+history"), [(now, {})] * 128, alpha=0.03, jitter="frames", **grid)[-1]
+    many = frames(
+        find_method("froxel-fog+history"), [(now, {})] * 128, alpha=0.03, jitter="frames", **grid
+    )[-1]
     assert relative_rmse(many, fine) < 0.8 * relative_rmse(alone, fine)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts that a frame keeps of the last one, and large images in parts: the same images, bit by bit."""
+"""Parts that a frame keeps of the last one, and large images in parts: the
+same images, bit by bit.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -34,7 +36,19 @@ from tests.helpers.sunlit import cube
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
 #: Motion from frame to frame; together every pair of neighbours that matters.
-STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "light", "objects", "camera", "medium")
+STEPS = (
+    "light",
+    "medium",
+    "colour",
+    "camera",
+    "light",
+    "objects",
+    "colour",
+    "light",
+    "objects",
+    "camera",
+    "medium",
+)
 
 
 def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
@@ -52,13 +66,18 @@ def sphere_scene() -> Scene:
 
 
 def cube_of_fog() -> Scene:
-    """A cube of fog by an occluder, over a floor; the kernels of `three-media` take ten times as long to compile."""
+    """A cube of fog by an occluder, over a floor; the kernels of `three-media` take ten
+    times as long to compile.
+    """
     turned = mi.ScalarTransform4f().translate([0.7, 0.4, 0.5]).rotate([1, 2, 3], 40).scale(0.17)
     occluder = {"type": "cube", "to_world": turned}
     return read_scene(
         mi.load_dict(
             clear_scene(
-                size=(32, 24), cube=cube(centre=(0.9, 0.5, 0.6)), occluder=occluder, floor=tiny_scene()["floor"]
+                size=(32, 24),
+                cube=cube(centre=(0.9, 0.5, 0.6)),
+                occluder=occluder,
+                floor=tiny_scene()["floor"],
             )
         )
     )
@@ -66,18 +85,28 @@ def cube_of_fog() -> Scene:
 
 def frames(scene: Scene, steps, fraction: float = 0.1):
     """Yield the scene after each step, and what moved."""
-    objects = read_objects(scene, closed_shapes(read_occluders(scene.geometry))) if "objects" in steps else None
+    objects = (
+        read_objects(scene, closed_shapes(read_occluders(scene.geometry)))
+        if "objects" in steps
+        else None
+    )
     turn = np.eye(3)
     for step in steps:
         moved = dict(STILL)
         if step == "light":
-            about = np.array(scene.lights[0].position, dtype=np.float64).ravel() + np.array([0.21, -0.13, 0.05])
-            scene = replace(scene, lights=tuple(turned_light(light, about, TURN) for light in scene.lights))
+            about = np.array(scene.lights[0].position, dtype=np.float64).ravel() + np.array(
+                [0.21, -0.13, 0.05]
+            )
+            scene = replace(
+                scene, lights=tuple(turned_light(light, about, TURN) for light in scene.lights)
+            )
             moved["light_moved"] = True
         elif step == "medium":
             scene = replace(scene, medium=thicker_medium(scene.medium, 1.3))
         elif step == "colour":
-            scene = replace(scene, lights=tuple(coloured_light(light, fraction) for light in scene.lights))
+            scene = replace(
+                scene, lights=tuple(coloured_light(light, fraction) for light in scene.lights)
+            )
         elif step == "camera":
             scene = replace(scene, camera=aside(scene.camera))
             moved["camera_moved"] = True
@@ -109,14 +138,18 @@ CASES = [
         ("light", "medium", "camera", "colour"),
         id="bounded media",
     ),
-    pytest.param(sphere_scene, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"),
+    pytest.param(
+        sphere_scene, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"
+    ),
 ]
 
 
 @pytest.mark.claim("kept-frames", tolerance="none: equal bit by bit")
 @pytest.mark.parametrize(("scene", "method", "parameters", "steps"), CASES)
 def test_images_are_those_of_frames_made_afresh(variant, scene, method, parameters, steps):
-    renderer, afresh = (made(scene := scene() if callable(scene) else scene, method, **parameters) for _ in range(2))
+    renderer, afresh = (
+        made(scene := scene() if callable(scene) else scene, method, **parameters) for _ in range(2)
+    )
     stages, kept = next_frame(renderer, renderer.scene, None, **STILL)
     last = host(renderer, stages)
     for now, moved in frames(renderer.scene, steps):
@@ -125,7 +158,8 @@ def test_images_are_those_of_frames_made_afresh(variant, scene, method, paramete
         wanted = host(afresh, run_stages(replace(afresh, scene=now), afresh.prepare(now)))
         for name, image in images.items():
             np.testing.assert_array_equal(image, wanted[name], err_msg=f"{name} after {moved}")
-        assert np.any(images["airlight"] != last["airlight"]), moved  # each step does change the image
+        # each step does change the image
+        assert np.any(images["airlight"] != last["airlight"]), moved
         last = images
 
 
@@ -151,7 +185,9 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
 
 @pytest.mark.claim("frames-are-replayed")
 def test_frames_replay_whatever_moves(variant):
-    """No stage is recorded again, except for the camera rays, once, where part of Mitsuba's scene is another."""
+    """No stage is recorded again, except for the camera rays, once, where part of
+    Mitsuba's scene is another.
+    """
     renderer = made(built_in("two-pens"), "shadow-planes")
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):
@@ -161,10 +197,11 @@ def test_frames_replay_whatever_moves(variant):
     assert [stage.n_recordings for stage in (stages.shade, stages.render)] == [1, 1]
 
 
-# Large images in parts -----------------------------------------------------------------------------------------------
+# Large images in parts ----------------------------------------------------------------------------
 
 
-# No method sees the rays of another part, and a part begins where a block of tiles does: the same bits.
+# No method sees the rays of another part, and a part begins where a block of
+# tiles does: the same bits.
 IN_PARTS = {
     "shadow-planes": {},
     "light-volumes, a disk": {"map": 64, "points": 3},
@@ -174,7 +211,9 @@ IN_PARTS = {
 def scene_of_parts(*, lamp=False):
     disk = area_lamp("disk", (0.31, -0.57, 1.93), (0.13, 0.29, -1.0), 0.17, (5.3, 4.9, 4.1))
     lamps = {"lamp": disk} if lamp else {}
-    box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).rotate([0.3, 1, 0.2], 29.0).scale(0.37)
+    box = (
+        mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).rotate([0.3, 1, 0.2], 29.0).scale(0.37)
+    )
     built = mi.load_dict(tiny_scene(ball={"type": "cube", "to_world": box}, **lamps))
     resize(built, (83, 47))
     return read_scene(built)
@@ -182,7 +221,9 @@ def scene_of_parts(*, lamp=False):
 
 def renderer_of_parts(name):
     method = METHODS[name.partition(",")[0]]
-    return frame_renderer(scene_of_parts(lamp="disk" in name), method, kernel=KERNELS["exact"], **IN_PARTS[name])
+    return frame_renderer(
+        scene_of_parts(lamp="disk" in name), method, kernel=KERNELS["exact"], **IN_PARTS[name]
+    )
 
 
 def same(frame, other):
@@ -195,9 +236,17 @@ def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch
     """A later frame that is shaded again is shaded in parts too; all parts share one state."""
     made = renderer_of_parts(name)
     read, turn = made.scene, rotation([0.3, 0.9, -0.2], 11.0)
-    turned = replace(read, lights=tuple(turned_light(light, np.array([0.1, 0.2, 0.3]), turn) for light in read.lights))
+    turned = replace(
+        read,
+        lights=tuple(turned_light(light, np.array([0.1, 0.2, 0.3]), turn) for light in read.lights),
+    )
     coloured = replace(turned, lights=tuple(coloured_light(light, 0.4) for light in turned.lights))
-    moves = [(read, {}), (turned, {"light_moved": True}), (coloured, {}), (read, {"light_moved": True})]
+    moves = [
+        (read, {}),
+        (turned, {"light_moved": True}),
+        (coloured, {}),
+        (read, {"light_moved": True}),
+    ]
     moves += [(read, {"geometry_moved": True, "light_moved": True})]
     expected, cache = [], None
     for now, moved in moves:

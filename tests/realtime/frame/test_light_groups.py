@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Area lights in frames: every method renders their points, frames follow moves, and spheres have their closed form."""
+"""Area lights in frames: every method renders their points, frames follow moves, and
+spheres have their closed form.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -27,7 +29,8 @@ from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
 
 SIZE = (32, 24)
-#: Methods with what brings them close to the reference, and the relative RMSE of airlight that remains.
+#: Methods with what brings them close to the reference, and the relative RMSE
+#: of airlight that remains.
 CLOSE = {
     "ray-march": ({"steps": 600}, 1e-3),
     "shadow-planes": ({}, 1e-3),
@@ -42,10 +45,16 @@ def scene_of(precision="single", **changes):
 
 @pytest.fixture(scope="module", params=["rectangle", "folded mesh"])
 def one_by_one(variant, request):
-    """Frames of each of five points as the only light, added up: what every method must come close to."""
+    """Frames of each of five points as the only light, added up: what every
+    method must come close to.
+    """
     airlight = surface = 0.0
     scene = scene_of(
-        **({} if request.param == "rectangle" else {"changes": {"size": SIZE, "lamp": ring((0.9, 0.7, 1.9), size=0.6)}})
+        **(
+            {}
+            if request.param == "rectangle"
+            else {"changes": {"size": SIZE, "lamp": ring((0.9, 0.7, 1.9), size=0.6)}}
+        )
     )
     for point in light_samples(scene, 5, "sobol"):
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
@@ -66,24 +75,36 @@ def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
 def test_a_folded_lamp_alone_shadows_itself_and_another_does_not(variant):
     """A speck far behind the camera, which makes any scene one with shadows, changes nothing."""
     speck = {"type": "sphere", "center": [3.0, 1.0, -500.0], "radius": 1e-3}
-    alone, beside = (read(lit_scene(size=(8, 6), lamp=ring(), **more)) for more in ({}, {"speck": speck}))
-    airlight, expected = (render(scene, "ray-march", points=2, steps=50).airlight for scene in (alone, beside))
+    alone, beside = (
+        read(lit_scene(size=(8, 6), lamp=ring(), **more)) for more in ({}, {"speck": speck})
+    )
+    airlight, expected = (
+        render(scene, "ray-march", points=2, steps=50).airlight for scene in (alone, beside)
+    )
     np.testing.assert_allclose(airlight, expected, rtol=1e-5)
     assert not read(lit_scene(lamp=lamp("sphere", center=[0.3, 0.4, 2.9]))).features.shadows
 
 
 def _two_spots():
     """Return a scene with a hard and a soft spot in bounded media."""
-    spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1])}
+    spot = {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1]),
+    }
     bright = {"intensity": {"type": "rgb", "value": [9.1, 7.3, 5.9]}, "cutoff_angle": 37.0}
-    lamps = {"hard": spot | bright | {"beam_width": 37.0}, "soft": spot | bright | {"beam_width": 11.0}}
+    lamps = {
+        "hard": spot | bright | {"beam_width": 37.0},
+        "soft": spot | bright | {"beam_width": 11.0},
+    }
     turned = mi.ScalarTransform4f().translate([0.63, 0.47, 1.63]).rotate([1, 2, 3], 37).scale(0.07)
     solid = {"type": "cube", "to_world": turned}
     return read(shaded(size=(16, 12), lamp=None, pearl=fog_sphere(), solid=solid, **lamps))
 
 
 def test_many_lights_one_by_one_are_all_at_once(variant):
-    """Each light has code of its own in one kernel, or kernels of their own: the sum is the same to rounding."""
+    """Each light has code of its own in one kernel, or kernels of their own: the sum
+    is the same to rounding.
+    """
     scene = _two_spots()
     method = METHODS["unshadowed"]
     apart = frames.renderer(scene, method)
@@ -91,7 +112,9 @@ def test_many_lights_one_by_one_are_all_at_once(variant):
     one = frames.renderer(scene, at_once(method))
     assert len(one.groups) == 1
     wanted, frame = render_frame(one), render_frame(apart)
-    np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=1e-5, atol=1e-5 * wanted.airlight.mean())
+    np.testing.assert_allclose(
+        frame.airlight, wanted.airlight, rtol=1e-5, atol=1e-5 * wanted.airlight.mean()
+    )
     np.testing.assert_allclose(frame.surface, wanted.surface, rtol=1e-5, atol=1e-6)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     stages, cache = next_frame(apart, scene, None, **still)
@@ -117,13 +140,17 @@ class Prepared(Method):
         return light.intensity + 0 * view.distance
 
 
-def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(variant, monkeypatch):
-    """Where nothing moved nothing is prepared again, however many lights there are; the samples are the same in all
-    stages of a frame."""
+def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(
+    variant, monkeypatch
+):
+    """Where nothing moved nothing is prepared again, however many lights there are; the samples are
+    the same in all stages of a frame."""
     scene = scene_of(changes={"size": (16, 12)})
     placed = []
     place_points = module.place_points
-    monkeypatch.setattr(module, "place_points", lambda *which: (placed.append(1), place_points(*which))[1])
+    monkeypatch.setattr(
+        module, "place_points", lambda *which: (placed.append(1), place_points(*which))[1]
+    )
     drawn = frames.renderer(scene, Prepared, points=40)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     _, cache = next_frame(drawn, scene, None, **still)
@@ -139,14 +166,19 @@ def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(v
 
 def test_the_power_of_a_light_is_its_intensity_times_its_solid_angle(variant):
     """By these numbers a method draws lights: a wrong one is noise, and no error."""
-    spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1, 2, 3], [0, 0, 0], [0, 0, 1])}
+    spot = {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at([1, 2, 3], [0, 0, 0], [0, 0, 1]),
+    }
     lamps = {
         f"spot-{n}": spot | {"cutoff_angle": angle, "beam_width": angle / 2, "intensity": power}
         for n, (angle, power) in enumerate([(30.0, 2.0), (60.0, 1.0), (80.0, 4.0)])
     }
     (table,) = light_tables(read(shaded(size=(16, 12), lamp=None, **lamps)).lights)
     power = np.array([2.0, 1.0, 4.0]) * (1 - np.cos(np.radians([30.0, 60.0, 80.0])))
-    np.testing.assert_allclose(np.array(light_choice(table).fractions), power / power.sum(), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.array(light_choice(table).fractions), power / power.sum(), rtol=1e-6
+    )
 
 
 def test_a_black_lamp_shadows_others_and_not_itself(variant):
@@ -154,9 +186,13 @@ def test_a_black_lamp_shadows_others_and_not_itself(variant):
 
     def drawn(material):
         screen = area_lamp("disk", size=0.3, material=material) | {
-            "to_world": mi.ScalarTransform4f().look_at([0.75, 0.6, 1.5], [0.1, 0.1, -3.0], [0, 1, 0]).scale(0.3)
+            "to_world": mi.ScalarTransform4f()
+            .look_at([0.75, 0.6, 1.5], [0.1, 0.1, -3.0], [0, 1, 0])
+            .scale(0.3)
         }
-        scene = read(lit_by(changes={"size": SIZE}) | {"lamp": tiny_scene()["lamp"], "screen": screen})
+        scene = read(
+            lit_by(changes={"size": SIZE}) | {"lamp": tiny_scene()["lamp"], "screen": screen}
+        )
         return [
             frames.render(scene, name, points=2, **parameters)
             for name, parameters in (("shadow-planes", {}), ("ray-march", {"steps": 1000}))
@@ -178,7 +214,9 @@ class Veil(Method):
     def render(self, view, state, kernel):
         light = sum(light.intensity for light in view.lights)
         light = light + 0 * view.distance * light
-        return Layers(light, transmittance=type(view.distance)(0.5), background=type(view.medium.albedo)(0.25))
+        return Layers(
+            light, transmittance=type(view.distance)(0.5), background=type(view.medium.albedo)(0.25)
+        )
 
 
 def at_once(method):
@@ -203,7 +241,9 @@ def test_what_a_method_shows_of_no_light_is_added_once(variant):
     [("ray-march", {"type": "null"}), ("shadow-planes", None), ("light-volumes", None)],
 )
 def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
-    parameters = {"steps": 20} if name == "ray-march" else {"map": 64} if name == "light-volumes" else {}
+    parameters = (
+        {"steps": 20} if name == "ray-march" else {"map": 64} if name == "light-volumes" else {}
+    )
     scene = scene_of(kind="disk", size=0.31, material=material, changes={"size": SIZE})
     drawn = frames.renderer(scene, name, points=3, **parameters)
     about = np.array([0.1, 0.1, 0.0])
@@ -223,7 +263,7 @@ def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
     with_area_lights(scene, scene.area_lights)
 
 
-# Right beside a sphere light in fog ----------------------------------------------------------------------------------
+# Right beside a sphere light in fog ---------------------------------------------------------------
 
 
 SIGMA_T, RADIUS, FAR, END, SPHERE_SIZE = 0.21, 0.41, 5.0, 20.0, (24, 18)
@@ -236,10 +276,14 @@ def beside_a_sphere(**shapes):
         "to_world": mi.ScalarTransform4f().translate([0, 0, END]).scale([-50, 50, 50]),
         "bsdf": BLACK,
     }
-    return read(lit_scene(size=SPHERE_SIZE, medium=fog(SIGMA_T, 1.0), lamp=light, wall=wall, **shapes))
+    return read(
+        lit_scene(size=SPHERE_SIZE, medium=fog(SIGMA_T, 1.0), lamp=light, wall=wall, **shapes)
+    )
 
 
-@pytest.mark.claim("sphere-light-beside", tolerance="of the midpoint rule with 32 places a ray, 2e-3")
+@pytest.mark.claim(
+    "sphere-light-beside", tolerance="of the midpoint rule with 32 places a ray, 2e-3"
+)
 def test_fog_beside_a_sphere_light_has_the_closed_form(variant):
     """By 64 samples without it 9 %, by 16 27 %."""
     scene = beside_a_sphere()
@@ -247,17 +291,28 @@ def test_fog_beside_a_sphere_light_has_the_closed_form(variant):
     tangent = np.tan(np.radians(30.0)) * 2 / SPHERE_SIZE[0]
     column, row = np.meshgrid(*(np.arange(count) - 0.5 * (count - 1) for count in SPHERE_SIZE))
     slope = tangent * np.hypot(column, row)
-    height, foot, end = FAR * slope / np.hypot(1, slope), FAR / np.hypot(1, slope), END * np.hypot(1, slope)
+    height, foot, end = (
+        FAR * slope / np.hypot(1, slope),
+        FAR / np.hypot(1, slope),
+        END * np.hypot(1, slope),
+    )
     beside = height > RADIUS
     rays = zip(height[beside], foot[beside], end[beside], strict=True)
-    closed = np.array([sphere_airlight(SIGMA_T, h, RADIUS, foot=f, x0=0.0, x1=x1) for h, f, x1 in rays])
+    closed = np.array(
+        [sphere_airlight(SIGMA_T, h, RADIUS, foot=f, x0=0.0, x1=x1) for h, f, x1 in rays]
+    )
     expected = np.repeat(closed[:, None], 3, axis=1) * SIGMA_T / (4 * np.pi)
     assert relative_rmse(frame.airlight[beside], expected) < 2e-3
-    # Before the lamp circles end at the ray, where the rule is of second order: samples without it err by 30 %.
+    # Before the lamp circles end at the ray, where the rule is of second order:
+    # samples without it err by 30 %.
     many = render(scene, "unshadowed", points=1024)
     assert relative_rmse(frame.airlight[~beside], many.airlight[~beside]) < 0.05
 
 
 def test_what_is_in_the_shadow_of_a_sphere_light_stays_dark(variant):
-    box = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 0, FAR]).scale(1.0), "bsdf": BLACK}
+    box = {
+        "type": "cube",
+        "to_world": mi.ScalarTransform4f().translate([0, 0, FAR]).scale(1.0),
+        "bsdf": BLACK,
+    }
     assert render(beside_a_sphere(box=box), "shadow-planes", points=16).airlight.max() < 1e-6

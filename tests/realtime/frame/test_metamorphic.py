@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: what changes nothing of the light changes nothing of an image, for every method and every built-in scene.
+"""Claim: what changes nothing of the light changes nothing of an image, for every method
+and every built-in scene.
 
 Six relations need no reference, and meet faults that no reference was asked about:
 
@@ -12,23 +13,28 @@ Six relations need no reference, and meet faults that no reference was asked abo
 
 Rules say what rounding and a method's discretisation allow:
 
-- *Powers of two* are exact in floating point: twice the light is twice the image to the last bit. Twice
-  the lengths are so to the last bits: grids, bounds and layers know places to a rounding of a metre.
+- *Powers of two* are exact in floating point: twice the light is twice the image to the last bit.
+  Twice the lengths are so to the last bits: grids, bounds and layers know places to a rounding of a
+  metre.
 - *A speck* is behind the camera, and all numbers in view are the same. The map of a sun's shadows
   spans the speck, too: its texels lie elsewhere, and heights in it are rounded.
-- *Moved*, coordinates are rounded: those of 32 m to 2e-6 m. A ray that passes a light at 2 cm has its airlight to 1e-4.
-  Of 192 rays 2 % may graze an edge, and meet the other side of it.
-- *Maps of shadows* have texels along the axes of the world, or about an axis that follows from them. A turn by a right
-  angle at least moves faces onto faces. The rest is as large as the error of the texels, which the difference to
-  a map with four times as many on a side measures; both images have it, and one half more is for chance.
-- *Froxels* end where the light of the farthest lamp fades: lights add up between grids with the same end.
+- *Moved*, coordinates are rounded: those of 32 m to 2e-6 m. A ray that passes a light at 2 cm has
+  its airlight to 1e-4. Of 192 rays 2 % may graze an edge, and meet the other side of it.
+- *Maps of shadows* have texels along the axes of the world, or about an axis that follows from
+  them. A turn by a right angle at least moves faces onto faces. The rest is as large as the error
+  of the texels, which the difference to a map with four times as many on a side measures; both
+  images have it, and one half more is for chance.
+- *Froxels* end where the light of the farthest lamp fades: lights add up between
+  grids with the same end.
 - *A draw* of one light in many is right in the mean alone: a noisy method is asked nothing of sums.
-- *A map of a light at infinity* spans all media: it is asked nothing of a body far away, which makes its texels wide.
-  The maps of how much of a cloud lies before a sun do so, too: a body 320 m behind `cumulus-detail` changes its image
-  by 5e-4 with 256 texels on a side, 1e-4 with 512 and 2e-5 with 1024.
+- *A map of a light at infinity* spans all media: it is asked nothing of a body far away, which
+  makes its texels wide. The maps of how much of a cloud lies before a sun do so, too: a body 320 m
+  behind `cumulus-detail` changes its image by 5e-4 with 256 texels on a side, 1e-4 with 512 and
+  2e-5 with 1024.
 - *Published methods* have the errors of their papers; their exact forms are asked.
-- *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the vertical. The grid of a
-  cloud is moved without a turn where a method looks it up in a map whose texels have one size.
+- *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the
+  vertical. The grid of a cloud is moved without a turn where a method looks it up in a map whose
+  texels have one size.
 """
 
 import tomllib
@@ -104,7 +110,9 @@ def beyond(got: Any, expected: Any, within: float = ROUNDING) -> float:
 
 
 def same(got: Image | None, expected: Image | None, within: float) -> None:
-    """Demand that two images are the same, to a fraction of the brightest pixel; so are two refusals."""
+    """Demand that two images are the same, to a fraction of the brightest
+    pixel; so are two refusals.
+    """
     assert (got is None) == (expected is None)
     for part in ("airlight", "surface") if got is not None else ():
         different = beyond(getattr(got, part), getattr(expected, part), within)
@@ -122,11 +130,13 @@ def has_grid(scene: str) -> bool:
 
 
 def has_cloud_grid(scene: str) -> bool:
-    """Return whether a cloud of a scene has a grid of densities: its suns have maps of how much lies before a point."""
+    """Return whether a cloud of a scene has a grid of densities: its suns have maps of how
+    much lies before a point.
+    """
     return any("density" in shape.get("medium", {}) for shape in TABLES[scene].get("shapes", ()))
 
 
-# Relations ------------------------------------------------------------------------------------------------------------
+# Relations ----------------------------------------------------------------------------------------
 
 
 def twice_the_light(scene: str, method: str) -> None:
@@ -152,7 +162,9 @@ def a_speck(scene: str, method: str) -> None:
 
 
 def moved(scene: str, method: str) -> None:
-    """The world moved and turned with its camera changes nothing beyond rounding and the texels of maps."""
+    """The world moved and turned with its camera changes nothing beyond
+    rounding and the texels of maps.
+    """
     fog = TABLES[scene].get("fog", {})
     turn = np.eye(4)
     turn[:3, 3] = MOVE
@@ -188,7 +200,9 @@ def two_lights(scene: str, method: str) -> None:
     names = changes.lights(changes.description(scene))
     if len(names) > 1:
         halves = names[: len(names) // 2], names[len(names) // 2 :]
-        one, other = (image(changes.only(changes.description(scene), half), method, **far) for half in halves)
+        one, other = (
+            image(changes.only(changes.description(scene), half), method, **far) for half in halves
+        )
         both = image(changes.description(scene), method, **far)
     else:
         more = {"more": changes.another_light(changes.description(scene))}
@@ -203,12 +217,15 @@ def two_lights(scene: str, method: str) -> None:
 
 def bounds(scene: str, method: str) -> None:
     """The bounds of a medium moved where no ray comes change nothing."""
-    near, far = (image(changes.with_body(changes.description(scene), x), method) for x in (320.0, 331.0))
+    near, far = (
+        image(changes.with_body(changes.description(scene), x), method) for x in (320.0, 331.0)
+    )
     same(far, near, within=LAST_BITS)
 
 
 RELATIONS: dict[str, Callable[[str, str], None]] = {
-    each.__name__: each for each in (twice_the_light, twice_the_lengths, a_speck, moved, two_lights, bounds)
+    each.__name__: each
+    for each in (twice_the_light, twice_the_lengths, a_speck, moved, two_lights, bounds)
 }
 
 
@@ -229,8 +246,8 @@ ALL = [
     for relation in RELATIONS
     if holds(relation, scene, method)
 ]
-#: Each relation, each kind of scene (no occluder, a spot, bounds under a sun, area lights, many lights,
-#: height fog under lamps and a sun, a grid, clouds) and each method at least once.
+#: Each relation, each kind of scene (no occluder, a spot, bounds under a sun, area lights, many
+#: lights, height fog under lamps and a sun, a grid, clouds) and each method at least once.
 QUICK = {
     ("open-fog", "unshadowed"): ("a_speck", "two_lights"),
     ("open-fog", "shadow-planes"): ("a_speck",),
@@ -259,20 +276,27 @@ def _cheap_clouds(variant, monkeypatch):
 @pytest.mark.claim("metamorphic")
 @pytest.mark.parametrize(
     ("scene", "method", "relation"),
-    [pytest.param(*each, marks=() if each[2] in QUICK.get(each[:2], ()) else pytest.mark.slow) for each in ALL],
+    [
+        pytest.param(*each, marks=() if each[2] in QUICK.get(each[:2], ()) else pytest.mark.slow)
+        for each in ALL
+    ],
 )
 def test_what_changes_nothing_changes_nothing(scene, method, relation):
     RELATIONS[relation](scene, method)
-    assert (scene, method) not in QUICK or plain(scene, method) is not None  # a refusal holds for all
+    # a refusal holds for all
+    assert (scene, method) not in QUICK or plain(scene, method) is not None
 
 
 @pytest.mark.claim("metamorphic")
 def test_a_speck_changes_nothing_of_a_lamp_that_shadows_itself():
-    """No built-in scene has a lone light in its own way: with any occluder it cast its shadow, and without it none."""
+    """No built-in scene has a lone light in its own way: with any occluder it cast its
+    shadow, and without it none.
+    """
     scene = changes.description("open-fog")
     del scene["lamp"]
     before, after = (
-        image(change(scene | {"ring": ring((0.3, 0.4, 1.1))}), "ray-march") for change in (dict, changes.with_speck)
+        image(change(scene | {"ring": ring((0.3, 0.4, 1.1))}), "ray-march")
+        for change in (dict, changes.with_speck)
     )
     assert before is not None
     same(after, before, LAST_BITS)

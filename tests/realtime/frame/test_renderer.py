@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame's airlight is the integral of the reference; marching, maps and several rays a pixel converge."""
+"""A frame's airlight is the integral of the reference; marching, maps and
+several rays a pixel converge.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -33,7 +35,8 @@ SCENES = {
         },
     },
     "tabulated": lambda: {
-        "fog": tiny_scene()["fog"] | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
+        "fog": tiny_scene()["fog"]
+        | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
     },
 }
 
@@ -47,13 +50,18 @@ def without_shadows(name):
 
 
 @pytest.mark.claim("unshadowed-integral")
-@pytest.mark.parametrize(("name", "kernel"), [*((name, "exact") for name in SCENES), ("grey", "quadrature")])
+@pytest.mark.parametrize(
+    ("name", "kernel"), [*((name, "exact") for name in SCENES), ("grey", "quadrature")]
+)
 def test_integral_without_shadows_is_that_of_the_reference(variant, name, kernel):
     """Two routes that share no code."""
     scene = without_shadows(name)
     integral = render("unshadowed", kernel=kernel, precision="double", scene=scene).airlight
-    # Kernels promise 1e-6. Sixteen nodes a panel know nothing of the kinks of a coarse phase table: 1e-3.
-    assert relative_rmse(integral, reference_of(scene).airlight) < (1e-3 if name == "tabulated" else 1e-6)
+    # Kernels promise 1e-6. Sixteen nodes a panel know nothing of the kinks of a
+    # coarse phase table: 1e-3.
+    assert relative_rmse(integral, reference_of(scene).airlight) < (
+        1e-3 if name == "tabulated" else 1e-6
+    )
 
 
 # Uniform steps see their order later: an unbounded ray is 65 m long, and the light 4 m away.
@@ -67,7 +75,14 @@ def test_marching_is_of_second_order_without_shadows(variant, spacing, first):
     steps = first * np.array([1, 2, 4, 8])
     errors = [
         relative_rmse(
-            render("ray-march", precision="double", scene=scene, steps=int(n), spacing=spacing, shadow="none").airlight,
+            render(
+                "ray-march",
+                precision="double",
+                scene=scene,
+                steps=int(n),
+                spacing=spacing,
+                shadow="none",
+            ).airlight,
             exact,
         )
         for n in steps
@@ -81,7 +96,9 @@ def test_shadow_map_converges_to_shadow_rays(variant):
     scene = tiny_scene(size=(48, 36), spot=spot(beam=20.0))
     rays = render("ray-march", scene=scene, steps=200).airlight
     errors = [
-        relative_rmse(render("ray-march", scene=scene, steps=200, shadow="map", map=size).airlight, rays)
+        relative_rmse(
+            render("ray-march", scene=scene, steps=200, shadow="map", map=size).airlight, rays
+        )
         for size in (16, 128, 1024)
     ]
     assert errors == sorted(errors, reverse=True)
@@ -89,18 +106,24 @@ def test_shadow_map_converges_to_shadow_rays(variant):
     assert render("ray-march", scene=scene, shadow="none").airlight.sum() > rays.sum()
 
 
-# Several rays a pixel ------------------------------------------------------------------------------------------------
+# Several rays a pixel -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", ["shadow-planes", "froxel-fog"])
 def test_one_ray_is_the_frame_itself(variant, method):
-    renderer = prepared(read_scene(load_scene("sphere-spot", (16, 12)).scene), configuration(method))
-    np.testing.assert_array_equal(render_samples(renderer, 1).airlight, render_frame(renderer).airlight)
+    renderer = prepared(
+        read_scene(load_scene("sphere-spot", (16, 12)).scene), configuration(method)
+    )
+    np.testing.assert_array_equal(
+        render_samples(renderer, 1).airlight, render_frame(renderer).airlight
+    )
 
 
 @pytest.mark.claim("anti-aliased")
 def test_the_mean_converges_to_that_over_the_pixels(variant):
-    """16 rays err a quarter as much as the centre alone, by the quadrature of the means over pixels."""
+    """16 rays err a quarter as much as the centre alone, by the quadrature
+    of the means over pixels.
+    """
     loaded = load_scene("sphere-spot", (16, 12))
     reference = reference_image(loaded.scene, pixel="area").airlight
     renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
@@ -114,7 +137,7 @@ def test_the_mean_converges_to_that_over_the_pixels(variant):
     assert fractions == [number / 16 for number in range(1, 17)]
 
 
-# Lights on rays, by their distance -----------------------------------------------------------------------------------
+# Lights on rays, by their distance ----------------------------------------------------------------
 
 
 def render_along(method, *, position, size=(9, 9), changes=None, **parameters):
@@ -122,9 +145,9 @@ def render_along(method, *, position, size=(9, 9), changes=None, **parameters):
     scene = tiny_scene(size=size, floor=None)
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     scene["lamp"]["position"] = position
-    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (
-        changes or {}
-    )
+    scene |= {
+        "ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}
+    } | (changes or {})
     return frames.render(scene, method, **parameters)
 
 
@@ -132,11 +155,15 @@ def render_along(method, *, position, size=(9, 9), changes=None, **parameters):
 @pytest.mark.parametrize("method", FOG_METHODS)
 @pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
 def test_a_light_at_the_camera_or_on_a_ray_is_refused_by_its_distance(variant, method, position):
-    with pytest.raises(InputError, match=r"light 1 is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
+    with pytest.raises(
+        InputError, match=r"light 1 is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"
+    ):
         render_along(method, position=position)
 
 
-@pytest.mark.parametrize("position", [[0.0, -9.0, 1.0], [0.0, 9.0, 1.0], [1e-4, 0.0, 1.0], [0.0, -4.999, 1.03]])
+@pytest.mark.parametrize(
+    "position", [[0.0, -9.0, 1.0], [0.0, 9.0, 1.0], [1e-4, 0.0, 1.0], [0.0, -4.999, 1.03]]
+)
 def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, position):
     """Behind the camera, behind a wall, a little aside."""
     wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 4, 1]).scale(0.5)}
@@ -159,5 +186,6 @@ def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, para
     wanted = J * 0.31 * np.array([0.9 * 5, 0.8 * 4, 0.7 * 3]) / (4 * np.pi)
     for away in (0.0, 1e-7, 1e-4):
         found = render_along(method, position=[away, -9.0, 1.0], **parameters).airlight[4, 4]
-        # Both ends of an angle of 1/1024 are rounded to 2^-24: 1.2e-4, and as much for the places of its steps.
+        # Both ends of an angle of 1/1024 are rounded to 2^-24: 1.2e-4, and as much for
+        # the places of its steps.
         np.testing.assert_allclose(found, wanted, rtol=3e-4)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames wait for the host only as a table says, as a GPU needs it; every wait is counted, without a GPU."""
+"""Frames wait for the host only as a table says, as a GPU needs it; every wait
+is counted, without a GPU.
+"""
 
 import traceback
 from collections import Counter
@@ -33,10 +35,11 @@ FOLDERS = ("realtime", "validation", "reports")
 
 @contextmanager
 def round_trips() -> Iterator[Counter[str]]:
-    """Count, by file and function of ours, what waits for the device: reads of arrays, and sizes that arrays decide.
+    """Count, by file and function of ours, what waits for the device: reads of arrays, and
+    sizes that arrays decide.
 
-    Dr.Jit forbids what waits in any other way (`dr.JitFlag.ForbidSynchronization`): that raises. The processor takes
-    the way of a GPU where the two differ, `realtime.numerics.array_types`.
+    Dr.Jit forbids what waits in any other way (`dr.JitFlag.ForbidSynchronization`): that raises.
+    The processor takes the way of a GPU where the two differ, `realtime.numerics.array_types`.
     """
     trips: Counter[str] = Counter()
     inside = False
@@ -70,14 +73,19 @@ def round_trips() -> Iterator[Counter[str]]:
 
 
 def _flat_types() -> list[type]:
-    """Return the types of arrays without rows of the backend in use, with and without derivatives."""
+    """Return the types of arrays without rows of the backend in use, with
+    and without derivatives.
+    """
     named = {kind for name in dir(mi) if isinstance(kind := getattr(mi, name), type)}
     plain = {dr.detached_t(kind) for kind in named if dr.is_array_v(kind)}
     return sorted(
         (
             kind
             for kind in named | plain
-            if dr.is_array_v(kind) and dr.depth_v(kind) == 1 and not dr.is_tensor_v(kind) and dr.is_jit_v(kind)
+            if dr.is_array_v(kind)
+            and dr.depth_v(kind) == 1
+            and not dr.is_tensor_v(kind)
+            and dr.is_jit_v(kind)
         ),
         key=str,
     )
@@ -98,19 +106,23 @@ def _caller() -> str:
     return "a test"
 
 
-# The waits of frames -------------------------------------------------------------------------------------------------
+# The waits of frames ------------------------------------------------------------------------------
 
 
 POINTS = 4  # of an area light
-LAMP = {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+LAMP = {
+    "type": "point",
+    "position": [0.9, 0.7, 1.9],
+    "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+}
 
 MOVES = {"look": "", "camera": "camera_moved", "light": "light_moved", "objects": "geometry_moved"}
 
 READ = "realtime/numerics/array_types.py: _in_one_transfer"
 SIDES = "realtime/methods/light_volumes/jump_search.py: _jumping_sides"
 
-#: By method the moves after which a frame waits for the host, where, and how often in each of the scenes below. There
-#: is no other wait.
+#: By method the moves after which a frame waits for the host, where, and how often in each of the
+#: scenes below. There is no other wait.
 WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
     "shadow-planes": (
         ("camera", "light", "objects"),
@@ -141,7 +153,8 @@ def scenes() -> dict[str, Callable[[], dict[str, Any]]]:
 
 @pytest.fixture(scope="module")
 def elsewhere(variant) -> Iterator[Executor]:
-    """A process of its own: counting replaces methods of Dr.Jit's types, and putting them back does not heal these.
+    """A process of its own: counting replaces methods of Dr.Jit's types, and putting them
+    back does not heal these.
 
     In one process Mitsuba crashed in a later test, where a mesh was built.
     """
@@ -155,7 +168,9 @@ def waits_in_fog(scene: str, method: str) -> dict[str, Counter[str]]:
 
 
 def waits_in_clouds(method: str) -> dict[str, Counter[str]]:
-    """By what moved, the waits of a frame of a cloud, with the formula in the place of tables that take minutes."""
+    """By what moved, the waits of a frame of a cloud, with the formula in the place of
+    tables that take minutes.
+    """
     with pytest.MonkeyPatch.context() as patch:
         use_formula(patch)
         return waits_of_frames(cloud_scene(size=(8, 6)), method)
@@ -184,12 +199,16 @@ def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str
 @pytest.mark.parametrize("method", [*FOG_METHODS, "equi-angular"])
 def test_a_frame_waits_for_the_host_where_the_table_says(elsewhere, method, scene):
     moves, where, counts = WAITS.get(method, ((), "", {}))
-    expected = {name: {where: counts[scene]} if name in moves and scene in counts else {} for name in MOVES}
+    expected = {
+        name: {where: counts[scene]} if name in moves and scene in counts else {} for name in MOVES
+    }
     assert elsewhere.submit(waits_in_fog, scene, method).result() == expected
 
 
 @pytest.mark.slow
 @pytest.mark.claim("no-wait-in-a-frame")
-@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.renders_clouds])
+@pytest.mark.parametrize(
+    "method", [name for name, method in METHODS.items() if method.renders_clouds]
+)
 def test_a_frame_of_clouds_never_waits(elsewhere, method):
     assert elsewhere.submit(waits_in_clouds, method).result() == {name: {} for name in MOVES}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame does not hang on how many threads draw it. Workers of a test run have one each: this has a process apart."""
+"""A frame does not hang on how many threads draw it. Workers of a test run have one each:
+this has a process apart.
+"""
 
 import subprocess
 import sys
@@ -45,5 +47,7 @@ print("the same")
 
 @pytest.mark.slow
 def test_two_threads_draw_what_one_does():
-    done = subprocess.run([sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=600
+    )
     assert done.stdout == "the same\n", done.stderr

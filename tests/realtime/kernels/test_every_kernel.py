@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: every kernel takes a phase function that it never heard of and empty rays, or says in a line why it cannot."""
+"""Claim: every kernel takes a phase function that it never heard of and empty rays, or says
+in a line why it cannot.
+"""
 
 from dataclasses import dataclass
 
@@ -43,13 +45,20 @@ def test_a_phase_function_that_no_kernel_knows_is_taken_or_refused_in_a_line(var
 
     kernel = KERNELS[name].function
     if name in REFUSED:
-        with pytest.raises(InputError, match=r"^[^\n]*phase function 'oval'[^\n]*use the kernel [^\n]*$"):
+        with pytest.raises(
+            InputError, match=r"^[^\n]*phase function 'oval'[^\n]*use the kernel [^\n]*$"
+        ):
             kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
         return
-    reference = [quad(integrand, *ray[2:], args=tuple(ray[:2]), epsrel=1e-11)[0] for ray in zip(foot, height, x0, x1)]
+    reference = [
+        quad(integrand, *ray[2:], args=tuple(ray[:2]), epsrel=1e-11)[0]
+        for ray in zip(foot, height, x0, x1)
+    ]
     value = kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
     # Steps in the distance and a rule of 16 steps are coarse by design; the others are quadratures.
-    assert np.max(np.abs(value / reference - 1)) < {"uniform": 2e-3, "equiangular": 5e-3}.get(name, 2e-6)
+    assert np.max(np.abs(value / reference - 1)) < {"uniform": 2e-3, "equiangular": 5e-3}.get(
+        name, 2e-6
+    )
 
 
 @pytest.mark.parametrize("name", sorted(set(KERNELS) - {"uniform", "equiangular", "table"}))
@@ -74,7 +83,9 @@ def test_numbers_that_a_kernel_does_not_have_are_refused(variant, name, paramete
 
 @pytest.mark.parametrize("name", ["quadrature", "exact"])
 def test_a_light_beside_the_segment_on_the_ray(variant, name):
-    """Height 0: the closed form int exp(-sigma_t (x + |x - t|)) / (x - t)^2 dx, behind and before the light."""
+    """Height 0: the closed form int exp(-sigma_t (x + |x - t|)) / (x - t)^2 dx,
+    behind and before the light.
+    """
     values = kernel_values(KERNELS[name].function, ([-0.5, 2.5], 0.0, 0.0, 1.0, 0.7))
     for value, t in zip(values, (-0.5, 2.5), strict=True):
         expected = quad(lambda x, t=t: np.exp(-0.7 * (x + abs(x - t))) / (x - t) ** 2, 0, 1)[0]
@@ -87,7 +98,10 @@ def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
     """Dr.Jit wraps what is raised there: `random:13` ended `airlight render` with a traceback."""
     entries = tiny_scene()
     fog = entries["fog"] | {"phase": {"type": "tabphase", "values": "1.1, 0.4, 1.7"}}
-    block = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31)}
+    block = {
+        "type": "cube",
+        "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31),
+    }
     scene = read_scene(mi.load_dict(entries | {"fog": fog, "ball": block}))
     with pytest.raises(InputError, match="no Taylor series"):
         render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["taylor"]))

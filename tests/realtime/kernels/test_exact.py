@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the default kernel is right in every limit, on rays of every magnitude, in colour and in soft spots."""
+"""Claim: the default kernel is right in every limit, on rays of every magnitude, in
+colour and in soft spots.
+"""
 
 from itertools import pairwise
 
@@ -35,17 +37,25 @@ NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 
 def g_of(name, count):
     """One mean cosine for each ray: the sharpest forward and backward lobes, and those between."""
-    return np.resize([-0.95, -0.5, 0.0, 0.5, 0.95], count).astype(np.float32).astype(float) if name == "hg" else 0.0
+    return (
+        np.resize([-0.95, -0.5, 0.0, 0.5, 0.95], count).astype(np.float32).astype(float)
+        if name == "hg"
+        else 0.0
+    )
 
 
 def many_rays(count, seed):
-    """Segments of every length, unbounded ones too; optical depth 1e-6 to 50; heights down to 1e-7 of the distance."""
+    """Segments of every length, unbounded ones too; optical depth 1e-6 to 50; heights down
+    to 1e-7 of the distance.
+    """
     rng = np.random.default_rng(seed)
     height = 10 ** rng.uniform(-7, 0, count)
     foot = rng.choice([-1, 1], count) * np.sqrt(1 - np.minimum(height, 1) ** 2)
     x0 = np.where(rng.random(count) < 0.5, 0, 10 ** rng.uniform(-3, 1, count))
     # A quarter about the foot, where the range of v is largest.
-    x0 = np.where(rng.random(count) < 0.25, np.maximum(foot - height * 10 ** rng.uniform(-2, 2, count), 0), x0)
+    x0 = np.where(
+        rng.random(count) < 0.25, np.maximum(foot - height * 10 ** rng.uniform(-2, 2, count), 0), x0
+    )
     length = 10 ** rng.uniform(-4, 2, count)
     x1 = np.where(rng.random(count) < 0.2, np.inf, x0 + length)
     sigma_t = 10 ** rng.uniform(-6, 1.7, count) / (x0 + np.hypot(x0 - foot, height))
@@ -55,13 +65,18 @@ def many_rays(count, seed):
 @pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize("name", NAMES)
 def test_rays_of_every_magnitude(name):
-    """Rounding: the exponent's, 6e-8 times an optical depth of up to 80; in float64 the nodes leave 1e-11."""
+    """Rounding: the exponent's, 6e-8 times an optical depth of up to 80; in
+    float64 the nodes leave 1e-11.
+    """
     rays, g = many_rays(3000, 8), g_of(name, 3000)
     expected = true_values(rays, name, g)
     error = relative_error(kernel_values(exact, rays, name, g), expected)
     assert error.max() < 1e-5
     assert np.percentile(error, 99) < 3e-6
-    assert relative_error(kernel_values(exact, rays, name, g, precision="double"), expected).max() < 1e-10
+    assert (
+        relative_error(kernel_values(exact, rays, name, g, precision="double"), expected).max()
+        < 1e-10
+    )
 
 
 @pytest.mark.claim("infinite-through-the-light")
@@ -81,36 +96,55 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(name):
     for extinctions in ((0.2, 0.3, 0.5), (0.0, 0.01, 8.0), (1e-3, 30.0, 1.0)):
         channels = opaque(tuple(types.scalar(extinction) for extinction in extinctions))
         medium = Homogeneous(channels, types.color(1), phase_of(name, 0.8, types.scalar))
-        colour = np.array(exact(RayGeometry(*columns[:2]), *columns[2:], medium, Light(None, None)), dtype=np.float64)
+        colour = np.array(
+            exact(RayGeometry(*columns[:2]), *columns[2:], medium, Light(None, None)),
+            dtype=np.float64,
+        )
         for channel, sigma_t in zip(colour, extinctions, strict=True):
-            seen = sigma_t * (x0 + np.hypot(x0 - foot, height)) < 70  # what is dimmer is not worth a number
+            # what is dimmer is not worth a number
+            seen = sigma_t * (x0 + np.hypot(x0 - foot, height)) < 70
             grey = kernel_values(exact, (foot, height, x0, x1, sigma_t), name, 0.8)
-            # Each rounds its exponent, to 6e-8 of the depth, in its own way where they take different rules.
+            # Each rounds its exponent, to 6e-8 of the depth, in its own way where
+            # they take different rules.
             assert channel[seen] == pytest.approx(grey[seen], rel=1e-5)
 
 
-def in_soft_spot(origin, direction, *, cutoff, beam, precision, kernel=exact, name="isotropic", end=np.inf):
-    """Return J of rays by a kernel in a soft spot at the origin that shines along -z, and their geometry."""
+def in_soft_spot(
+    origin, direction, *, cutoff, beam, precision, kernel=exact, name="isotropic", end=np.inf
+):
+    """Return J of rays by a kernel in a soft spot at the origin that shines
+    along -z, and their geometry.
+    """
     types = array_types(precision)
     fields = spot_fields([0, 0, -1.0], np.radians(cutoff), np.radians(beam), types)
     light = opaque(Light(types.vector(0), types.color(1), **fields))
-    vectors = (types.vector(*(aligned_array(types.scalar, row) for row in v)) for v in (origin, direction))
+    vectors = (
+        types.vector(*(aligned_array(types.scalar, row) for row in v)) for v in (origin, direction)
+    )
     rays = ray_geometry(*vectors, light)
-    medium = opaque(Homogeneous((types.scalar(0.3),), types.color(1), phase_of(name, 0, types.scalar)))
+    medium = opaque(
+        Homogeneous((types.scalar(0.3),), types.color(1), phase_of(name, 0, types.scalar))
+    )
     zero, far = (aligned_array(types.scalar, np.full(len(origin[0]), x)) for x in (0.0, end))
     return np.array(kernel(rays, *rays.lit_segment(zero, far), medium, light)), rays
 
 
 @pytest.mark.parametrize(("cutoff", "beam"), [(40, 0.0), (20, 0.4), (60, 50), (80, 5)])
 def test_soft_spots_against_the_reference(cutoff, beam):
-    """A ray that passes close to the axis of a narrow beam sees almost a kink: without a cut there 6e-3 was left."""
+    """A ray that passes close to the axis of a narrow beam sees almost a kink: without a
+    cut there 6e-3 was left.
+    """
     rng = np.random.default_rng(3)
     count = 400
     origin = rng.normal(size=(3, count)) + 1.5
     target = np.stack([*(0.2 * rng.normal(size=(2, count))), -rng.uniform(0.1, 2, count)])
     direction = (target - origin) / np.linalg.norm(target - origin, axis=0)
-    double, rays = in_soft_spot(origin, direction, cutoff=cutoff, beam=beam, precision="double", name="rayleigh", end=9)
-    single, _ = in_soft_spot(origin, direction, cutoff=cutoff, beam=beam, precision="single", name="rayleigh", end=9)
+    double, rays = in_soft_spot(
+        origin, direction, cutoff=cutoff, beam=beam, precision="double", name="rayleigh", end=9
+    )
+    single, _ = in_soft_spot(
+        origin, direction, cutoff=cutoff, beam=beam, precision="single", name="rayleigh", end=9
+    )
 
     def weight(x, row):
         point = origin[:, row, None] + direction[:, row, None] * x
@@ -120,10 +154,16 @@ def test_soft_spots_against_the_reference(cutoff, beam):
     foot = -np.sum(origin * direction, axis=0)
     height = np.linalg.norm(np.cross(origin.T, direction.T), axis=1)
     enter, leave, first, last = (
-        np.clip(np.array(end), 0, 9) for end in (rays.enter, rays.leave, rays.beam_enter, rays.beam_leave)
+        np.clip(np.array(end), 0, 9)
+        for end in (rays.enter, rays.leave, rays.beam_enter, rays.beam_leave)
     )
     closest = np.clip(foot - origin[2] / direction[2], enter, leave)
-    ends = np.sort(np.stack([enter, np.clip(first, enter, leave), np.clip(last, enter, leave), leave, closest]), axis=0)
+    ends = np.sort(
+        np.stack(
+            [enter, np.clip(first, enter, leave), np.clip(last, enter, leave), leave, closest]
+        ),
+        axis=0,
+    )
     expected = np.zeros(count)
     for a, b in pairwise(ends):
         part, _ = airlight_segments(foot, height, a, b, 0.3, Rayleigh(), weight=weight, rtol=1e-9)
@@ -135,14 +175,24 @@ def test_soft_spots_against_the_reference(cutoff, beam):
     assert np.max(np.abs(single[bright] / expected[bright] - 1)) < 1e-4
 
 
-SOFT = ("exact", "quadrature", "quadrature-theta", "taylor", "taylor-printed", "equiangular", "uniform")
+SOFT = (
+    "exact",
+    "quadrature",
+    "quadrature-theta",
+    "taylor",
+    "taylor-printed",
+    "equiangular",
+    "uniform",
+)
 
 
 @pytest.mark.parametrize("name", SOFT)
 def test_unbounded_rays_that_stay_in_the_beam_of_a_soft_spot(name):
-    """The piece behind the beam is empty and at infinity: values were not finite in five of 440 random scenes.
+    """The piece behind the beam is empty and at infinity: values were not finite in
+    five of 440 random scenes.
 
-    Expected: the reference, without a weight in the beam, to what each kernel is known for. Uniform steps have no end.
+    Expected: the reference, without a weight in the beam, to what each kernel is known for.
+    Uniform steps have no end.
     """
     rng = np.random.default_rng(7)
     count = 200
@@ -150,13 +200,20 @@ def test_unbounded_rays_that_stay_in_the_beam_of_a_soft_spot(name):
     aim = np.stack([*(0.1 * rng.normal(size=(2, count))), -np.ones(count)])
     direction = aim / np.linalg.norm(aim, axis=0)
     kernel = KERNELS[name].function
-    value, rays = in_soft_spot(origin, direction, cutoff=40, beam=25, precision="single", kernel=kernel)
+    value, rays = in_soft_spot(
+        origin, direction, cutoff=40, beam=25, precision="single", kernel=kernel
+    )
     assert np.all(np.isinf(np.array(rays.beam_leave)))
     assert np.all(np.isfinite(value))
-    foot, height = -np.sum(origin * direction, axis=0), np.linalg.norm(np.cross(origin.T, direction.T), axis=1)
+    foot, height = (
+        -np.sum(origin * direction, axis=0),
+        np.linalg.norm(np.cross(origin.T, direction.T), axis=1),
+    )
     known = {"exact": 1e-5, "quadrature": 1e-4, "quadrature-theta": 1e-2, "equiangular": 0.1}
     if name in known:
-        assert value == pytest.approx(true_values((foot, height, 0.0, np.inf, 0.3)), rel=known[name])
+        assert value == pytest.approx(
+            true_values((foot, height, 0.0, np.inf, 0.3)), rel=known[name]
+        )
 
 
 #: Rounding left aside, the rule leaves 5e-7, 8e-7 of cos^64; it was tuned on other rays.
@@ -183,7 +240,7 @@ def test_what_the_rule_of_panels_leaves_without_rounding(name):
     assert np.abs(rule[long_enough] / reference[long_enough] - 1).max() < LEFT
 
 
-# Certified values, in both precisions --------------------------------------------------------------------------------
+# Certified values, in both precisions -------------------------------------------------------------
 
 
 FEET, RAYS, DROPLETS = (f"airlight_integral{name}.csv" for name in ("", "_rays", "_droplets"))
@@ -211,7 +268,9 @@ def certified_errors(cases, kernel, precision):
     return relative_error(values, cases.value)
 
 
-@pytest.mark.claim("exact-keeps-its-bar", tolerance="3e-5, 1e-4 where |g| > 0.9; 99 % 3e-6, median 3e-7")
+@pytest.mark.claim(
+    "exact-keeps-its-bar", tolerance="3e-5, 1e-4 where |g| > 0.9; 99 % 3e-6, median 3e-7"
+)
 @pytest.mark.claim("exact-in-float32", tolerance="4e-6 and 1.5e-5 relative, the figures stated")
 def test_exact_in_single_precision(variant, cases):
     error = certified_errors(cases, "exact", "single")
@@ -229,8 +288,9 @@ def test_exact_in_double_precision(variant, cases):
     assert certified_errors(cases, "exact", "double").max() < 1e-10
 
 
-# Sixteen nodes leave 4e-6 of isotropic light, as the double precision shows; float32 adds the rounding of the
-# exponent, 6e-8 times an optical depth of up to 100. Lobes of g up to 0.98 are wider than sixteen nodes resolve.
+# Sixteen nodes leave 4e-6 of isotropic light, as the double precision shows; float32 adds the
+# rounding of the exponent, 6e-8 times an optical depth of up to 100. Lobes of g up to 0.98 are
+# wider than sixteen nodes resolve.
 @pytest.mark.claim("quadrature-kernel")
 @pytest.mark.parametrize(
     ("kernel", "precision", "phases", "bound"),

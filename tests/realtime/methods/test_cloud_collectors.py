@@ -48,7 +48,9 @@ ALONG = np.asarray(TURN) @ (0.48, 0.36, -0.8)
 
 def _scene(**parts):
     parts = parts or {"sun": _sun(ALONG), "slab": _slab()}
-    sensor = camera((30.83, -400.91, 257.03), (3.17, 0.29, 1.49), fov=47.9, size=(16, 12), in_fog=False)
+    sensor = camera(
+        (30.83, -400.91, 257.03), (3.17, 0.29, 1.49), fov=47.9, size=(16, 12), in_fog=False
+    )
     return {"type": "scene", "sensor": sensor} | parts
 
 
@@ -70,11 +72,15 @@ def _rays(scene, precision="single"):
     camera = read_scene(mi.load_dict(scene), precision).camera
     pixels = mi.UInt32(np.arange(camera.width * camera.height))
     directions = np.array(ray_directions(camera, pixels)[0]).T
-    return np.array(camera.origin, dtype=float).ravel(), directions.reshape(camera.height, camera.width, 3)
+    return np.array(camera.origin, dtype=float).ravel(), directions.reshape(
+        camera.height, camera.width, 3
+    )
 
 
 def _transported(directions, depth):
-    """Return the light of a sun of irradiance 1 that the transport says, at a depth below the lit face of the slab."""
+    """Return the light of a sun of irradiance 1 that the transport says, at a depth below
+    the lit face of the slab.
+    """
     normal, horizontal = np.asarray(TURN)[:, 2], np.asarray(TURN) @ (0.8, 0.6, 0.0)
     angles = (-directions @ axis for axis in (normal, horizontal, np.cross(normal, horizontal)))
     return sum(WEIGHTS) * Formula.radiance(EXTINCTION * THICKNESS, EXTINCTION * depth, *angles, 0.8)
@@ -86,10 +92,13 @@ def test_a_slab_sends_back_what_the_transport_says(variant):
     image = _airlight(scene, iterations=30)
     _, directions = _rays(scene)
     expected = _transported(directions, 0)
-    shown = directions @ np.asarray(TURN)[:, 2] < -0.3  # rays that come down on the slab, far from its sides
+    # rays that come down on the slab, far from its sides
+    shown = directions @ np.asarray(TURN)[:, 2] < -0.3
     assert shown.mean() > 0.3
     for channel, irradiance in enumerate((3.1, 2.9, 2.3)):
-        np.testing.assert_allclose(image[shown][:, channel], irradiance * expected[shown], rtol=4e-3)
+        np.testing.assert_allclose(
+            image[shown][:, channel], irradiance * expected[shown], rtol=4e-3
+        )
 
 
 def test_suns_add_up_and_so_does_a_sky_as_a_beam(variant):
@@ -116,10 +125,18 @@ def test_the_peak_lowers_the_density(variant):
     fraction = fraction_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
     thin = _slab(medium=DROPLETS | {"sigma_t": (1 - fraction) * EXTINCTION})
     matched = _airlight(_scene(), peak="matched")
-    np.testing.assert_allclose(matched, _airlight(_scene(sun=_sun(ALONG), slab=thin)), rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(
+        matched, _airlight(_scene(sun=_sun(ALONG), slab=thin)), rtol=1e-3, atol=1e-6
+    )
     published = {"method": "cloud-collectors-2008", "sky": "uniform"}
-    assert _airlight(_scene(), peak="half", thickness="slab", **published).mean() < 0.95 * matched.mean()
-    assert _airlight(_scene(), thickness="light", **published).mean() > 1.02 * _airlight(_scene()).mean()
+    assert (
+        _airlight(_scene(), peak="half", thickness="slab", **published).mean()
+        < 0.95 * matched.mean()
+    )
+    assert (
+        _airlight(_scene(), thickness="light", **published).mean()
+        > 1.02 * _airlight(_scene()).mean()
+    )
 
 
 def test_a_camera_in_the_cloud_is_its_point(variant):
@@ -139,7 +156,9 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
 def test_the_last_frame_s_collectors_go_on(variant, monkeypatch):
     """Three steps a frame end where forty end."""
     slabs_as_they_are(monkeypatch)
-    scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
+    scene = cloud_scene(
+        (64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring())
+    )
     whole = _airlight(scene, iterations=40)
     options = {"peak": "full", "extra_layers": True}
     renderer = _renderer(scene, start="previous", iterations=3, **options)
@@ -158,7 +177,9 @@ def test_the_last_frame_s_collectors_go_on(variant, monkeypatch):
 
 @pytest.mark.claim("collector-shade", tolerance="1 % in the middle of the shade and beside it")
 def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
-    """Each cloud has its own maps: vacuum between two is no matter, and light fades on its way through the other."""
+    """Each cloud has its own maps: vacuum between two is no matter, and light fades on
+    its way through the other.
+    """
     normal, side = np.asarray(TURN)[:, 2], 20.0
     far = cloud("far", placed(box((300.0, 300.0, side)), tuple(MIDDLE - 900.0 * ALONG), TURN))
     alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
@@ -171,9 +192,13 @@ def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
     assert fraction[alone > 0].min() > 0.98 * faded
 
 
-@pytest.mark.claim("uniform-sky-total", tolerance="1e-3: the fractions of a slab add up to 1, in float32")
+@pytest.mark.claim(
+    "uniform-sky-total", tolerance="1e-3: the fractions of a slab add up to 1, in float32"
+)
 def test_of_a_uniform_sky_comes_as_much_as_clouds_take(variant):
-    """A cloud that absorbs nothing cannot be told from the sky around it; layers add up, and order 1 is a part."""
+    """A cloud that absorbs nothing cannot be told from the sky around it; layers add
+    up, and order 1 is a part.
+    """
     sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}
     frame = _frame(_scene(sky=sky, cloud=cloud("ring", ring())), extra_layers=True)
     total = np.array([0.11, 0.17, 0.31]) * np.array(frame.extra["opacity"])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: octaves are what their formula says; clouds dim what lies behind and below them; others refuse clouds."""
+"""Claim: octaves are what their formula says; clouds dim what lies behind and below
+them; others refuse clouds.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -35,7 +37,9 @@ rendered = partial(render, method=OCTAVES)
 def directions(scene):
     """Return the unit directions of the rays of a Mitsuba scene of 16 x 12 pixels, (12, 16, 3)."""
     pixel = mi.UInt32(np.arange(16 * 12, dtype=np.uint32))
-    return np.array(ray_directions(read_scene(scene, "double").camera, pixel)[0]).T.reshape(12, 16, 3)
+    return np.array(ray_directions(read_scene(scene, "double").camera, pixel)[0]).T.reshape(
+        12, 16, 3
+    )
 
 
 def slab(thickness=31.7, size=9000.0, middle=0.0):
@@ -45,8 +49,12 @@ def slab(thickness=31.7, size=9000.0, middle=0.0):
 @pytest.mark.claim("octaves", tolerance="5e-4 relative: 48 steps in float32")
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_octaves_in_a_slab_are_their_integrals(precision):
-    """Seen from above, octave n is b^n P_n mu0/(mu0 + a^n mu) (1 - exp(-tau (1/mu + a^n/mu0)))/(4 pi)."""
-    scene = mi.load_dict(cloud_scene(origin=(30.0, -400.0, 700.0), sun=SUN, slab=cloud("slab", slab())))
+    """Seen from above, octave n is b^n P_n mu0/(mu0 + a^n mu) (1 - exp(-tau
+    (1/mu + a^n/mu0)))/(4 pi).
+    """
+    scene = mi.load_dict(
+        cloud_scene(origin=(30.0, -400.0, 700.0), sun=SUN, slab=cloud("slab", slab()))
+    )
     numbers = {"octaves": 3, "extinction": 0.4, "contribution": 0.3, "anisotropy": 0.6, "steps": 48}
     frame = rendered(scene, precision=precision, extra_layers=True, **numbers)
     direction = directions(scene)
@@ -62,7 +70,9 @@ def test_octaves_in_a_slab_are_their_integrals(precision):
     assert list(frame.extra) == ["airlight_1", "airlight_2", "airlight_3_4", OPACITY]
     for name, octave in zip(frame.extra, expected):
         assert frame.extra[name] == pytest.approx(octave, rel=5e-4)
-    assert frame.extra[OPACITY] == pytest.approx(np.broadcast_to(1 - np.exp(-tau / mu), (12, 16, 3)), rel=1e-4)
+    assert frame.extra[OPACITY] == pytest.approx(
+        np.broadcast_to(1 - np.exp(-tau / mu), (12, 16, 3)), rel=1e-4
+    )
 
 
 @pytest.mark.claim("cloud-layers")
@@ -82,29 +92,44 @@ def test_the_sky_is_seen_through_clouds_and_lights_them_from_above():
     frame = rendered(mi.load_dict(cloud_scene(**parts)), octaves=1, sky="beams", extra_layers=True)
     sky = np.array(SKY["radiance"]["value"])
     assert frame.surface == pytest.approx((1 - frame.extra[OPACITY]) * sky, rel=1e-5)
-    down = SUN | {"direction": [0, 0, -1.0], "irradiance": {"type": "rgb", "value": list(np.pi * sky)}}
+    down = SUN | {
+        "direction": [0, 0, -1.0],
+        "irradiance": {"type": "rgb", "value": list(np.pi * sky)},
+    }
     lit = rendered(mi.load_dict(cloud_scene(**(parts | {"sky": down}))), octaves=1)
     assert frame.airlight == pytest.approx(lit.airlight, rel=1e-5)
     assert lit.surface.max() == 0
 
 
 def test_light_that_came_through_a_cloud_falls_on_the_ground():
-    """Under a slab the ground has rho E mu0/pi exp(-tau/mu0); a part beyond its edge has all of it."""
-    ground = mitsuba_mesh("ground", grid((-4000, -4000, -200), (8000, 0, 0), (0, 8000, 0), (1, 1)), (0.4, 0.3, 0.2))
+    """Under a slab the ground has rho E mu0/pi exp(-tau/mu0); a part
+    beyond its edge has all of it.
+    """
+    ground = mitsuba_mesh(
+        "ground", grid((-4000, -4000, -200), (8000, 0, 0), (0, 8000, 0), (1, 1)), (0.4, 0.3, 0.2)
+    )
     origin = (30.0, -300.0, 350.0)
-    scene = mi.load_dict(cloud_scene(origin=origin, sun=SUN, slab=cloud("slab", slab()), ground=ground))
+    scene = mi.load_dict(
+        cloud_scene(origin=origin, sun=SUN, slab=cloud("slab", slab()), ground=ground)
+    )
     frame = rendered(scene)
     mu0 = 0.619 / np.linalg.norm(SUN["direction"])
     full = np.array([0.4, 0.3, 0.2]) * np.array([3.1, 2.9, 2.3]) * mu0 / np.pi
     through = np.exp(-SIGMA * 31.7 * (1 / mu0 + 1 / -directions(scene)[..., 2:]))
     assert frame.surface == pytest.approx(full * through, rel=3e-4)
-    away = cloud_scene(origin=origin, sun=SUN, ring=cloud("ring", ring((3000.0, 0.0, 900.0))), ground=ground)
-    assert rendered(mi.load_dict(away)).surface[-1] == pytest.approx(np.tile(full, (16, 1)), rel=1e-5)
+    away = cloud_scene(
+        origin=origin, sun=SUN, ring=cloud("ring", ring((3000.0, 0.0, 900.0))), ground=ground
+    )
+    assert rendered(mi.load_dict(away)).surface[-1] == pytest.approx(
+        np.tile(full, (16, 1)), rel=1e-5
+    )
 
 
 def test_surfaces_shadow_clouds():
     """A roof over the slab takes all light of the sun."""
-    roof = mitsuba_mesh("roof", grid((-4e4, -4e4, 900), (8e4, 0, 0), (0, 8e4, 0), (1, 1)), (0.4, 0.3, 0.2))
+    roof = mitsuba_mesh(
+        "roof", grid((-4e4, -4e4, 900), (8e4, 0, 0), (0, 8e4, 0), (1, 1)), (0.4, 0.3, 0.2)
+    )
     scene = cloud_scene(origin=(30.0, -40.0, 700.0), sun=SUN, slab=cloud("slab", slab()), roof=roof)
     assert rendered(mi.load_dict(scene)).airlight.max() == 0
 
@@ -126,7 +151,9 @@ def test_up_is_what_is_upright_in_the_image(origin, sun, axis):
 
 @pytest.mark.parametrize(("sign", "phase"), [(1, "hg:0.95"), (-1, "hg-draine:12")])
 def test_the_sun_in_the_axis_of_the_view(sign, phase):
-    """Scattering angles of 0 and 180 degrees exactly: the eye looks into the sun, or has it behind."""
+    """Scattering angles of 0 and 180 degrees exactly: the eye looks into
+    the sun, or has it behind.
+    """
     scene = loaded()
     middle = directions(scene)[6, 8]
     sun = SUN | {"direction": (-sign * middle).tolist()}
@@ -142,9 +169,15 @@ LAMP = {"type": "point", "position": [0.0, 0.0, 300.0], "intensity": {"type": "r
 
 @pytest.mark.claim("clouds-refused")
 def test_what_is_not_lit_from_infinity_is_refused():
-    with pytest.raises(InputError, match="cloud-octaves: the scene has a light of kind point, and clouds are lit from"):
+    with pytest.raises(
+        InputError,
+        match="cloud-octaves: the scene has a light of kind point, and clouds are lit from",
+    ):
         rendered(loaded(sun=SUN, lamp=LAMP, ring=cloud("ring", ring())))
-    panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}}}
+    panel = {
+        "type": "rectangle",
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}},
+    }
     with pytest.raises(InputError, match=r"a light of kind area \(rectangle\)"):
         rendered(loaded(sun=SUN, panel=panel, ring=cloud("ring", ring())))
 
@@ -158,7 +191,9 @@ def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
     with pytest.raises(InputError, match=wanted):
         frame_renderer(read_scene(loaded()), method, **kernel)
     with pytest.raises(InputError, match=wanted):
-        frame_renderer(read_scene(loaded(sun=SUN, sky=SKY, slab=cloud("slab", slab()))), method, **kernel)
+        frame_renderer(
+            read_scene(loaded(sun=SUN, sky=SKY, slab=cloud("slab", slab()))), method, **kernel
+        )
 
 
 def test_frames_after_the_sun_moved_and_the_cloud_thickened():
@@ -172,6 +207,8 @@ def test_frames_after_the_sun_moved_and_the_cloud_thickened():
     thick = replace(read, medium=thicker_medium(read.medium, 2.0))
     stages, cache = next_frame(renderer, thick, cache, **still)
     now = image_frame(renderer, stages, cache.extra)
-    new = rendered(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring(), DROPLETS | {"sigma_t": 2 * SIGMA})))
+    new = rendered(
+        loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring(), DROPLETS | {"sigma_t": 2 * SIGMA}))
+    )
     assert now.airlight == pytest.approx(new.airlight, rel=1e-4, abs=1e-7)
     assert now.extra[OPACITY].mean() > first.extra[OPACITY].mean()

@@ -25,7 +25,9 @@ def shadowed() -> dict[str, dict[str, Any]]:
     """Return sunlit shadowed with occluders that are meshes, by what is hard about them."""
     beam = solid_box((0.5, 0.4, 0.3), (0.33, 0.27, 1.75))
     return {
-        "two media": shaded(solid=beam, plank=plank(), other=solid_box((0.2, 0.3, 0.9), (-0.6, 0.1, 2.6))),
+        "two media": shaded(
+            solid=beam, plank=plank(), other=solid_box((0.2, 0.3, 0.9), (-0.6, 0.1, 2.6))
+        ),
         # Four sides of the box are edge-on, and its upright edges are points as the light sees it.
         "parallel to edges": shaded(solid=beam, lamp=sun((0.0, 0.0, -1.0))),
     }
@@ -38,7 +40,8 @@ def test_shadow_planes_are_the_reference(variant, name):
     loaded = read(scene, "double")
     unshadowed = render(loaded).airlight
     assert relative_rmse(unshadowed, reference) > 0.02  # there is a shadow
-    # The panels of two media leave 3e-6 without any shadow; the rest is the reference's rays, cast in float32.
+    # The panels of two media leave 3e-6 without any shadow; the rest is the
+    # reference's rays, cast in float32.
     allowed = 1e-5 if name == "two media" else 2e-6
     assert relative_rmse(render(loaded, "shadow-planes").airlight, reference) < allowed
     assert relative_rmse(render(scene, "shadow-planes").airlight, reference) < 5e-5
@@ -52,21 +55,32 @@ def test_slices_come_to_the_reference_as_the_map_grows(variant, name):
     scene = shaded(solid=solid_box((0.5, 0.4, 0.3), (0.33, 0.27, 1.75)))
     if name == "along the view":
         # The image of the light is the middle of the image: rays beside it lie along the slices.
-        scene = shaded(solid=solid_box((0.4, 0.3, 0.3), (0.753, -1.67, 1.17)), lamp=sun((-0.1, 4.1, -0.7)))
+        scene = shaded(
+            solid=solid_box((0.4, 0.3, 0.3), (0.753, -1.67, 1.17)), lamp=sun((-0.1, 4.1, -0.7))
+        )
     reference = reference_image(mi.load_dict(scene)).airlight
     loaded = read(scene)
-    errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, reference) for size in (64, 1024)]
+    errors = [
+        relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, reference)
+        for size in (64, 1024)
+    ]
     # A texel of the slanted walls at every jump, in a shadow that takes a fair part of the light.
     assert errors[1] < min(0.05, 0.4 * errors[0])
     # The height field of the map itself, with slanted walls, is about as far from the reference.
-    walked = relative_rmse(render(loaded, "light-volumes", map=1024, walls="slanted").airlight, reference)
+    walked = relative_rmse(
+        render(loaded, "light-volumes", map=1024, walls="slanted").airlight, reference
+    )
     assert errors[1] < 3 * walked + 2e-3
 
 
 def summed(scene, distance, lit):
-    """Sum the airlight of the sun over small steps of every chord of the box of fog; `scene` is for its camera."""
+    """Sum the airlight of the sun over small steps of every chord of the box of fog;
+    `scene` is for its camera.
+    """
     chord = airlight_sum.box(CUBE_AT, 0.5 * SIDES, TURN)
-    box = airlight_sum.Body(chord, np.full(3, 1.1), np.array([0.2, 0.5, 0.9]), airlight_sum.henyey_greenstein(0.4))
+    box = airlight_sum.Body(
+        chord, np.full(3, 1.1), np.array([0.2, 0.5, 0.9]), airlight_sum.henyey_greenstein(0.4)
+    )
     light = airlight_sum.Light(-unit(ALONG), 0.0, np.array([3.0, 2.0, 1.0]))
     origin, directions = rays(scene)
     image = [
@@ -77,12 +91,15 @@ def summed(scene, distance, lit):
 
 
 def height_field(scene, size):
-    """Return the function that tells whether points are lit by the triangles over the texels of a map."""
+    """Return the function that tells whether points are lit by the triangles
+    over the texels of a map.
+    """
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], size)
     vectors = scene.lights[0].position, *shadow_map.projection.basis
     position, across, up, axis = (np.array(vector, dtype=float).ravel() for vector in vectors)
     depth = np.array(shadow_map.distance, dtype=float).reshape(size + 1, size + 1)
-    # Where nothing is hit the height is 0 at the plane where the media end, and at any depth behind it the same.
+    # Where nothing is hit the height is 0 at the plane where the media end, and at any
+    # depth behind it the same.
     height = np.maximum(float(shadow_map.projection.depth[0]) - depth, 0)
 
     def lit(point):
@@ -114,6 +131,8 @@ def test_the_walk_against_steps_through_the_height_field(variant):
 def test_a_map_of_rays_that_miss_all_media(variant):
     """A camera that looks away from the media: points at infinity have no place in a map."""
     scene = shaded(size=(8, 8), floor=None)
-    scene["sensor"] |= {"to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, -9.0, 4.6], [0, 0, 1])}
+    scene["sensor"] |= {
+        "to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, -9.0, 4.6], [0, 0, 1])
+    }
     for method, parameters in (("ray-march", {"shadow": "map"}), ("light-volumes", {})):
         assert np.all(render(scene, method, **parameters).airlight == 0)

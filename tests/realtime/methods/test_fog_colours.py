@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Closed forms of fog shading: what shaders print, thin fog, and how much too bright their ambient light is."""
+"""Closed forms of fog shading: what shaders print, thin fog, and how much too
+bright their ambient light is.
+"""
 
 import numpy as np
 import pytest
@@ -39,13 +41,19 @@ def shown(loaded, form, kernel=None):
     return render_frame(frame)
 
 
-@pytest.mark.claim("fog-colours", tolerance="1e-4 relative: float32, and the series of the shader is exact here")
+@pytest.mark.claim(
+    "fog-colours", tolerance="1e-4 relative: float32, and the series of the shader is exact here"
+)
 def test_colours_are_what_shaders_print(scene):
     loaded = scene(SUN, SKY)
     sensor = loaded.sensors()[0]
     ways = film_directions(sensor, pixel_centres((8, 6)), (8, 6)).reshape(6, 8, 3)
     towards = -np.array([0.5, 0.3, -0.45]) / np.linalg.norm([0.5, 0.3, -0.45])
-    sky, sun, albedo = np.array([0.2, 0.3, 0.4]), np.array([3, 2.6, 2.1]), np.array([0.9, 0.85, 0.7])
+    sky, sun, albedo = (
+        np.array([0.2, 0.3, 0.4]),
+        np.array([3, 2.6, 2.1]),
+        np.array([0.9, 0.85, 0.7]),
+    )
     cosine = np.maximum(ways @ towards, 0)[..., None]
     for form, lobe in (("wenzel", 1), ("quilez", 18 * cosine**8), ("unreal", 10 * cosine**4)):
         frame = shown(loaded, form)
@@ -53,18 +61,34 @@ def test_colours_are_what_shaders_print(scene):
         length = np.minimum(np.asarray(frame.distance, dtype=np.float64), ends)
         # HeightFogCommon.ush, in cm: density and falloff over 1000, 2^-x for both.
         fall = 100 * FALLOFF / 1000 * ways[..., 2] * length
-        line = DENSITY / 1000 * 2 ** (-100 * FALLOFF / 1000 * (2.3 - BASE)) * (1 - 2**-fall) / fall * 100 * length
+        line = (
+            DENSITY
+            / 1000
+            * 2 ** (-100 * FALLOFF / 1000 * (2.3 - BASE))
+            * (1 - 2**-fall)
+            / fall
+            * 100
+            * length
+        )
         amount = 1 - 2**-line
-        if form == "quilez":  # (a/b) exp(-b y) (1 - exp(-b t dy))/dy, with the a and b of the same fog
+        # (a/b) exp(-b y) (1 - exp(-b t dy))/dy, with the a and b of the same fog
+        if form == "quilez":
             a, b = np.log(2) ** 2 * DENSITY / 10, np.log(2) * FALLOFF / 10
             amount = np.minimum(
-                a / b * np.exp(-b * (2.3 - BASE)) * (1 - np.exp(-b * length * ways[..., 2])) / ways[..., 2], 1
+                a
+                / b
+                * np.exp(-b * (2.3 - BASE))
+                * (1 - np.exp(-b * length * ways[..., 2]))
+                / ways[..., 2],
+                1,
             )
         expected = albedo * (sky + sun * lobe / (4 * np.pi)) * amount[..., None]
         np.testing.assert_allclose(frame.airlight, expected, rtol=1e-4)
 
 
-@pytest.mark.claim("fog-colours", tolerance="0.5 %: the optical depth to the sun in fog a thousandth as dense")
+@pytest.mark.claim(
+    "fog-colours", tolerance="0.5 %: the optical depth to the sun in fog a thousandth as dense"
+)
 def test_one_colour_is_the_airlight_of_thin_fog_that_scatters_evenly(scene):
     def thin(text):
         even = '<phase type="isotropic"/><float name="scale" value="0.001"/>'
@@ -72,7 +96,9 @@ def test_one_colour_is_the_airlight_of_thin_fog_that_scatters_evenly(scene):
 
     loaded = scene(SUN, change=thin)
     np.testing.assert_allclose(
-        shown(loaded, "wenzel").airlight, shown(loaded, "airlight", KERNELS["exact"]).airlight, rtol=5e-3
+        shown(loaded, "wenzel").airlight,
+        shown(loaded, "airlight", KERNELS["exact"]).airlight,
+        rtol=5e-3,
     )
 
 

@@ -49,11 +49,14 @@ def test_frames_through_the_door_of_the_built_in_methods(scene):
     np.testing.assert_allclose(images[0], alone[0], rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(images[1], 0.75 * alone[1] + 0.25 * alone[0], rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(images[2], 0.75 * alone[1] + 0.25 * images[1], rtol=1e-5, atol=1e-7)
-    assert renderer.stages.render.n_recordings == 2  # without a last frame and with one, and no third
+    # without a last frame and with one, and no third
+    assert renderer.stages.render.n_recordings == 2
 
 
 def test_a_frame_is_composed_by_the_formula(scene):
-    """surface visibility transmittance + transmittance background, the surface that of a method without layers."""
+    """surface visibility transmittance + transmittance background, the surface that of
+    a method without layers.
+    """
 
     @dataclass(frozen=True)
     class Nothing(Veil):
@@ -67,20 +70,28 @@ def test_a_frame_is_composed_by_the_formula(scene):
     behind = np.where(np.isfinite(plain.distance)[..., None], 0, np.array([0.3, 0.4, 0.5]))
     assert np.max(plain.surface) > 0
     assert np.max(behind) > 0
-    np.testing.assert_allclose(veiled.surface, 0.6 * (0.3 * plain.surface + behind), rtol=1e-5, atol=1e-8)
+    np.testing.assert_allclose(
+        veiled.surface, 0.6 * (0.3 * plain.surface + behind), rtol=1e-5, atol=1e-8
+    )
 
 
 def test_a_method_that_casts_no_rays_and_asks_for_one_is_told_so(scene):
     @dataclass(frozen=True)
     class Asks(Veil):
         def render(self, view, state, kernel):
-            return Layers(dr.select(view.visible(view.origin + view.direction, view.lights[0]), view.medium.albedo, 0))
+            return Layers(
+                dr.select(
+                    view.visible(view.origin + view.direction, view.lights[0]),
+                    view.medium.albedo,
+                    0,
+                )
+            )
 
     with pytest.raises(InputError, match="the method says that it casts no rays"):
         frame(scene, Asks)
 
 
-# A medium of two functions -------------------------------------------------------------------------------------------
+# A medium of two functions ------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -109,7 +120,9 @@ class Fog(Medium):
         return replace(self, sigma_t=factor * self.sigma_t)
 
 
-@pytest.mark.parametrize("method", ["shadow-planes", "light-volumes", "ray-march", "froxel-fog", "soft-shafts"])
+@pytest.mark.parametrize(
+    "method", ["shadow-planes", "light-volumes", "ray-march", "froxel-fog", "soft-shafts"]
+)
 def test_a_medium_of_two_functions(variant, method):
     """Panels of any medium against the kernel; depths by segments, against one product."""
     place = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)

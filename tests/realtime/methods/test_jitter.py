@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jittered samples are noisy and not biased: the mean of runs is the reference within its standard error.
+"""Jittered samples are noisy and not biased: the mean of runs is the reference
+within its standard error.
 
 Protects the claim on methods with noise.
 """
@@ -29,13 +30,18 @@ CASES = {
 
 
 def lamps():
-    """A ball and six lamps of unequal power, and a spot, so that there are tables of two structures."""
+    """A ball and six lamps of unequal power, and a spot, so that there are
+    tables of two structures.
+    """
     rng = np.random.default_rng(61)
     more = {
         f"lamp-{number}": {
             "type": "point",
             "position": [*rng.uniform(-1.9, 1.9, 2), rng.uniform(1.7, 3.1)],
-            "intensity": {"type": "rgb", "value": (rng.uniform(0.3, 5.3) * np.array([1.0, 0.9, 0.7])).tolist()},
+            "intensity": {
+                "type": "rgb",
+                "value": (rng.uniform(0.3, 5.3) * np.array([1.0, 0.9, 0.7])).tolist(),
+            },
         }
         for number in range(5)
     }
@@ -44,7 +50,10 @@ def lamps():
 
 def biases(method, parameters, scene, runs=RUNS):
     """Return by run the relative bias of the image and of its four quarters, (runs, 5)."""
-    made, reference = renderer(scene, find_method(method), **parameters), reference_of(scene).airlight
+    made, reference = (
+        renderer(scene, find_method(method), **parameters),
+        reference_of(scene).airlight,
+    )
     half = SIZE[1] // 2, SIZE[0] // 2
     parts = [
         np.s_[:, :],
@@ -64,10 +73,15 @@ def biases(method, parameters, scene, runs=RUNS):
 def least_p(found):
     """Return the least of the p-values of Student's test that the means are 0."""
     runs = len(found)
-    return 2 * student.sf(np.max(np.abs(found.mean(0)) / (found.std(0, ddof=1) / np.sqrt(runs))), runs - 1)
+    return 2 * student.sf(
+        np.max(np.abs(found.mean(0)) / (found.std(0, ddof=1) / np.sqrt(runs))), runs - 1
+    )
 
 
-@pytest.mark.claim("noise-unbiased", tolerance="Student's test of 64 runs at 1e-4 each, of the image and its quarters")
+@pytest.mark.claim(
+    "noise-unbiased",
+    tolerance="Student's test of 64 runs at 1e-4 each, of the image and its quarters",
+)
 @pytest.mark.parametrize("case", CASES)
 def test_the_mean_of_runs_is_the_reference(variant, case):
     method, parameters = CASES[case]
@@ -85,7 +99,11 @@ def test_a_bias_of_the_midpoints_is_found_by_the_same_test(variant):
 
 
 def test_surfaces_are_lit_by_many_lights_as_they_are_by_each(variant):
-    """A method that is given all lights at once has the surfaces of one that is given one after the other."""
-    many, each = (render_frame(renderer(lamps(), method)).surface for method in ("equi-angular", "ray-march"))
+    """A method that is given all lights at once has the surfaces of one that is
+    given one after the other.
+    """
+    many, each = (
+        render_frame(renderer(lamps(), method)).surface for method in ("equi-angular", "ray-march")
+    )
     assert np.max(each) > 0
     np.testing.assert_allclose(many, each, rtol=1e-5, atol=1e-7)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A user's shader is a method: it is given the rays, lights, maps and images that the page says, and its faults have
-the user's file and line."""
+"""A user's shader is a method: it is given the rays, lights, maps and images that the page says,
+and its faults have the user's file and line."""
 
 import math
 
@@ -53,31 +53,47 @@ def _fog(g: float) -> dict:
     return {"fog": fog | {"phase": {"type": "hg", "g": g}}}
 
 
-# Inputs ---------------------------------------------------------------------------------------------------------------
+# Inputs -------------------------------------------------------------------------------------------
 
 
 def test_rays_are_those_of_the_camera_row_by_row_and_by_their_place_in_the_image(drawn):
     scene = tiny_scene(size=(31, 17))
     camera = read_camera(read_scene(mi.load_dict(scene)).camera)
     column, row = np.meshgrid(np.arange(31), np.arange(17))
-    rays = camera.forward + ((15 - column)[..., None] * camera.left) + ((8 - row)[..., None] * camera.up)
+    rays = (
+        camera.forward
+        + ((15 - column)[..., None] * camera.left)
+        + ((8 - row)[..., None] * camera.up)
+    )
     rays /= np.linalg.norm(rays, axis=2, keepdims=True)
-    np.testing.assert_allclose(drawn("vec3 airlight(Ray ray) { return ray.direction; }").airlight, rays, atol=2e-7)
+    np.testing.assert_allclose(
+        drawn("vec3 airlight(Ray ray) { return ray.direction; }").airlight, rays, atol=2e-7
+    )
     by_place = "vec3 airlight(Ray ray) { return ray_through((vec2(ray.pixel) + 0.5) / vec2(resolution)).direction; }"
     np.testing.assert_allclose(drawn(by_place).airlight, rays, atol=4e-7)
 
 
 def test_surfaces_have_distance_normal_and_reflectance(drawn):
     found = drawn("vec3 airlight(Ray ray) { return ray.hit ? vec3(ray.distance) : vec3(0.0); }")
-    np.testing.assert_allclose(found.airlight[..., 0], np.where(np.isfinite(found.distance), found.distance, 0))
-    floor = drawn("vec3 airlight(Ray ray) { return texelFetch(g_normal, ray.pixel, 0).xyz; }").airlight[-1, 0]
+    np.testing.assert_allclose(
+        found.airlight[..., 0], np.where(np.isfinite(found.distance), found.distance, 0)
+    )
+    floor = drawn(
+        "vec3 airlight(Ray ray) { return texelFetch(g_normal, ray.pixel, 0).xyz; }"
+    ).airlight[-1, 0]
     np.testing.assert_allclose(floor, [0, 0, 1], atol=1e-6)
-    floor = drawn("vec3 airlight(Ray ray) { return texelFetch(g_albedo, ray.pixel, 0).rgb; }").airlight[-1, 0]
+    floor = drawn(
+        "vec3 airlight(Ray ray) { return texelFetch(g_albedo, ray.pixel, 0).rgb; }"
+    ).airlight[-1, 0]
     np.testing.assert_allclose(floor, [0.4, 0.4, 0.5], atol=1e-6)
 
 
 def test_a_marcher_with_shadow_maps_is_the_one_of_dr_jit_with_the_same_steps(drawn):
-    second = {"type": "point", "position": [-1.1, -0.6, 1.2], "intensity": {"type": "rgb", "value": [1.0, 4.0, 2.0]}}
+    second = {
+        "type": "point",
+        "position": [-1.1, -0.6, 1.2],
+        "intensity": {"type": "rgb", "value": [1.0, 4.0, 2.0]},
+    }
     scene = tiny_scene(size=(31, 17), lamp2=second, **_fog(0.4))
     ours = drawn((EXAMPLES / "marcher.glsl").read_text(), scene, STEPS=32, map=256).airlight
     same = render(scene, "ray-march", steps=32, shadow="map", map=256).airlight
@@ -89,23 +105,31 @@ def test_a_marcher_with_shadow_maps_is_the_one_of_dr_jit_with_the_same_steps(dra
 def test_a_marcher_converges_to_the_reference_under_a_soft_spot_in_a_lobe(drawn):
     scene = tiny_scene(size=(16, 12), lamp2=spot(beam=11.0), **_fog(0.7), **_EMPTY)
     text, expected = (EXAMPLES / "marcher.glsl").read_text(), reference_of(scene).airlight
-    few, many = (relative_rmse(drawn(text, scene, STEPS=steps).airlight, expected) for steps in (64, 512))
+    few, many = (
+        relative_rmse(drawn(text, scene, STEPS=steps).airlight, expected) for steps in (64, 512)
+    )
     assert many < few / 5
     assert many < 5e-4
     backward = text.replace("phase(-s / r)", "phase(s / r)")
     assert relative_rmse(drawn(backward, scene, STEPS=64).airlight, expected) > 0.2
     even = scene | _fog(0.0)
-    assert relative_rmse(drawn(backward, even, STEPS=64).airlight, reference_of(even).airlight) < 0.01
+    assert (
+        relative_rmse(drawn(backward, even, STEPS=64).airlight, reference_of(even).airlight) < 0.01
+    )
 
 
 @pytest.mark.parametrize(("phase", "g"), [({"type": "rayleigh"}, 0.0), (_TABLE, None)])
 def test_phase_functions_are_in_one_over_steradian(drawn, phase, g):
     scene = tiny_scene(size=(8, 6), fog=dict(tiny_scene()["fog"]) | {"phase": phase}, **_EMPTY)
-    found = drawn("vec3 airlight(Ray ray) { return vec3(phase(-0.5), phase(0.25), medium.g); }", scene).airlight[0, 0]
+    found = drawn(
+        "vec3 airlight(Ray ray) { return vec3(phase(-0.5), phase(0.25), medium.g); }", scene
+    ).airlight[0, 0]
     own = read_scene(mi.load_dict(scene)).medium.phase
     wanted = [float(own.evaluate(mi.Float(c))[0]) / (4 * math.pi) for c in (-0.5, 0.25)]
     # 2 + c below 0 and 2 + 7 c above it: the integral of c p is 8/3, that of p 7
-    np.testing.assert_allclose(found, [*wanted, 8 / 3 / 7 if g is None else g], rtol=2e-6, atol=1e-7)
+    np.testing.assert_allclose(
+        found, [*wanted, 8 / 3 / 7 if g is None else g], rtol=2e-6, atol=1e-7
+    )
 
 
 def test_passes_in_two_and_three_dimensions_have_images_of_this_frame_and_the_last(drawn, tmp_path):
@@ -120,7 +144,9 @@ vec3 airlight(Ray ray) {
 }
 """
     assert (drawn(text).airlight == [3, 4, 3]).all()
-    renderer = frame_renderer(read_scene(mi.load_dict(tiny_scene(**_EMPTY))), find_method(str(tmp_path / "fog.glsl")))
+    renderer = frame_renderer(
+        read_scene(mi.load_dict(tiny_scene(**_EMPTY))), find_method(str(tmp_path / "fog.glsl"))
+    )
     moved = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     cache = next_frame(renderer, renderer.scene, None, **moved)[1]
     (_, _, airlight), cache = next_frame(renderer, renderer.scene, cache, **moved)
@@ -138,16 +164,20 @@ vec3 airlight(Ray ray) { float all[COUNT]; return bright ? vec3(all.length(), ga
     assert (drawn(text).airlight == [3, 0.5, 0]).all()
     assert (drawn(text, COUNT="5", gain="0.25").airlight == [5, 0.25, 0]).all()
     assert (drawn(text, bright="no").airlight == 0).all()
-    with pytest.raises(InputError, match=r"got a parameter 'COUNTS', expected one of: .*did you mean 'COUNT'"):
+    with pytest.raises(
+        InputError, match=r"got a parameter 'COUNTS', expected one of: .*did you mean 'COUNT'"
+    ):
         drawn(text, COUNTS=1)
 
 
-# Faults ---------------------------------------------------------------------------------------------------------------
+# Faults -------------------------------------------------------------------------------------------
 
 
 def test_a_mistake_has_the_users_file_and_line_after_an_include_too(tmp_path):
     need_opengl()
-    (tmp_path / "own.glsl").write_text("// one\n/* two\nthree */ float own(float x) { return lenght(x); }\n")
+    (tmp_path / "own.glsl").write_text(
+        "// one\n/* two\nthree */ float own(float x) { return lenght(x); }\n"
+    )
     (tmp_path / "fog.glsl").write_text(
         '#version 450\n#extension GL_ARB_gpu_shader5 : enable\n#include "right.glsl"\n'
         "vec3 airlight(Ray ray) {\n    return vec3(right(nowhere));\n}\n"
@@ -155,7 +185,9 @@ def test_a_mistake_has_the_users_file_and_line_after_an_include_too(tmp_path):
     (tmp_path / "right.glsl").write_text("float right(float x) { return x; }\n")
     words = "fog.glsl, line 5: `nowhere' undeclared: return vec3(right(nowhere));"
     assert _refusal(tmp_path / "fog.glsl") == f"method {tmp_path / 'fog.glsl'}: {words}"
-    (tmp_path / "fog.glsl").write_text('#include "own.glsl"\nvec3 airlight(Ray ray) { return vec3(own(1.0)); }\n')
+    (tmp_path / "fog.glsl").write_text(
+        '#include "own.glsl"\nvec3 airlight(Ray ray) { return vec3(own(1.0)); }\n'
+    )
     assert "own.glsl, line 3: no function with name 'lenght'" in _refusal(tmp_path / "fog.glsl")
 
 
@@ -170,7 +202,8 @@ def test_a_mistake_has_the_users_file_and_line_after_an_include_too(tmp_path):
         ),
         ("error: too many uniforms\n", "fog.glsl: error: too many uniforms"),
         (
-            "0:2(9): error: no f(int); candidates are:\n0:2(9): error:    f(vec2)\n0:2(9): error:    f(vec3)\n"
+            "0:2(9): error: no f(int); candidates are:\n0:2(9): error:    f(vec2)\n0:2(9): error:  "
+            "  f(vec3)\n"
             "0:2(3): error: another\n",
             "line 2: no f(int); candidates are: f(vec2); f(vec3): second",
         ),
@@ -212,9 +245,17 @@ def test_a_byte_order_mark_before_the_text_changes_nothing(drawn):
     ("given", "unset"),
     [
         ("uniform vec3 tint; uniform float time;", "time, tint"),
-        ("uniform vec3 tint = vec3(1.0); uniform sampler2D noise; float time = texture(noise, vec2(0)).r;", "noise"),
+        (
+            "uniform vec3 tint = vec3(1.0); uniform sampler2D noise; float time = texture(noise, "
+            "vec2(0)).r;",
+            "noise",
+        ),
         ("buffer Tints { vec3 tint; float time; };", "Tints"),
-        ("#pragma airlight uniform time 1.0\nuniform struct { vec3 on; } sky; vec3 tint = sky.on;", "sky.on"),
+        (
+            "#pragma airlight uniform time 1.0\nuniform struct { vec3 on; } sky; vec3 tint = "
+            "sky.on;",
+            "sky.on",
+        ),
         ("uniform float time = 0.0, other = 2.0; uniform vec3 tint=vec3(1.0);", ""),
     ],
 )
@@ -230,7 +271,9 @@ def test_what_nothing_sets_is_refused_by_name(drawn, given, unset):
 
 def test_radiance_that_is_not_finite_is_refused_by_pixel(drawn):
     text = "vec3 airlight(Ray ray) { return vec3(ray.pixel.x == 4 && ray.pixel.y < 3 ? sqrt(-ray.distance) : 1.0); }"
-    with pytest.raises(InputError, match=r"3 of 527 pixels are not finite, the first in column 4 of row 14, ray\."):
+    with pytest.raises(
+        InputError, match=r"3 of 527 pixels are not finite, the first in column 4 of row 14, ray\."
+    ):
         drawn(text)
 
 
@@ -238,11 +281,19 @@ def test_radiance_that_is_not_finite_is_refused_by_pixel(drawn):
     ("changes", "words"),
     [
         ({"fog": None, "sensor": None}, "the medium has bounds: fog.glsl renders"),
-        ({"lamp": {"type": "rectangle", "emitter": {"type": "area", "radiance": 2.0}}}, "the scene has area lights"),
-        ({"fog": {"type": "homogeneous", "id": "fog", "sigma_t": 0.0}}, "nothing is extinguished in a channel"),
+        (
+            {"lamp": {"type": "rectangle", "emitter": {"type": "area", "radiance": 2.0}}},
+            "the scene has area lights",
+        ),
+        (
+            {"fog": {"type": "homogeneous", "id": "fog", "sigma_t": 0.0}},
+            "nothing is extinguished in a channel",
+        ),
     ],
 )
-def test_scenes_out_of_scope_are_refused_by_name_before_the_driver_starts(tmp_path, monkeypatch, changes, words):
+def test_scenes_out_of_scope_are_refused_by_name_before_the_driver_starts(
+    tmp_path, monkeypatch, changes, words
+):
     monkeypatch.setattr(ShaderHost, "__init__", None)
     (tmp_path / "fog.glsl").write_text(_BLACK)
     scene = tiny_scene(**(_EMPTY | changes))
@@ -260,14 +311,19 @@ def test_a_frame_that_takes_too_long_ends_with_its_process(drawn, monkeypatch):
     text = """#pragma airlight frames 1000
 vec3 airlight(Ray ray) { float x = ray.distance; for (int i = 0; i < 60000; ++i) x = sin(x + 1.0); return vec3(x); }
 """
-    with pytest.raises(InputError, match=r"no answer within 1\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=3 "):
+    with pytest.raises(
+        InputError,
+        match=r"no answer within 1\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=3 ",
+    ):
         drawn(text)
 
 
 @pytest.mark.parametrize("limit", ["0", "nan", "inf", "1e12", "soon"])
 def test_a_limit_of_time_is_one_that_every_process_can_keep(monkeypatch, limit):
     monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", limit)
-    with pytest.raises(InputError, match=r"AIRLIGHT_METHOD_LIMIT: got '.*', expected a time above 0 up to 2e\+06"):
+    with pytest.raises(
+        InputError, match=r"AIRLIGHT_METHOD_LIMIT: got '.*', expected a time above 0 up to 2e\+06"
+    ):
         ShaderHost("fog.glsl")
 
 
@@ -290,8 +346,14 @@ def test_a_process_that_ends_is_a_fault_and_no_driver_is_missing(monkeypatch, tm
 
 def test_a_light_in_the_picture_is_finite_and_its_own_pixels_bright(drawn):
     # the light stands on the ray of no pixel's centre, but within a pixel
-    lamp = {"type": "point", "position": [0.11, 0.03, 0.61], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
-    airlight = drawn((EXAMPLES / "marcher.glsl").read_text(), tiny_scene(size=(31, 17), lamp=lamp, **_EMPTY)).airlight
+    lamp = {
+        "type": "point",
+        "position": [0.11, 0.03, 0.61],
+        "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+    }
+    airlight = drawn(
+        (EXAMPLES / "marcher.glsl").read_text(), tiny_scene(size=(31, 17), lamp=lamp, **_EMPTY)
+    ).airlight
     assert np.isfinite(airlight).all()
     assert np.unravel_index(airlight[..., 0].argmax(), (17, 31)) == (8, 15)
     assert dr.all(mi.Float(airlight.ravel()) > 0)

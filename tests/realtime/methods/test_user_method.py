@@ -97,7 +97,9 @@ def render(own, variant):
     scene = read_scene(mi.load_dict(tiny_scene()))
 
     def rendered(name, **parameters):
-        renderer = frame_renderer(scene, find_method(f"{own}:{name}"), kernel=KERNELS["exact"], **parameters)
+        renderer = frame_renderer(
+            scene, find_method(f"{own}:{name}"), kernel=KERNELS["exact"], **parameters
+        )
         return render_frame(renderer).airlight
 
     return rendered
@@ -108,7 +110,12 @@ def test_the_signature_decides(own):
     method = find_method(f"{own}:calls")
     assert method.uses_kernel
     assert defaults(method) == {"steps": 7, "fraction": 0.5, "word": "a", "on": True}
-    assert (method.shadows, method.frozen, method.by_rays, method.casts_rays) == (False, True, True, True)
+    assert (method.shadows, method.frozen, method.by_rays, method.casts_rays) == (
+        False,
+        True,
+        True,
+        True,
+    )
     method = find_method(f"{own}:divides")
     assert not method.uses_kernel
     assert (defaults(method), method.shadows, method.frozen) == ({}, True, False)
@@ -168,7 +175,9 @@ def test_an_exception_names_file_and_line(render, own):
 
 @pytest.mark.claim("own-method-faults")
 def test_what_a_method_refuses_is_no_fault(render):
-    """Its words stand alone, whichever of the two classes it raises: a fault would have file and line before them."""
+    """Its words stand alone, whichever of the two classes it raises: a fault would have
+    file and line before them.
+    """
     with pytest.raises(InputError, match=r"^refuses: expected less$"):
         render("refuses")
 
@@ -206,14 +215,19 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
         with refused("broken_for_tests.py, line 2: SyntaxError"):
             find_method(f"{module}:f")
     for module in ("imports_for_tests", "imports_for_tests.py"):
-        with refused("imports_for_tests.py, line 2: ModuleNotFoundError: No module named 'not_there_for_tests'"):
+        with refused(
+            "imports_for_tests.py, line 2: ModuleNotFoundError: No module named "
+            "'not_there_for_tests'"
+        ):
             find_method(f"{module}:f")
 
 
 def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "dont_write_bytecode", False)  # as it is where nothing is set
     (tmp_path / "neighbour.py").write_text("strength = 1.0\n")
-    (tmp_path / "mine.py").write_text("from neighbour import strength\ndef fog(view):\n    return strength\n")
+    (tmp_path / "mine.py").write_text(
+        "from neighbour import strength\ndef fog(view):\n    return strength\n"
+    )
     find_method(f"{tmp_path / 'mine.py'}:fog")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.py", "neighbour.py"]
     assert not sys.dont_write_bytecode
@@ -222,5 +236,10 @@ def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):
 @pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
     scene = read_scene(mi.load_dict(tiny_scene()))
-    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen)
-    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=KERNELS["exact"]).stages.render, Frozen)
+    assert not isinstance(
+        frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen
+    )
+    assert isinstance(
+        frame_renderer(scene, find_method(f"{own}:calls"), kernel=KERNELS["exact"]).stages.render,
+        Frozen,
+    )

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from airlight.realtime.frame.renderer import render_frame
-from airlight.realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
+from airlight.realtime.scene.animate import (
+    coloured_light,
+    read_objects,
+    turned_light,
+    turned_objects,
+)
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.meshes import grid, icosphere, rotation
 from airlight.validation.scenes.parts import mitsuba_mesh
@@ -32,17 +37,28 @@ def leaves(light) -> dict[str, np.ndarray]:
 
 
 def in_sun_and_sky(turn: float, colour: list[float]):
-    """The scene with a light of each kind, read again with all of them turned and coloured; a sky does not turn."""
+    """The scene with a light of each kind, read again with all of them turned and
+    coloured; a sky does not turn.
+    """
 
     def world(first, second):
-        about = mi.ScalarTransform4f().translate([0.1, 0.2, 0]).rotate([0, 0, 1], turn).translate([-0.1, -0.2, 0])
+        about = (
+            mi.ScalarTransform4f()
+            .translate([0.1, 0.2, 0])
+            .rotate([0, 0, 1], turn)
+            .translate([-0.1, -0.2, 0])
+        )
         return about @ mi.ScalarTransform4f().look_at(first, second, [0, 1, 0])
 
     def rgb():
         return {"type": "rgb", "value": colour}
 
     lights = {
-        "point": {"type": "point", "to_world": world([0.9, 0.7, 190.0], [0, 0, 0]), "intensity": rgb()},
+        "point": {
+            "type": "point",
+            "to_world": world([0.9, 0.7, 190.0], [0, 0, 0]),
+            "intensity": rgb(),
+        },
         "soft": {
             "type": "spot",
             "to_world": world([7.1, -3.0, 260.0], [0.1, 0.1, 0.4]),
@@ -50,11 +66,17 @@ def in_sun_and_sky(turn: float, colour: list[float]):
             "beam_width": 21.0,
             "intensity": rgb(),
         },
-        "sun": {"type": "directional", "to_world": world([0, 0, 0], [0.7, -0.3, -0.6]), "irradiance": rgb()},
+        "sun": {
+            "type": "directional",
+            "to_world": world([0, 0, 0], [0.7, -0.3, -0.6]),
+            "irradiance": rgb(),
+        },
         "sky": {"type": "constant", "radiance": rgb()},
     }
     # A sky beside a lamp is a background, which lights nothing.
-    scenes = [{name: lights[name] for name in names} for names in (("point", "soft"), ("sun", "sky"))]
+    scenes = [
+        {name: lights[name] for name in names} for names in (("point", "soft"), ("sun", "sky"))
+    ]
     built = [mi.load_dict(cloud_scene(ring=cloud("ring", ring()), **each)) for each in scenes]
     return [light for scene in built for light in read_scene(scene).lights]
 
@@ -67,10 +89,14 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_fresh(variant):
     turned, coloured = in_sun_and_sky(71.0, colour), in_sun_and_sky(0.0, [0.5, 3.0, 2.0])
     for old, after, other in zip(before, turned, coloured, strict=True):
         by_turn = leaves(turned_light(old, np.array([0.1, 0.2, 0.0]), rotation((0, 0, 1), 71.0)))
-        for moved, fresh in ((by_turn, leaves(after)), (leaves(coloured_light(old, 1 / 3)), leaves(other))):
+        for moved, fresh in (
+            (by_turn, leaves(after)),
+            (leaves(coloured_light(old, 1 / 3)), leaves(other)),
+        ):
             assert moved.keys() == fresh.keys()
             for name, values in fresh.items():
-                if not name.endswith("_low"):  # what float32 took from the other part, which may round the other way
+                # what float32 took from the other part, which may round the other way
+                if not name.endswith("_low"):
                     # float32, and Mitsuba's matrices, which have a few roundings of their own.
                     np.testing.assert_allclose(
                         moved[name], values, rtol=1e-5, atol=3e-6 * abs(values).max(), err_msg=name
@@ -81,19 +107,24 @@ TURN = rotation((0.3, -0.2, 1), 71.0)
 
 
 def bumpy_ball(turn=None, *, normals: bool):
-    """A closed mesh that no turn maps to itself, turned about the middle of its bounding box as it was.
+    """A closed mesh that no turn maps to itself, turned about the middle of
+    its bounding box as it was.
 
     Its normals, if it has any, are arbitrary and not those that Mitsuba would compute.
     """
 
     sphere, faces = icosphere(3)
-    vertices = 0.31 * bumpy(sphere, np.full(3, -1.0), 3.5) * (1.0, 0.6, 1.3) + np.array([0.13, -0.07, 0.73])
+    vertices = 0.31 * bumpy(sphere, np.full(3, -1.0), 3.5) * (1.0, 0.6, 1.3) + np.array(
+        [0.13, -0.07, 0.73]
+    )
     vertices = vertices.astype(np.float32).astype(np.float64)
     turn = np.eye(3) if turn is None else turn
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     mesh = mi.Mesh("ball", len(vertices), len(faces), has_vertex_normals=normals)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = ((vertices - middle) @ turn.T + middle).astype(np.float32).ravel()
+    parameters["vertex_positions"] = (
+        ((vertices - middle) @ turn.T + middle).astype(np.float32).ravel()
+    )
     parameters["faces"] = faces.astype(np.uint32).ravel()
     if normals:
         parameters["vertex_normals"] = (sphere @ turn.T).astype(np.float32).ravel()
@@ -102,7 +133,9 @@ def bumpy_ball(turn=None, *, normals: bool):
 
 
 def floor():
-    return mitsuba_mesh("floor", grid((-3.1, -3.3, -0.03), (6.7, 0, 0), (0, 6.1, 0), (2, 2)), (0.5, 0.6, 0.4))
+    return mitsuba_mesh(
+        "floor", grid((-3.1, -3.3, -0.03), (6.7, 0, 0), (0, 6.1, 0), (2, 2)), (0.5, 0.6, 0.4)
+    )
 
 
 def read_turned(turn=None, *, normals: bool = False):
@@ -115,9 +148,12 @@ def image(scene, method: str, parameters):
 
 
 @pytest.mark.parametrize(
-    ("method", "parameters", "normals"), [("shadow-planes", {}, True), ("light-volumes", {"map": 64}, False)]
+    ("method", "parameters", "normals"),
+    [("shadow-planes", {}, True), ("light-volumes", {"map": 64}, False)],
 )
-def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method, parameters, normals):
+def test_moved_objects_are_those_of_a_file_with_the_object_moved(
+    variant, method, parameters, normals
+):
     """Rays, normals, shadows on surfaces and in the fog."""
     scene = read_turned(normals=normals)
     before = image(scene, method, parameters)  # moved vertices move in this scene too
@@ -127,8 +163,9 @@ def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method
     for name in ("airlight", "surface"):
         old, ours, theirs = (getattr(frame, name) for frame in (before, here, there))
         scale = theirs.mean()
-        assert np.mean(np.abs(old - theirs).max(axis=-1) > 1e-2 * scale) > 0.02  # what moved is seen
-        # Rays and vertices are rounded to float32: 1e-6 of a distance. At an edge of the object or of its shadow, a
-        # ray or a sample of it is on the other side, in a few pixels.
+        # what moved is seen
+        assert np.mean(np.abs(old - theirs).max(axis=-1) > 1e-2 * scale) > 0.02
+        # Rays and vertices are rounded to float32: 1e-6 of a distance. At an edge of the object or
+        # of its shadow, a ray or a sample of it is on the other side, in a few pixels.
         same = np.isclose(ours, theirs, rtol=1e-4, atol=1e-4 * scale).all(axis=-1)
         assert np.mean(~same) < 0.01

@@ -11,7 +11,13 @@ import pytest
 from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.numerics.array_types import array_types
-from airlight.realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
+from airlight.realtime.scene.camera import (
+    pixel_grid,
+    ray_directions,
+    resized_camera,
+    row_and_column,
+    sensor_camera,
+)
 from airlight.realtime.scene.read_scene import describe, read_scene
 from airlight.realtime.scene.rounding import check_rounding
 from airlight.validation.scenes.height_fog import register_height_fog
@@ -24,11 +30,17 @@ def read(**changes):
     return read_scene(mi.load_dict(tiny_scene(**changes)))
 
 
-@pytest.mark.parametrize("names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")])
+@pytest.mark.parametrize(
+    "names", [("a.b", "a-b"), ("Sphere-2", ""), ("", "Sphere-1"), ("", ""), ("a.b.c", "a-b.c")]
+)
 def test_every_opaque_shape_stays_whatever_its_name(variant, names):
-    """Mitsuba's dictionaries have keys without dots, each once; beside a boundary the opaque shapes are a new scene."""
+    """Mitsuba's dictionaries have keys without dots, each once; beside a boundary the
+    opaque shapes are a new scene.
+    """
     bounded = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
-    scene = clear_scene(first={"type": "sphere"}, second={"type": "sphere", "center": [5.0, 0.0, 0.0]}, box=bounded)
+    scene = clear_scene(
+        first={"type": "sphere"}, second={"type": "sphere", "center": [5.0, 0.0, 0.0]}, box=bounded
+    )
     loaded = mi.load_dict(scene)
     opaque = [shape for shape in loaded.shapes() if shape.interior_medium() is None]
     for shape, name in zip(opaque, names, strict=True):
@@ -36,7 +48,11 @@ def test_every_opaque_shape_stays_whatever_its_name(variant, names):
     shapes = read_scene(loaded).geometry.shapes()
     assert sorted(float(shape.bbox().min[0]) for shape in shapes) == [-1.0, 4.0]
     # Reading changes nothing of what it reads.
-    assert sorted(shape.id() for shape in shapes) == sorted(shape.id() for shape in opaque) == sorted(names)
+    assert (
+        sorted(shape.id() for shape in shapes)
+        == sorted(shape.id() for shape in opaque)
+        == sorted(names)
+    )
 
 
 @pytest.mark.claim("not-needed-costs-nothing")
@@ -68,7 +84,9 @@ def test_glossy_surfaces_are_noted(variant):
 @pytest.mark.claim("first-camera-noted")
 def test_a_second_camera_is_noted(variant):
     """The first is used, and anyone who meant the other is told."""
-    (note,) = read(other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}).features.notes
+    (note,) = read(
+        other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}
+    ).features.notes
     assert "2 cameras: the first is used" in note
 
 
@@ -82,7 +100,9 @@ def test_a_second_camera_is_noted(variant):
     ],
 )
 @pytest.mark.parametrize("kind", ["homogeneous", "grid", "height fog"])
-def test_numbers_that_no_medium_has_are_refused_whoever_built_the_scene(variant, kind, changes, words):
+def test_numbers_that_no_medium_has_are_refused_whoever_built_the_scene(
+    variant, kind, changes, words
+):
     """`validation.scenes.loading` looks at files; a scene from Python comes here at once."""
     register_height_fog()
     box = {"to_world": mi.ScalarTransform4f().translate([-9.0, -9.0, -9.0]).scale(18.0)}
@@ -100,7 +120,9 @@ def test_numbers_that_no_medium_has_are_refused_whoever_built_the_scene(variant,
 
 @pytest.mark.parametrize(("offset", "outcome"), [(0.0, ""), (3e3, "noted"), (4e5, "refused")])
 def test_lengths_that_coordinates_lose_are_noted_or_refused(variant, offset, outcome):
-    """In map coordinates an image was 10 % off, "known to 2e-11": float32 rounds positions before anyone reads them."""
+    """In map coordinates an image was 10 % off, "known to 2e-11": float32 rounds positions
+    before anyone reads them.
+    """
     moved = mi.ScalarTransform4f().translate([offset, 0.0, 0.0])
     parts = tiny_scene(floor=None)
     parts["sensor"] = parts["sensor"] | {"to_world": moved @ parts["sensor"]["to_world"]}
@@ -114,7 +136,9 @@ def test_lengths_that_coordinates_lose_are_noted_or_refused(variant, offset, out
     if outcome != "refused":
         check_rounding(scene)
         return
-    with pytest.raises(InputError, match=r"subtract an offset, such as \(400000, -4, 1\)") as refusal:
+    with pytest.raises(
+        InputError, match=r"subtract an offset, such as \(400000, -4, 1\)"
+    ) as refusal:
         check_rounding(scene)
     assert "\n" not in str(refusal.value)
 
@@ -125,20 +149,27 @@ def test_a_scene_without_a_camera_is_refused_for_that_alone(variant):
         read(sensor=None)
 
 
-# The camera ----------------------------------------------------------------------------------------------------------
+# The camera ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 @pytest.mark.parametrize(
     ("size", "axis", "pixels"),
-    [((64, 48), "x", None), ((37, 53), "y", None), ((37, 53), "smaller", (10, 31)), ((64, 48), "smaller", (10, 31))],
+    [
+        ((64, 48), "x", None),
+        ((37, 53), "y", None),
+        ((37, 53), "smaller", (10, 31)),
+        ((64, 48), "smaller", (10, 31)),
+    ],
 )
 def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
     sensor = {
         "type": "perspective",
         "fov": 47.0,
         "fov_axis": axis,
-        "to_world": mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0]),
+        "to_world": mi.ScalarTransform4f().look_at(
+            [1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0]
+        ),
         "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
     }
     scene = mi.load_dict({"type": "scene", "sensor": sensor})
@@ -154,10 +185,17 @@ def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
 
 
 def test_aim_is_kept_to_twice_the_digits(variant):
-    """The aim that a camera of single precision has besides its direction, by NumPy: the angle between them."""
+    """The aim that a camera of single precision has besides its direction, by
+    NumPy: the angle between them.
+    """
     matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
     film = {"type": "hdrfilm", "width": 801, "height": 601}
-    scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film},
+        }
+    )
     pixel = mi.UInt32(np.arange(0, 801 * 601, 7, dtype=np.uint32))
     camera = sensor_camera(scene, array_types())[0]
     direction, aim = (np.array(part, dtype=np.float64).T for part in ray_directions(camera, pixel))
@@ -174,7 +212,8 @@ def test_aim_is_kept_to_twice_the_digits(variant):
 def test_rows_and_columns_are_those_of_a_division(variant, width):
     """Rationale: the division is one of float64, and wrong by one row where rounding shows.
 
-    Setup: pixels next to the ends of rows, where it would show, up to the last that is allowed, and random ones.
+    Setup: pixels next to the ends of rows, where it would show, up to the last that is
+    allowed, and random ones.
     """
 
     most = (1 << 31) - 1
@@ -189,7 +228,9 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
 
 
 def test_one_kernel_serves_images_of_all_sizes(variant):
-    """Rationale: a kernel that holds the size of an image is compiled again for each, for half a second and more."""
+    """Rationale: a kernel that holds the size of an image is compiled again for each,
+    for half a second and more.
+    """
     launched = []
     for size in ((64, 48), (96, 80)):
         scene = read_scene(load_scene("sphere-spot", size).scene)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference in density grids: against quadrature by look-ups alone, homogeneous fog, Mitsuba; injected faults."""
+"""The reference in density grids: against quadrature by look-ups alone, homogeneous fog,
+Mitsuba; injected faults.
+"""
 
 from itertools import pairwise
 
@@ -18,7 +20,18 @@ from airlight.validation.scenes.loading import load_scene
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
 from tests.helpers.clouds import linear_between
-from tests.helpers.density_grid import ALBEDO, HIGH, INSIDE, LOW, ROUGH, SCALE, SHAPES, SPOT, grid_xml, volume
+from tests.helpers.density_grid import (
+    ALBEDO,
+    HIGH,
+    INSIDE,
+    LOW,
+    ROUGH,
+    SCALE,
+    SHAPES,
+    SPOT,
+    grid_xml,
+    volume,
+)
 from tests.helpers.height_fog import LAMP, SUN
 
 BATCHES = 40
@@ -28,14 +41,20 @@ BATCHES = 40
 def reference(variant, tmp_path):
     def read(*lights, values=ROUGH, albedo=ALBEDO, shapes=SHAPES, **how):
         path = tmp_path / "grid.xml"
-        path.write_text(grid_xml(volume(tmp_path / "smoke.vol", values, **how), *lights, albedo=albedo, shapes=shapes))
+        path.write_text(
+            grid_xml(
+                volume(tmp_path / "smoke.vol", values, **how), *lights, albedo=albedo, shapes=shapes
+            )
+        )
         return read_reference(load_scene(str(path)).scene)
 
     return read
 
 
 def extinction(points, medium):
-    """Return the extinction of the rough grid at points [1/m], 0 beside its box, as Mitsuba rounds that."""
+    """Return the extinction of the rough grid at points [1/m], 0 beside its
+    box, as Mitsuba rounds that.
+    """
     inside = np.all((points >= medium.low) & (points <= medium.high), axis=-1)
     flat = linear_between(ROUGH.astype(np.float64), medium.low, medium.high, points.reshape(-1, 3))
     flat = flat.reshape(points.shape[:-1])
@@ -49,7 +68,9 @@ def box_ends(start, way, medium):
     return np.maximum(ends.min(axis=0).max(axis=-1), 0.0), ends.max(axis=0).min(axis=-1)
 
 
-@pytest.mark.claim("density-grid-reference", tolerance="1e-9 relative: scipy's quad, cut at nothing")
+@pytest.mark.claim(
+    "density-grid-reference", tolerance="1e-9 relative: scipy's quad, cut at nothing"
+)
 def test_optical_depths_are_those_of_scipy(reference):
     random = np.random.default_rng(5)
     origin, end = random.uniform(LOW - 1, HIGH + 1, (2, 4, 3))
@@ -69,7 +90,9 @@ def test_optical_depths_are_those_of_scipy(reference):
         np.testing.assert_allclose(depth, sum(parts), rtol=1e-9)
 
 
-@pytest.mark.claim("density-grid-reference", tolerance="3e-5 relative: 1000 steps with kinks, and 600 to the light")
+@pytest.mark.claim(
+    "density-grid-reference", tolerance="3e-5 relative: 1000 steps with kinks, and 600 to the light"
+)
 @pytest.mark.parametrize("light", [LAMP, SUN])
 def test_airlight_by_look_ups_alone(reference, light):
     scene = reference(light, shapes="")
@@ -96,16 +119,27 @@ def test_airlight_by_look_ups_alone(reference, light):
         depth = np.trapezoid(extinction(path, scene.medium), along, axis=1) * r
         depth += np.concatenate([[0], np.cumsum(0.5 * (sigma_t[1:] + sigma_t[:-1]) * np.diff(x))])
         phase = scene.medium.phase((to_light @ way) / r)
-        f = (sigma_t * np.exp(-depth) * phase)[:, None] * strength * scene.medium.albedo / (4 * np.pi)
+        f = (
+            (sigma_t * np.exp(-depth) * phase)[:, None]
+            * strength
+            * scene.medium.albedo
+            / (4 * np.pi)
+        )
         np.testing.assert_allclose(radiance[row], simpson(f, x=x, axis=0), rtol=3e-5)
     assert bound.max() < 1e-4 * radiance.mean()
 
 
-@pytest.mark.claim("density-grid-reference", tolerance="1e-5 relative: twice what panels of the grid may differ by")
+@pytest.mark.claim(
+    "density-grid-reference", tolerance="1e-5 relative: twice what panels of the grid may differ by"
+)
 def test_a_constant_grid_is_homogeneous_fog(reference, tmp_path):
     lights = LAMP, SPOT, SUN
-    even = quadrature_image(reference(*lights, values=np.full((4, 3, 5), 0.25, np.float32)), checks=0)
-    text = grid_xml('<float name="sigma_t" value="0.25"/>', *lights).replace('<ref id="smoke" name="medium"/>', "")
+    even = quadrature_image(
+        reference(*lights, values=np.full((4, 3, 5), 0.25, np.float32)), checks=0
+    )
+    text = grid_xml('<float name="sigma_t" value="0.25"/>', *lights).replace(
+        '<ref id="smoke" name="medium"/>', ""
+    )
     size, corner = (", ".join(map(str, each)) for each in (0.5 * (HIGH - LOW), 0.5 * (HIGH + LOW)))
     cube = f"""<shape type="cube" id="box"><bsdf type="null"/><ref id="smoke" name="interior"/>
         <transform name="to_world"><scale value="{size}"/><translate value="{corner}"/></transform></shape></scene>"""
@@ -121,7 +155,9 @@ def test_a_constant_grid_is_homogeneous_fog(reference, tmp_path):
 @pytest.mark.parametrize("size", [1.0, 1.3])
 def test_a_shape_that_holds_the_box_bounds_nothing(reference, tmp_path, size):
     plain = reference(LAMP, SUN)
-    half, corner = (", ".join(map(str, each)) for each in (0.5 * size * (HIGH - LOW), 0.5 * (HIGH + LOW)))
+    half, corner = (
+        ", ".join(map(str, each)) for each in (0.5 * size * (HIGH - LOW), 0.5 * (HIGH + LOW))
+    )
     cube = f"""<shape type="cube" id="box"><bsdf type="null"/><ref name="interior" id="smoke"/>
         <transform name="to_world"><scale value="{half}"/><translate value="{corner}"/></transform></shape></scene>"""
     path = tmp_path / "grid.xml"
@@ -141,7 +177,9 @@ def test_a_shape_that_holds_the_box_bounds_nothing(reference, tmp_path, size):
 @pytest.mark.claim("density-grid-reference", tolerance="1e-12 relative: rounding")
 def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     count = 8
-    values = np.broadcast_to(((2 + np.arange(count)) / 8)[:, None, None], (count, 3, 4)).astype(np.float32)
+    values = np.broadcast_to(((2 + np.arange(count)) / 8)[:, None, None], (count, 3, 4)).astype(
+        np.float32
+    )
     scene = reference(LAMP, values=values)
     low, high = scene.medium.low, scene.medium.high
     half = 0.5 * (high - low) / [4, 3, count]
@@ -150,7 +188,9 @@ def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     way = (end - origin) / length[:, None]
     found = field_of(scene).optical_depth(origin, way, np.zeros(20), length)
     height = (0.5 * (origin + end)[:, 2] - low[2]) / (high - low)[2] * count - 0.5
-    np.testing.assert_allclose(found[:, 0], float(np.float32(SCALE)) * (2 + height) / 8 * length, rtol=1e-12)
+    np.testing.assert_allclose(
+        found[:, 0], float(np.float32(SCALE)) * (2 + height) / 8 * length, rtol=1e-12
+    )
 
 
 @pytest.mark.claim("density-grid-refused", tolerance="none: an error and its words")
@@ -163,7 +203,12 @@ def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
         ({"values": np.repeat(ROUGH[..., None], 3, axis=3)}, "a grid of 3 channels"),
         ({"values": ROUGH - 0.5}, "expected finite numbers"),
         (
-            {"albedo": '<volume type="gridvolume" name="albedo"><string name="filename" value="FILE"/></volume>'},
+            {
+                "albedo": (
+                    '<volume type="gridvolume" name="albedo"><string name="filename" '
+                    'value="FILE"/></volume>'
+                )
+            },
             "albedo",
         ),
     ],
@@ -178,20 +223,26 @@ def test_other_grids_are_refused_by_name(reference, tmp_path, how, words):
 #: Faults that the comparison with volpath must find, by name.
 FAULTS = {
     "values at the corners of voxels": Wrap(
-        "airlight.reference.scene.varying:GridMedium.voxels", lambda function, self, point: function(self, point) + 0.5
+        "airlight.reference.scene.varying:GridMedium.voxels",
+        lambda function, self, point: function(self, point) + 0.5,
     ),
     "no attenuation on the way from the light": Wrap(
-        "airlight.reference.quadrature.cell_walk:CellWalk.leave", lambda function, *others: 0 * function(*others)
+        "airlight.reference.quadrature.cell_walk:CellWalk.leave",
+        lambda function, *others: 0 * function(*others),
     ),
     "cells as thick as their first place": Wrap(
         "airlight.reference.quadrature.cell_walk:CellWalk.within",
-        lambda function, self, origin, way, x0, x1: (x1 - x0) * self.density(origin + way * (x0 + 1e-6)),
+        lambda function, self, origin, way, x0, x1: (
+            (x1 - x0) * self.density(origin + way * (x0 + 1e-6))
+        ),
     ),
 }
 
 
 @pytest.mark.slow
-@pytest.mark.claim("density-grid-volpath", tolerance="0.5 % of the image, 95 % intervals of 40 batches")
+@pytest.mark.claim(
+    "density-grid-volpath", tolerance="0.5 % of the image, 95 % intervals of 40 batches"
+)
 def test_both_estimators_agree_and_injected_faults_are_found(reference):
     for light in (INSIDE, SUN):
         scene = reference(light)
@@ -202,7 +253,9 @@ def test_both_estimators_agree_and_injected_faults_are_found(reference):
 
         def outside(changes=(), light=light, batches=batches):
             with injected(*changes):
-                image = quadrature_image(reference(light), checks=0, shadow_scale=1 - measure_shadow_epsilon())
+                image = quadrature_image(
+                    reference(light), checks=0, shadow_scale=1 - measure_shadow_epsilon()
+                )
             found = biases(reference(light), image, batches)
             return [abs(bias) + half > 0.005 for bias, half in found]
 

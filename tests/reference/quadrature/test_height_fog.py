@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference in height fog: against homogeneous fog, steps that know the density alone, Mitsuba; injected faults."""
+"""The reference in height fog: against homogeneous fog, steps that know the density alone,
+Mitsuba; injected faults.
+"""
 
 from dataclasses import replace
 
@@ -35,19 +37,29 @@ def scene(variant, tmp_path):
     return load
 
 
-@pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the height of the scene over H = 1e8 m")
+@pytest.mark.claim(
+    "height-fog-reference", tolerance="1e-6 relative: the height of the scene over H = 1e8 m"
+)
 def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
     reference = read_reference(scene(LAMP, SPOT, PANEL, size=(8, 6)))
-    plain = ReferenceMedium(np.full(3, 0.06), reference.medium.albedo, reference.medium.phase, reference.medium.plugin)
-    deep = replace(reference.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf)
+    plain = ReferenceMedium(
+        np.full(3, 0.06), reference.medium.albedo, reference.medium.phase, reference.medium.plugin
+    )
+    deep = replace(
+        reference.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf
+    )
     how = {"checks": 0, "plan": PointPlan(error=0.0, first=4, most=4)}
-    images = [quadrature_image(replace(reference, medium=medium), **how) for medium in (plain, deep)]
+    images = [
+        quadrature_image(replace(reference, medium=medium), **how) for medium in (plain, deep)
+    ]
     for layer in ("airlight", "surface", "emitted"):
         expected, found = (getattr(image, layer) for image in images)
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * expected.max())
 
 
-@pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the trapezoidal rule with 2e5 steps")
+@pytest.mark.claim(
+    "height-fog-reference", tolerance="1e-6 relative: the trapezoidal rule with 2e5 steps"
+)
 def test_the_sun_by_steps_that_know_the_density_alone(scene):
     reference = read_reference(scene(SUN))
     image = quadrature_image(reference, checks=0)
@@ -79,13 +91,17 @@ def test_bounds_are_below_a_millionth_of_the_mean(scene):
 FAULTS = {
     "height of the wrong light path": Wrap(
         "airlight.analytic.height_fog:height_fog_segments",
-        lambda function, fog, rays, *others, **named: function(fog, replace(rays, light=rays.origin), *others, **named),
+        lambda function, fog, rays, *others, **named: function(
+            fog, replace(rays, light=rays.origin), *others, **named
+        ),
     ),
     "1/H for H": Wrap(
-        "airlight.reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)
+        "airlight.reference.scene.varying:read_height_fog",
+        lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h),
     ),
     "ln 2 left out": Wrap(
-        "airlight.reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
+        "airlight.reference.scene.varying:read_height_fog",
+        lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2)),
     ),
     "density at the camera for the mean": Wrap(
         "airlight.analytic.height_fog:HeightFog.optical_depth",
@@ -93,13 +109,18 @@ FAULTS = {
     ),
     "the sun's path without its cosine": Wrap(
         "airlight.analytic.height_fog:height_fog_sun",
-        lambda function, fog, *others, sun, phase: function(_flat(fog, sun), *others, sun=sun, phase=phase),
+        lambda function, fog, *others, sun, phase: function(
+            _flat(fog, sun), *others, sun=sun, phase=phase
+        ),
     ),
 }
 
 
 def _scale_heights(medium: HeightMedium, change) -> HeightMedium:
-    return replace(medium, layers=tuple((sigma_t, base, change(scale)) for sigma_t, base, scale in medium.layers))
+    return replace(
+        medium,
+        layers=tuple((sigma_t, base, change(scale)) for sigma_t, base, scale in medium.layers),
+    )
 
 
 class _Flat(HeightFog):

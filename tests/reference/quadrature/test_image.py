@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of the quadrature: against adaptive integrals, closed forms, Mitsuba's direct light and brute force."""
+"""Images of the quadrature: against adaptive integrals, closed forms, Mitsuba's
+direct light and brute force.
+"""
 
 from dataclasses import replace
 
@@ -43,10 +45,12 @@ def test_unshadowed_pixels_are_the_adaptive_integral(variant):
 
 @pytest.mark.claim("attenuation-and-falloff", "bound-in-every-pixel", tolerance="3e-5 relative")
 def test_shadow_of_a_sphere_against_its_closed_form(variant):
-    """The shadow of a sphere is a cone cut by a cap: the lit set of a ray in closed form, sampled finely.
+    """The shadow of a sphere is a cone cut by a cap: the lit set of a ray in
+    closed form, sampled finely.
 
-    A point P is in shadow where the segment from the light to P meets the sphere. The airlight is then an integral
-    with the indicator of that set, by the midpoint rule with 200 000 steps in theta.
+    A point P is in shadow where the segment from the light to P meets the sphere. The airlight is
+    then an integral with the indicator of that set, by the midpoint rule with 200 000 steps in
+    theta.
     """
     reference, image = reference_of(floor=None, size=(12, 9))
     light, sigma_t = reference.lights[0], reference.medium.sigma_t[0]
@@ -78,7 +82,9 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
 @pytest.mark.claim("lit-surface", tolerance="1e-5 relative: float32")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_surface_is_mitsubas_direct_integrator(variant, kind):
-    """In a vacuum the lit surface is what Mitsuba's `direct` integrator renders at the pixel centres."""
+    """In a vacuum the lit surface is what Mitsuba's `direct` integrator
+    renders at the pixel centres.
+    """
     changes = {} if kind == "point" else {"lamp": spot(beam=20.0)}
     scene = mi.load_dict(tiny_scene(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}, **changes))
     reference = read_reference(scene)
@@ -86,18 +92,26 @@ def test_surface_is_mitsubas_direct_integrator(variant, kind):
     integrator = mi.load_dict({"type": "direct", "bsdf_samples": 0, "emitter_samples": 1})
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(1, reference.width * reference.height)
-    ray = mi.Ray3f(mi.Point3f(*(float(c) for c in reference.origin)), dr.normalize(mi.Vector3f(reference.direction.T)))
+    ray = mi.Ray3f(
+        mi.Point3f(*(float(c) for c in reference.origin)),
+        dr.normalize(mi.Vector3f(reference.direction.T)),
+    )
     expected, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray))
     expected = np.array(expected, dtype=np.float64).T.reshape(image.surface.shape)
-    assert image.surface == pytest.approx(expected, rel=1e-5, abs=1e-9)  # the same float32 operations, in another order
+    # the same float32 operations, in another order
+    assert image.surface == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert expected.max() > 0
     assert image.airlight.max() == 0
 
 
-# Means over the area of pixels ---------------------------------------------------------------------------------------
+# Means over the area of pixels --------------------------------------------------------------------
 
 
-OUT_OF_VIEW = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+OUT_OF_VIEW = {
+    "type": "point",
+    "position": [3.9, 0.7, 3.9],
+    "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+}
 
 
 def scene_of(scene):
@@ -105,31 +119,42 @@ def scene_of(scene):
 
 
 def brute_force(reference, n, regular=False):
-    """Return the means of n x n sub-pixels, a random point in each: airlight, surface, and the brightest surface.
+    """Return the means of n x n sub-pixels, a random point in each: airlight, surface,
+    and the brightest surface.
 
-    Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
-    where a random one may come too close.
+    Regular points would all be wrong the same way where an edge runs along the rows; close to a
+    light they are better, where a random one may come too close.
     """
     row, column = np.divmod(np.arange(reference.width * reference.height), reference.width)
     y, x = np.divmod(np.arange(n * n), n)
     u, v = (0.5, 0.5) if regular else np.random.default_rng(11).random((2, len(row), n * n))
-    positions = np.stack([column[:, None] + (x + u) / n, row[:, None] + (y + v) / n], axis=-1).reshape(-1, 2)
-    direction = film_directions(reference.scene.sensors()[0], positions, (reference.width, reference.height))
+    positions = np.stack(
+        [column[:, None] + (x + u) / n, row[:, None] + (y + v) / n], axis=-1
+    ).reshape(-1, 2)
+    direction = film_directions(
+        reference.scene.sensors()[0], positions, (reference.width, reference.height)
+    )
     values = ray_values(replace(reference, direction=direction), checks=1)
     shape = (reference.height, reference.width, n * n, 3)
     surface = values.surface.reshape(shape)
     return values.airlight.reshape(shape).mean(axis=2), surface.mean(axis=2), surface.max()
 
 
-@pytest.mark.claim("pixel-area", tolerance="7.1 standard errors of 1e-4 relative, which a pilot foresees")
+@pytest.mark.claim(
+    "pixel-area", tolerance="7.1 standard errors of 1e-4 relative, which a pilot foresees"
+)
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
-    """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
+    """Gauss's product rule with 12 x 12 points, converged for what is smooth:
+    the light is out of view.
+    """
     reference = scene_of(tiny_scene(ball=None, floor=None, lamp=OUT_OF_VIEW, size=(4, 3)))
     node, weight = np.polynomial.legendre.leggauss(12)
     node, weight = 0.5 * (node + 1), 0.5 * weight
     row, column = np.divmod(np.arange(12), 4)
     x, y = np.meshgrid(node, node)
-    positions = np.stack([column[:, None] + x.ravel(), row[:, None] + y.ravel()], axis=-1).reshape(-1, 2)
+    positions = np.stack([column[:, None] + x.ravel(), row[:, None] + y.ravel()], axis=-1).reshape(
+        -1, 2
+    )
     direction = film_directions(reference.scene.sensors()[0], positions, (4, 3))
     values = ray_values(replace(reference, direction=direction)).airlight.reshape(3, 4, 144, 3)
     expected = np.einsum("ijkc,k->ijc", values, np.outer(weight, weight).ravel())
@@ -137,7 +162,8 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     error = np.abs(image.airlight - expected)
     # Student's value with seven degrees of freedom that one value in 10 000 exceeds, for 36 values.
     assert np.all(error <= 7.1 * image.airlight_se + image.airlight_bound)
-    # A pilot foresees the error from a few positions: 1e-4 in the mean, and not twice and a half of it anywhere.
+    # A pilot foresees the error from a few positions: 1e-4 in the mean, and not twice
+    # and a half of it anywhere.
     stated = image.airlight_se / image.airlight
     assert np.sqrt(np.mean(stated**2)) < 1.5e-4
     assert stated.max() < 2.5e-4
@@ -151,26 +177,34 @@ def test_edges_against_brute_force(variant, scene):
     airlight, surface, brightest = brute_force(reference, 24)
     # The light is seen: in its pixel regular sub-pixels converge slowly.
     near = image.light_angle < 0.1
-    # Of 24 x 24 random sub-pixels an edge crosses about 24 and leaves sqrt(24)/2/576 = 0.4 % of its jump open; a jump
-    # may be larger than the pixel's value, the beam being in front of the light's glow.
+    # Of 24 x 24 random sub-pixels an edge crosses about 24 and leaves sqrt(24)/2/576 = 0.4 % of its
+    # jump open; a jump may be larger than the pixel's value, the beam being in front of the light's
+    # glow.
     error = np.abs(image.airlight - airlight)[~near]
     assert np.mean(error > 0.02 * airlight[~near] + 4 * image.airlight_se[~near]) == 0
     assert np.mean(error <= 2e-3 * airlight[~near] + 3 * image.airlight_se[~near]) > 0.9
     assert np.abs(image.airlight[~near].mean() / airlight[~near].mean() - 1) < 2e-3
-    # The top of the beam, seen almost edge-on, is a strip of a 160th of a pixel with a radiance of 0.2.
+    # The top of the beam, seen almost edge-on, is a strip of a 160th of a
+    # pixel with a radiance of 0.2.
     assert np.abs(image.surface - surface).max() < 0.02 * (0.2 if scene is box_scene else brightest)
     assert np.abs(image.surface.mean() / surface.mean() - 1) < 0.01
     centre = quadrature_image(reference, checks=1)
-    assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
+    # the centre is another thing
+    assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()
 
 
 def test_errors_of_pixels_average_out(variant):
-    """The variance of the mean over 192 pixels by that of uncorrelated errors is chi^2_7/7: 0.09 to 3.5 in 99.8 %.
+    """The variance of the mean over 192 pixels by that of uncorrelated errors is
+    chi^2_7/7: 0.09 to 3.5 in 99.8 %.
 
-    If pixels shared positions it would be 80. Two seeds differ by 7.1 standard errors once in 10 000.
+    If pixels shared positions it would be 80. Two seeds differ by 7.1
+    standard errors once in 10 000.
     """
     reference = scene_of(tiny_scene(ball=None, lamp=OUT_OF_VIEW, size=(16, 12)))
-    images = [quadrature_image(reference, pixel="area", checks=1, plan=PointPlan(seed=seed)) for seed in (1, 2)]
+    images = [
+        quadrature_image(reference, pixel="area", checks=1, plan=PointPlan(seed=seed))
+        for seed in (1, 2)
+    ]
     errors = [standard_error(image.replicate_means[0].T)[0] for image in images]
     for image, error in zip(images, errors, strict=True):
         alone = np.sqrt(np.sum(image.airlight_se[..., 0] ** 2)) / 192
@@ -181,7 +215,9 @@ def test_errors_of_pixels_average_out(variant):
 
 
 def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
-    """The ray through the centre meets the light; the mean over the area is what the one over r leaves."""
+    """The ray through the centre meets the light; the mean over the area is
+    what the one over r leaves.
+    """
     reference = scene_of(tiny_scene(ball=None, floor=None, size=(3, 3)))
     light = reference.lights[0]
     middle = reference.origin + 2.7 * reference.direction[4]
@@ -191,7 +227,8 @@ def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     assert not np.isfinite(centre.airlight[1, 1]).all() or centre.airlight[1, 1].max() > 1e6
     assert np.isfinite(area.airlight).all()
     expected, *_ = brute_force(reference, 32)
-    # Around the light the airlight is c/rho: the sub-pixel that holds it leaves about a 32nd of the mean open.
+    # Around the light the airlight is c/rho: the sub-pixel that holds it leaves about
+    # a 32nd of the mean open.
     error = np.abs(area.airlight[1, 1] - expected[1, 1])
     assert np.all(error < 3 * area.airlight_se[1, 1] + expected[1, 1] / 32)
     assert np.all(area.airlight_se[1, 1] < 0.04 * area.airlight[1, 1])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The light of a uniform sky: against integrals that know no sun, other estimators, and where nothing of it arrives."""
+"""The light of a uniform sky: against integrals that know no sun, other estimators, and
+where nothing of it arrives.
+"""
 
 import numpy as np
 import pytest
@@ -42,37 +44,60 @@ def reference_of(tmp_path, medium, *parts, camera=INSIDE):
 
 
 def close(image, wanted):
-    """Within six of the standard errors that are stated, which Student's 7 degrees exceed once in 2000 pixels."""
+    """Within six of the standard errors that are stated, which Student's 7 degrees
+    exceed once in 2000 pixels.
+    """
     got, error = (values.reshape(-1, 3)[:, 0] for values in (image.airlight, image.airlight_se))
     assert (np.abs(got - wanted) <= 6 * error + 1e-7 * wanted).all()
     assert error.mean() < 5e-3 * wanted.mean()
 
 
-@pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
+@pytest.mark.claim(
+    "sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most"
+)
 def test_in_height_fog_it_is_the_exponential_integral(variant, tmp_path):
     reference = reference_of(tmp_path, LAYERED, SKY)
-    with pytest.raises(InputError, match=r"bounding box is not valid|light paths of a sun or a sky end within the fog"):
+    with pytest.raises(
+        InputError,
+        match=r"bounding box is not valid|light paths of a sun or a sky end within the fog",
+    ):
         volpath_batch(reference, 0, 64)  # there are no shapes, whose size says how far a sky is
     x = np.linspace(0, 400, 200_001)
     wanted = []
     for direction in reference.direction:
         z = reference.origin[2] + x * direction[2]
-        sigma_t = np.where((z > FLOOR) & (z < CAP), LAYER["sigma_1"] * np.exp(-(z - LAYER["z_1"]) / LAYER["H_1"]), 0.0)
+        sigma_t = np.where(
+            (z > FLOOR) & (z < CAP),
+            LAYER["sigma_1"] * np.exp(-(z - LAYER["z_1"]) / LAYER["H_1"]),
+            0.0,
+        )
         left = np.exp(-cumulative_simpson(sigma_t, x=x, initial=0))
         whole = LAYER["sigma_1"] * LAYER["H_1"]
         column = [whole * np.exp(-(end - LAYER["z_1"]) / LAYER["H_1"]) for end in (z, CAP, FLOOR)]
         above, below = np.maximum(column[0] - column[1], 0), np.maximum(column[2] - column[0], 0)
         wanted.append(simpson(sigma_t * left * 0.5 * (expn(2, above) + expn(2, below)), x=x))
-    close(quadrature_image(reference, plan=PointPlan(most=32)), ALBEDO * RADIANCE[0] * np.array(wanted))
+    close(
+        quadrature_image(reference, plan=PointPlan(most=32)),
+        ALBEDO * RADIANCE[0] * np.array(wanted),
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
+@pytest.mark.claim(
+    "sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most"
+)
 def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
     reference = reference_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")
 
     def arriving(r):
-        return quad(lambda mu: np.exp(SIGMA_T * (r * mu - np.sqrt(RADIUS**2 - r**2 * (1 - mu**2)))), -1, 1)[0] / 2
+        return (
+            quad(
+                lambda mu: np.exp(SIGMA_T * (r * mu - np.sqrt(RADIUS**2 - r**2 * (1 - mu**2)))),
+                -1,
+                1,
+            )[0]
+            / 2
+        )
 
     def airlight(direction):
         foot = -reference.origin @ direction
@@ -87,7 +112,9 @@ def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
 
         return quad(scattered, -half, half)[0]
 
-    wanted = ALBEDO * RADIANCE[0] * np.array([airlight(direction) for direction in reference.direction])
+    wanted = (
+        ALBEDO * RADIANCE[0] * np.array([airlight(direction) for direction in reference.direction])
+    )
     assert (wanted > 0).sum() > 8
     close(quadrature_image(reference, plan=PointPlan(most=32)), wanted)
 
@@ -96,7 +123,10 @@ def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
 def test_through_fog_without_bounds_nothing_arrives(variant, tmp_path):
     with pytest.raises(InputError, match="light 'sky' is a sky: nothing of it arrives"):
         reference_of(tmp_path, HOMOGENEOUS, SKY)
-    dark, lit = (quadrature_image(reference_of(tmp_path, HOMOGENEOUS, LAMP, STONE, *sky)) for sky in ((), (SKY,)))
+    dark, lit = (
+        quadrature_image(reference_of(tmp_path, HOMOGENEOUS, LAMP, STONE, *sky))
+        for sky in ((), (SKY,))
+    )
     np.testing.assert_array_equal(lit.airlight, dark.airlight)
     np.testing.assert_array_equal(lit.surface, dark.surface)
     assert lit.emitted is not None

@@ -28,7 +28,9 @@ def holding(shape, **changes: Any) -> dict[str, Any]:
 
 
 def mesh(vertices, faces) -> dict[str, Any]:
-    return clear_scene(puff=medium_boundary("puff", (np.asarray(vertices, dtype=float), np.asarray(faces)), FOG))
+    return clear_scene(
+        puff=medium_boundary("puff", (np.asarray(vertices, dtype=float), np.asarray(faces)), FOG)
+    )
 
 
 def ball(**entries: Any) -> dict[str, Any]:
@@ -44,7 +46,11 @@ def radiance(value) -> dict[str, Any]:
 
 
 def texture() -> dict[str, Any]:
-    return {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32)), "raw": True}
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32)),
+        "raw": True,
+    }
 
 
 def scaled(part: dict[str, Any], *scale: float) -> dict[str, Any]:
@@ -64,7 +70,9 @@ def beam(scale: float) -> dict[str, Any]:
 
 
 def sheared():
-    return mi.ScalarTransform4f(np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]]))
+    return mi.ScalarTransform4f(
+        np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]])
+    )
 
 
 def around_the_camera() -> dict[str, Any]:
@@ -76,7 +84,11 @@ def in_fog() -> dict[str, Any]:
 
 
 def without_medium() -> dict[str, Any]:
-    return {"sensor": {name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"}}
+    return {
+        "sensor": {
+            name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"
+        }
+    }
 
 
 def fog(**entries: Any) -> dict[str, Any]:
@@ -89,9 +101,15 @@ BOTH = [
     (lambda: tiny_scene(lamp=None, sky={"type": "constant"}), "light 'sky'"),
     (lambda: tiny_scene(lamp=None, sun=sun()), "directional.*medium without bounds"),
     (lambda: tiny_scene(lamp=None, sun=sun(), puff=in_fog()), "directional.*medium without bounds"),
-    (lambda: ball(bsdf={"type": "mask", "nested": {"type": "diffuse"}}), "'ball' is partly transparent"),
+    (
+        lambda: ball(bsdf={"type": "mask", "nested": {"type": "diffuse"}}),
+        "'ball' is partly transparent",
+    ),
     (lambda: ball(interior=FOG), "'ball' bounds a medium and has a SmoothDiffuse material"),
-    (lambda: ball(bsdf={"type": "dielectric"}, interior=FOG), "'ball' bounds a medium and has a SmoothDielectric"),
+    (
+        lambda: ball(bsdf={"type": "dielectric"}, interior=FOG),
+        "'ball' bounds a medium and has a SmoothDielectric",
+    ),
     (lambda: tiny_scene(**without_medium()), "the camera references no medium"),
     (clear_scene, "the camera references no medium"),
     (lambda: holding(around_the_camera()), "the camera is inside of shape 'puff'"),
@@ -103,10 +121,16 @@ BOTH = [
         lambda: holding({"type": "sphere", "flip_normals": True}),
         "'puff' bounds a medium and is inside out.*remove flip",
     ),
-    (lambda: holding(scaled(SPHERE, -1, 1, 1)), "'puff' bounds a medium and is inside out.*negative scale"),
+    (
+        lambda: holding(scaled(SPHERE, -1, 1, 1)),
+        "'puff' bounds a medium and is inside out.*negative scale",
+    ),
     (lambda: tiny_scene(lamp=scaled(spot(), 2, 1, 1)), "light 'lamp' .*stretches its cone"),
     (lambda: tiny_scene(lamp=scaled(spot(), 1, 1, 0.2)), "light 'lamp' .*stretches its cone"),
-    (lambda: tiny_scene(lamp=spot() | {"to_world": sheared()}), "light 'lamp' .*stretches its cone"),
+    (
+        lambda: tiny_scene(lamp=spot() | {"to_world": sheared()}),
+        "light 'lamp' .*stretches its cone",
+    ),
     (
         lambda: beside(beam(3.0)),
         "light 'lamp' .*scales its direction by 3",
@@ -114,13 +138,22 @@ BOTH = [
     (lambda: mesh(BOX[0], BOX[1][:, ::-1]), "'puff' bounds a medium and is inside out"),
     (lambda: mesh(BOX[0], BOX[1][1:]), "'puff' bounds a medium and is not a closed surface"),
     (lambda: lit("cylinder"), "light 'lamp'.* is a cylinder"),
-    (lambda: lit("rectangle") | {"lamp": area_lamp("rectangle", to_world=sheared())}, "light 'lamp'.* is sheared"),
+    (
+        lambda: lit("rectangle") | {"lamp": area_lamp("rectangle", to_world=sheared())},
+        "light 'lamp'.* is sheared",
+    ),
     (lambda: lit("disk", size=(0.3, 0.2)), "light 'lamp'.*one scale"),
     (lambda: lit("rectangle", size=(0.0, 0.3)), "light 'lamp'.* has no area"),
     (lambda: lit("sphere", size=0.3, flip_normals=True), "light 'lamp'.*remove flip_normals"),
-    (lambda: tiny_scene(lamp=scaled(area_lamp("sphere", size=0.3), 1, 1, -1)), "light 'lamp'.*negative scale"),
+    (
+        lambda: tiny_scene(lamp=scaled(area_lamp("sphere", size=0.3), 1, 1, -1)),
+        "light 'lamp'.*negative scale",
+    ),
     (lambda: lit("sphere", size=9.0), "light 'lamp'.* camera"),
-    (lambda: lit("sphere", size=0.3, material={"type": "null"}, interior=FOG), "light 'lamp'.* bounds a medium"),
+    (
+        lambda: lit("sphere", size=0.3, material={"type": "null"}, interior=FOG),
+        "light 'lamp'.* bounds a medium",
+    ),
     (lambda: lit("rectangle", **radiance(texture())), "light 'lamp'.* textur"),
 ]
 #: Numbers that are refused before either side reads a scene, and by both sides.
@@ -128,9 +161,15 @@ NUMBERS = [
     (lambda: fog(sigma_t=-1.0), "sigma_t"),
     (lambda: fog(sigma_t=float("nan")), "sigma_t"),
     (lambda: fog(albedo=1.5), "albedo"),
-    (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle .* 95 degrees; expected more than 0"),
+    (
+        lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)),
+        "cutoff_angle .* 95 degrees; expected more than 0",
+    ),
     (lambda: tiny_scene(lamp=point_light((0.7, 0.3, 1.9), (-1.0, 2.0, 2.0))), "intensity"),
-    (lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})), "light '.*radiance"),
+    (
+        lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})),
+        "light '.*radiance",
+    ),
 ]
 #: Scenes that only the methods refuse.
 METHODS = [
@@ -138,10 +177,14 @@ METHODS = [
     (lambda: tiny_scene(sensor={"type": "thinlens", "aperture_radius": 0.1}), "ThinLens"),
     (lambda: mesh(BOX[0] * (1, 1, 0), BOX[1]), "has no volume|not a closed"),
 ]
-REFERENCE = [(lambda: mesh(*prism(star(0.4, 1.0, 5), 1.0)), "'puff' bounds a medium and is not convex")]
+REFERENCE = [
+    (lambda: mesh(*prism(star(0.4, 1.0, 5), 1.0)), "'puff' bounds a medium and is not convex")
+]
 
 
-@pytest.mark.claim("scenes-refused-by-name", "media-refused", "directional-wants-bounds", tolerance="by name")
+@pytest.mark.claim(
+    "scenes-refused-by-name", "media-refused", "directional-wants-bounds", tolerance="by name"
+)
 @pytest.mark.parametrize(
     ("make", "words", "readers"),
     [

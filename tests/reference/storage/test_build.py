@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: any two commits, changed files and copies without git are told apart; nobody else's commit is taken for ours.
+"""Claims: any two commits, changed files and copies without git are told apart; nobody else's
+commit is taken for ours.
 
 A toy checkout stands for that of airlight: a package of which a link leads to a folder beside it.
 """
@@ -13,7 +14,14 @@ from pathlib import Path
 
 import pytest
 
-from airlight.reference.storage.build import COMMIT, Build, build, build_of, commit_line, package_digest
+from airlight.reference.storage.build import (
+    COMMIT,
+    Build,
+    build,
+    build_of,
+    commit_line,
+    package_digest,
+)
 from tests.helpers.git import commit, git, write
 
 pytestmark = pytest.mark.claim("build-named")
@@ -73,7 +81,9 @@ def test_commits_of_one_version_print_different_words(checkout):
     assert first.digest == second.digest
 
 
-def test_an_installed_copy_names_the_commit_that_it_was_built_of_and_is_seen_to_change(checkout, tmp_path):
+def test_an_installed_copy_names_the_commit_that_it_was_built_of_and_is_seen_to_change(
+    checkout, tmp_path
+):
     package, of = installed(checkout, tmp_path / "site"), seen(checkout)
     assert build_of(package, "0.9") == of
     (package / "analytic/panels.py").write_text("NODES = 15\n")
@@ -108,7 +118,9 @@ def test_without_an_answer_of_git_the_commit_is_unknown(checkout, monkeypatch, f
         monkeypatch.setenv("PATH", "")
     else:
         shutil.rmtree(checkout / ".git")
-        git(checkout, "init", "--quiet") if fault == "no commit" else (checkout / ".git").write_text("gitdir: gone\n")
+        git(checkout, "init", "--quiet") if fault == "no commit" else (
+            checkout / ".git"
+        ).write_text("gitdir: gone\n")
     found = seen(checkout)
     assert (found.commit, found.changed) == ("unknown", None)
     assert found.words == f"0.9, commit unknown, files {found.digest[:12]}"
@@ -135,6 +147,8 @@ def test_git_is_asked_when_somebody_wants_to_know_and_not_by_an_import():
         "main.run(['--version'])\n"
         "assert build.cache_info().misses == 1\n"
     )
-    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, text=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.splitlines()[-1] == f"airlight {build().words}"

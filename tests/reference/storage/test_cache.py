@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: files are whole or not at all; arrays come back bit by bit or not at all, and the cache keeps to its size."""
+"""Claim: files are whole or not at all; arrays come back bit by bit or not at all, and the
+cache keeps to its size.
+"""
 
 import os
 import resource
@@ -84,7 +86,9 @@ def test_refuses_a_folder_that_is_a_file(tmp_path):
 
 @pytest.mark.claim("files-whole-or-not-at-all")
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
-    """A limit on the size of a file stands for the disk; a failed write does not name a file by itself."""
+    """A limit on the size of a file stands for the disk; a failed write does
+    not name a file by itself.
+    """
     write_bytes(tmp_path / "a.bin", b"old")
     old = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, old[1]))
@@ -98,7 +102,7 @@ def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
     assert (tmp_path / "a.bin").read_bytes() == b"old"
 
 
-# The cache -----------------------------------------------------------------------------------------------------------
+# The cache ----------------------------------------------------------------------------------------
 
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -107,7 +111,11 @@ KB = {"a": np.zeros(1000, dtype=np.uint8)}
 
 def test_arrays_come_back_bit_by_bit_and_the_last_ones_stored():
     store_arrays("twice", {"old": np.zeros(3)})
-    given = {"image": np.array([[1 / 3, -0.0], [np.inf, np.nan]]), "count": np.int64(7), "word": "fog"}
+    given = {
+        "image": np.array([[1 / 3, -0.0], [np.inf, np.nan]]),
+        "count": np.int64(7),
+        "word": "fog",
+    }
     store_arrays("twice", given)
     loaded = load_arrays("twice")
     assert loaded is not None
@@ -130,14 +138,20 @@ DAMAGES = {
     "empty": lambda path: path.write_bytes(b""),
     "cut in the middle": lambda path: path.write_bytes(path.read_bytes()[:4000]),
     "cut at the end": lambda path: path.write_bytes(path.read_bytes()[:-1]),
-    "a flipped bit": lambda path: path.write_bytes(bytes(b ^ (k == 4000) for k, b in enumerate(path.read_bytes()))),
+    "a flipped bit": lambda path: path.write_bytes(
+        bytes(b ^ (k == 4000) for k, b in enumerate(path.read_bytes()))
+    ),
     "text": lambda path: path.write_text("no archive\n" * 100),
     # Loading a pickle would run what a stranger wrote into the cache.
     "a pickle": lambda path: np.savez(path, a=np.array([{"code": 1}], dtype=object)),
     "a number": lambda path: archive(path, lambda arrays: arrays["a"].__setitem__(2, 2 + 1e-12)),
     "a name": lambda path: archive(path, lambda arrays: arrays.update(c=arrays.pop("b"))),
-    "a shape": lambda path: archive(path, lambda arrays: arrays.update(a=arrays["a"].reshape(10, 100))),
-    "a type": lambda path: archive(path, lambda arrays: arrays.update(a=arrays["a"].view(np.int64))),
+    "a shape": lambda path: archive(
+        path, lambda arrays: arrays.update(a=arrays["a"].reshape(10, 100))
+    ),
+    "a type": lambda path: archive(
+        path, lambda arrays: arrays.update(a=arrays["a"].view(np.int64))
+    ),
     "no digest": lambda path: archive(path, lambda arrays: arrays.pop("digest")),
 }
 
@@ -168,7 +182,14 @@ def test_the_folder_is_where_the_environment_says_and_made_when_needed(monkeypat
     assert cache_folder() == tmp_path / ".cache" / "airlight"
 
 
-SIZES = {"": DEFAULT_LIMIT, "0": 0, "1500": 1500, "500MB": 500_000_000, "500 mib": 500 * 2**20, "1.5G": 1_500_000_000}
+SIZES = {
+    "": DEFAULT_LIMIT,
+    "0": 0,
+    "1500": 1500,
+    "500MB": 500_000_000,
+    "500 mib": 500 * 2**20,
+    "1.5G": 1_500_000_000,
+}
 
 
 def key(kind, number):
@@ -205,21 +226,33 @@ def test_storing_keeps_to_the_limit(own_cache, monkeypatch):
     monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "25kB")
     for number in range(5):
         store_arrays(key("page", number), {"a": np.zeros(10_000, dtype=np.uint8)})
-    assert [is_stored(key("page", number)) for number in range(5)] == [False, False, False, True, True]
+    assert [is_stored(key("page", number)) for number in range(5)] == [
+        False,
+        False,
+        False,
+        True,
+        True,
+    ]
 
 
 @pytest.mark.parametrize("size", ["0", "0MB"])
 def test_a_cache_of_size_0_is_neither_read_nor_written(own_cache, monkeypatch, size):
     names = fill(own_cache)
     monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", size)
-    assert (load_arrays(names[0]), load_arrays(names[0], ["a"]), is_stored(names[0])) == (None, None, False)
+    assert (load_arrays(names[0]), load_arrays(names[0], ["a"]), is_stored(names[0])) == (
+        None,
+        None,
+        False,
+    )
     store_arrays(key("page", 9), KB)
     monkeypatch.delenv("AIRLIGHT_CACHE_SIZE")
     assert not is_stored(key("page", 9))
     assert load_arrays(names[0]) is not None
 
 
-def test_a_folder_that_cannot_be_written_is_noted_once_by_its_name_and_ends_nothing(monkeypatch, tmp_path, caplog):
+def test_a_folder_that_cannot_be_written_is_noted_once_by_its_name_and_ends_nothing(
+    monkeypatch, tmp_path, caplog
+):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "file"))
     for number in range(2):
@@ -231,7 +264,10 @@ def test_a_folder_that_cannot_be_written_is_noted_once_by_its_name_and_ends_noth
 
 def test_clearing_leaves_what_is_not_of_the_cache(own_cache):
     fill(own_cache)
-    others = [own_cache / name for name in ("thesis.npz", "report/notes.txt", f"deep/{key('page', 1)}.npz")]
+    others = [
+        own_cache / name
+        for name in ("thesis.npz", "report/notes.txt", f"deep/{key('page', 1)}.npz")
+    ]
     for path in others:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("mine")
@@ -263,7 +299,9 @@ def test_two_processes_keep_to_the_size_together(own_cache):
     environment = os.environ | {"AIRLIGHT_CACHE_SIZE": "20kB", "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", _WRITER]
     writers = [
-        subprocess.Popen([*command, name], cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            [*command, name], cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True
+        )
         for name in "12"
     ]
     for writer in writers:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the digest of code changes with every line and every number that a result may depend on, and no longer."""
+"""Claim: the digest of code changes with every line and every number that a result may
+depend on, and no longer.
+"""
 
 import os
 import subprocess
@@ -67,7 +69,9 @@ def test_a_users_file_counts_with_the_modules_beside_it_that_it_imports(folder):
 
 
 def test_data_that_a_users_file_names_count_with_it(folder):
-    (folder / "mine.py").write_text("from pathlib import Path\nTABLE = Path(__file__).with_name('table.csv')\n")
+    (folder / "mine.py").write_text(
+        "from pathlib import Path\nTABLE = Path(__file__).with_name('table.csv')\n"
+    )
     digests = []
     for name, text in (("table.csv", "1"), ("other.csv", "1"), ("table.csv", "2")):
         (folder / name).write_text(text)
@@ -81,9 +85,12 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
         (other / path.relative_to(folder)).parent.mkdir(exist_ok=True)
         (other / path.relative_to(folder)).write_text(path.read_text())
     code = (
-        "import sys\nfrom pathlib import Path\nfrom airlight.reference.storage.code import code_digest, source_digest\n"
+        "import sys\nfrom pathlib import Path\n"
+        "from airlight.reference.storage.code import code_digest, source_digest\n"
     )
-    code += "print(code_digest([Path(sys.argv[1])]), source_digest('airlight.reference.storage.store'))"
+    code += (
+        "print(code_digest([Path(sys.argv[1])]), source_digest('airlight.reference.storage.store'))"
+    )
     command = [sys.executable, "-c", code, str(other / "mine.py")]
     ran = subprocess.run(
         command,
@@ -92,7 +99,10 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
         check=True,
         env=os.environ | {"PYTHONPATH": ROOT, "PYTHONHASHSEED": "7"},
     )
-    assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest("airlight.reference.storage.store")]
+    assert ran.stdout.split() == [
+        code_digest([folder / "mine.py"]),
+        source_digest("airlight.reference.storage.store"),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -162,7 +172,9 @@ def test_a_change_of_the_code_throws_results_away_and_a_comment_does_not(monkeyp
     before = source_digest(name)
 
     def digest_with(change):
-        monkeypatch.setattr(module, "_source", lambda path: source(path) + change if path == file else source(path))
+        monkeypatch.setattr(
+            module, "_source", lambda path: source(path) + change if path == file else source(path)
+        )
         monkeypatch.setattr(
             module,
             "_compiled",

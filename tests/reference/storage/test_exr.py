@@ -37,7 +37,9 @@ def test_round_trip_is_exact(tmp_path, image):
     for name, values in image.layers.items():
         assert back.layers[name].dtype == np.float32
         np.testing.assert_array_equal(back.layers[name], values)
-    np.testing.assert_array_equal(back.layers["total"], image.layers["airlight"] + image.layers["surface"])
+    np.testing.assert_array_equal(
+        back.layers["total"], image.layers["airlight"] + image.layers["surface"]
+    )
     np.testing.assert_array_equal(back.depth, image.depth)
     assert dict(back.attributes) == dict(image.attributes)
     # An image that was read can be written again, total included.
@@ -58,17 +60,23 @@ def test_file_is_single_part_float32_zip_with_plain_names(tmp_path, image):
         assert file.header()["compression"] == OpenEXR.ZIP_COMPRESSION
 
 
-@pytest.mark.parametrize(("odd", "layer"), [(np.nan, "surface"), (np.inf, "airlight"), (-np.inf, "airlight")])
+@pytest.mark.parametrize(
+    ("odd", "layer"), [(np.nan, "surface"), (np.inf, "airlight"), (-np.inf, "airlight")]
+)
 def test_what_is_not_finite_is_not_written(tmp_path, odd, layer):
     layers = {name: np.ones((2, 3, 3)) for name in ("airlight", "surface")}
     layers[layer][1, 2, 0] = odd
-    with pytest.raises(InputError, match=f"layer '{layer}': 1 of 6 pixels are not finite, first in column 2 of row 1"):
+    with pytest.raises(
+        InputError,
+        match=f"layer '{layer}': 1 of 6 pixels are not finite, first in column 2 of row 1",
+    ):
         write_exr(tmp_path / "a.exr", Image(layers))
     depth = np.array([[np.nan, np.inf], [1.0, 2.0]])
     with pytest.raises(InputError, match="layer 'depth': 1 of 4 pixels"):
         write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((2, 2, 3))}, depth))
     assert list(tmp_path.iterdir()) == []
-    write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))  # nothing was hit
+    # nothing was hit
+    write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))
 
 
 def test_attributes_keep_their_value(tmp_path):
@@ -96,8 +104,14 @@ def test_attributes_keep_their_value(tmp_path):
     [
         ({}, "without layers"),
         ({"airlight": np.ones((2, 2))}, r"shape \(2, 2\); expected \(height, width, 3\)"),
-        ({"airlight": np.ones((2, 2, 3)), "surface": np.ones((2, 3, 3))}, "two sizes: 'airlight'.*'surface'"),
-        ({"airlight": np.ones((2, 2, 3)), "total": np.full((2, 2, 3), 1.01)}, "'total' is not airlight"),
+        (
+            {"airlight": np.ones((2, 2, 3)), "surface": np.ones((2, 3, 3))},
+            "two sizes: 'airlight'.*'surface'",
+        ),
+        (
+            {"airlight": np.ones((2, 2, 3)), "total": np.full((2, 2, 3), 1.01)},
+            "'total' is not airlight",
+        ),
     ],
 )
 def test_refuses_layers_that_do_not_fit(tmp_path, layers, message):
@@ -109,7 +123,10 @@ def test_refuses_layers_that_do_not_fit(tmp_path, layers, message):
 
 def test_layer_names_what_is_there_and_the_nearest(image):
     assert layer(image, "surface") is image.layers["surface"]
-    with pytest.raises(InputError, match=r"x\.exr has no layer 'airligth'; it has airlight, .*did you mean 'airlight'"):
+    with pytest.raises(
+        InputError,
+        match=r"x\.exr has no layer 'airligth'; it has airlight, .*did you mean 'airlight'",
+    ):
         layer(image, "airligth", "x.exr")
     with pytest.raises(InputError, match="ask for one of them"):
         layer(image, "qqq")
@@ -117,7 +134,9 @@ def test_layer_names_what_is_there_and_the_nearest(image):
         layer(Image({}), "airlight")
 
 
-@pytest.mark.parametrize(("name", "read"), [("Y", True), ("y", True), ("luminance", False), ("R", False)])
+@pytest.mark.parametrize(
+    ("name", "read"), [("Y", True), ("y", True), ("luminance", False), ("R", False)]
+)
 def test_a_lone_channel_is_grey_or_named_in_what_is_refused(tmp_path, name, read):
     pixels = np.full((3, 4), 0.7, np.float32)
     write_raw(tmp_path / "a.exr", {name: pixels})
@@ -125,14 +144,19 @@ def test_a_lone_channel_is_grey_or_named_in_what_is_refused(tmp_path, name, read
     if read:
         np.testing.assert_array_equal(image.layers["total"], np.stack([pixels] * 3, axis=-1))
     else:
-        with pytest.raises(InputError, match=rf"no layer of colours at all \(channels left out: {name}\)"):
+        with pytest.raises(
+            InputError, match=rf"no layer of colours at all \(channels left out: {name}\)"
+        ):
             layer(image, "")
 
 
 def test_reads_plain_half_images_and_says_so(tmp_path):
     # Thirds are not half floats; the file holds their roundings.
     thirds = (np.arange(12, dtype=np.float32).reshape(3, 4) / 3).astype(np.float16)
-    write_raw(tmp_path / "a.exr", {"R": thirds, "G": thirds, "B": thirds, "A": np.ones((3, 4), np.float16)})
+    write_raw(
+        tmp_path / "a.exr",
+        {"R": thirds, "G": thirds, "B": thirds, "A": np.ones((3, 4), np.float16)},
+    )
     image = read_exr(tmp_path / "a.exr")
     assert list(image.layers) == ["total"]
     assert layer(image, "").dtype == np.float32
@@ -149,7 +173,9 @@ def test_reads_colours_by_the_names_of_other_programs(tmp_path, names, prefix):
     channels = {prefix + name: values for name, values in zip([*names, "A"], pixels)}
     write_raw(path, channels)
     image = read_exr(path)
-    np.testing.assert_array_equal(image.layers[prefix[:-1] or "total"], np.stack(pixels[:3], axis=-1))
+    np.testing.assert_array_equal(
+        image.layers[prefix[:-1] or "total"], np.stack(pixels[:3], axis=-1)
+    )
     assert image.attributes["airlight:read"] == f"channels left out: {prefix}A"
 
 
@@ -160,7 +186,9 @@ def test_broken_files_give_one_line_and_nothing_on_the_terminal(tmp_path, capfd)
     path = tmp_path / "bad.exr"
     for cut in (0, 3, 8, 100, 400, len(good) // 2, len(good) - 600, len(good) - 1):
         path.write_bytes(good[:cut])
-        with pytest.raises(InputError, match=r"bad\.exr is (not an EXR|a broken EXR) file") as caught:
+        with pytest.raises(
+            InputError, match=r"bad\.exr is (not an EXR|a broken EXR) file"
+        ) as caught:
             read_exr(path)
         assert "\n" not in str(caught.value)
     path.write_text("<scene/>")
@@ -172,15 +200,20 @@ def test_broken_files_give_one_line_and_nothing_on_the_terminal(tmp_path, capfd)
 def write_parts(path, parts):
     import OpenEXR
 
-    OpenEXR.File([OpenEXR.Part(header, channels, name) for name, header, channels in parts]).write(str(path))
+    OpenEXR.File([OpenEXR.Part(header, channels, name) for name, header, channels in parts]).write(
+        str(path)
+    )
 
 
 @pytest.mark.claim("image-parts", tolerance="none: equal")
 def test_reads_the_parts_of_a_file(tmp_path):
-    """Blender names the layer in the channel, others in the part alone; a part named rgba is the image itself,
-    and one of a single channel may be named by that."""
+    """Blender names the layer in the channel, others in the part alone; a part named rgba is the
+    image itself, and one of a single channel may be named by that."""
     value = iter(np.arange(1, 20, dtype=np.float32))
-    plane = {key: np.full((3, 4), next(value)) for key in ("C.R", "C.G", "C.B", "C.A", "V.R", "V.G", "V.B", "R", "Z")}
+    plane = {
+        key: np.full((3, 4), next(value))
+        for key in ("C.R", "C.G", "C.B", "C.A", "V.R", "V.G", "V.B", "R", "Z")
+    }
     blender = [
         ("View.C", {}, {f"View.{key}": plane[key] for key in ("C.R", "C.G", "C.B", "C.A")}),
         ("View.V", {}, {f"View.{key}": plane[key] for key in ("V.R", "V.G", "V.B")}),
@@ -192,7 +225,12 @@ def test_reads_the_parts_of_a_file(tmp_path):
     assert image.attributes["airlight:read"] == "channels left out: View.C.A"
     colours = {key: plane["R"] for key in "RGB"}
     write_parts(
-        tmp_path / "b.exr", [("rgba", {"owner": "me"}, colours), ("fog", {}, colours), ("depth", {}, {"Z": plane["Z"]})]
+        tmp_path / "b.exr",
+        [
+            ("rgba", {"owner": "me"}, colours),
+            ("fog", {}, colours),
+            ("depth", {}, {"Z": plane["Z"]}),
+        ],
     )
     image = read_exr(tmp_path / "b.exr")
     assert sorted(image.layers) == ["fog", "total"]
@@ -206,7 +244,9 @@ def test_reads_the_parts_of_a_file(tmp_path):
 
 
 def test_the_image_is_the_frame_whatever_window_a_file_holds(tmp_path):
-    """Overscan is cut off; where a file holds a part of the frame, a mask says which. Tiles are read as scan lines."""
+    """Overscan is cut off; where a file holds a part of the frame, a mask says which.
+    Tiles are read as scan lines.
+    """
     import OpenEXR
 
     values = np.arange(48, dtype=np.float32).reshape(6, 8)
@@ -222,23 +262,37 @@ def test_the_image_is_the_frame_whatever_window_a_file_holds(tmp_path):
     write_raw(tmp_path / "levels.exr", plane, tiles)
     with pytest.raises(InputError, match="a mipmap"):
         read_exr(tmp_path / "levels.exr")
-    write_raw(tmp_path / "over.exr", plane, {"dataWindow": window(-2, -1, 5, 4), "displayWindow": window(0, 0, 3, 2)})
+    write_raw(
+        tmp_path / "over.exr",
+        plane,
+        {"dataWindow": window(-2, -1, 5, 4), "displayWindow": window(0, 0, 3, 2)},
+    )
     over = read_exr(tmp_path / "over.exr")
     np.testing.assert_array_equal(over.layers["total"][..., 1], values[1:4, 2:6])
     assert over.window is None
     assert "beyond the frame" in over.attributes["airlight:read"]
-    write_raw(tmp_path / "crop.exr", plane, {"dataWindow": window(3, 1, 10, 6), "displayWindow": window(0, 0, 8, 7)})
+    write_raw(
+        tmp_path / "crop.exr",
+        plane,
+        {"dataWindow": window(3, 1, 10, 6), "displayWindow": window(0, 0, 8, 7)},
+    )
     crop = read_exr(tmp_path / "crop.exr")
     np.testing.assert_array_equal(crop.layers["total"][1:7, 3:9, 0], values[:, :6])
     assert crop.window == (3, 1, 9, 7)
     assert crop.with_data().sum() == 36
-    write_raw(tmp_path / "far.exr", plane, {"dataWindow": window(9, 9, 16, 14), "displayWindow": window(0, 0, 3, 2)})
+    write_raw(
+        tmp_path / "far.exr",
+        plane,
+        {"dataWindow": window(9, 9, 16, 14), "displayWindow": window(0, 0, 3, 2)},
+    )
     with pytest.raises(InputError, match="no pixel of its frame"):
         read_exr(tmp_path / "far.exr")
 
 
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
-    """OpenEXR says in words what the system said; a limit on the size of a file stands for the disk."""
+    """OpenEXR says in words what the system said; a limit on the size of a
+    file stands for the disk.
+    """
     write_exr(tmp_path / "a.exr", Image({"surface": np.zeros((2, 2, 3))}))
     before = (tmp_path / "a.exr").read_bytes()
     noise = np.random.default_rng(1).random((64, 64, 3))

@@ -30,7 +30,11 @@ def rgb(*values):
     return {"type": "rgb", "value": list(values)}
 
 
-SUN = {"type": "directional", "direction": [0, 0, -1], "irradiance": {"type": "rgb", "value": [1, 2, 3]}}
+SUN = {
+    "type": "directional",
+    "direction": [0, 0, -1],
+    "irradiance": {"type": "rgb", "value": [1, 2, 3]},
+}
 
 CHANGES = {
     "extinction": lambda: changed("fog", sigma_t=0.3100001),
@@ -43,7 +47,9 @@ CHANGES = {
     "spot's beam": lambda: load(lamp=spot(beam=17.0)),
     "radius": lambda: changed("ball", radius=0.411),
     "centre": lambda: changed("ball", center=[0.1, 0.1, 0.71]),
-    "both sides": lambda: changed("ball", bsdf={"type": "twosided", "bsdf": tiny_scene()["ball"]["bsdf"]}),
+    "both sides": lambda: changed(
+        "ball", bsdf={"type": "twosided", "bsdf": tiny_scene()["ball"]["bsdf"]}
+    ),
     "turned inside out": lambda: changed("ball", flip_normals=True),
     "without the sphere": lambda: load(ball=None),
     "field of view": lambda: changed("sensor", fov=49.5),
@@ -51,7 +57,9 @@ CHANGES = {
     "centre of the image": lambda: changed("sensor", principal_point_offset_x=0.1),
     "extinction by channel": lambda: changed("fog", has_spectral_extinction=True),
     "lights unsampled": lambda: changed("fog", sample_emitters=False),
-    "a table of the phase function": lambda: changed("fog", phase={"type": "tabphase", "values": "1,2,3"}),
+    "a table of the phase function": lambda: changed(
+        "fog", phase={"type": "tabphase", "values": "1,2,3"}
+    ),
     "another table": lambda: changed("fog", phase={"type": "tabphase", "values": "1,2,4"}),
     "light in the fog": lambda: changed("lamp", medium={"type": "ref", "id": "fog"}),
     "sun": lambda: load(lamp=SUN),
@@ -87,9 +95,20 @@ def textured(**properties):
 
 
 def smoky(**properties):
-    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4))}
+    grid = {
+        "type": "gridvolume",
+        "grid": mi.VolumeGrid(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4)),
+    }
     phase = {"type": "hg", "g": 0.3}
-    return {"fog": {"type": "heterogeneous", "id": "fog", "sigma_t": grid | properties, "albedo": 0.9, "phase": phase}}
+    return {
+        "fog": {
+            "type": "heterogeneous",
+            "id": "fog",
+            "sigma_t": grid | properties,
+            "albedo": 0.9,
+            "phase": phase,
+        }
+    }
 
 
 HIDDEN = [
@@ -119,11 +138,18 @@ def test_a_scene_that_nobody_can_tell_from_another_has_no_digest(variant, parts)
     assert scene_digest(scene) is None
 
 
-def test_a_dictionary_with_an_object_that_was_built_before_has_a_digest_if_mitsuba_tells_all_of_it(variant):
+def test_a_dictionary_with_an_object_that_was_built_before_has_a_digest_if_mitsuba_tells_all_of_it(
+    variant,
+):
     built = [mi.load_dict(part["ball"]) for part in (textured(), textured(filter_type="nearest"))]
-    assert [scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball))) for ball in built] == [None, None]
+    assert [scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball))) for ball in built] == [
+        None,
+        None,
+    ]
     plain = [mi.load_dict(tiny_scene()["ball"] | {"radius": radius}) for radius in (0.4, 0.5)]
-    digests = [scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball, **smoky()))) for ball in plain]
+    digests = [
+        scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball, **smoky()))) for ball in plain
+    ]
     assert None not in digests
     assert digests[0] != digests[1]
 
@@ -161,7 +187,8 @@ UNNAMED = """<scene version="3.0.0">
 def test_digest_is_the_same_at_every_load_and_in_another_process(variant):
     """Names by address, hash seeds and set order must not enter."""
     first = mi.load_string(UNNAMED)
-    keep = [mi.load_dict({"type": "sphere"}) for _ in range(7)]  # so that the next scene lies elsewhere in memory
+    # so that the next scene lies elsewhere in memory
+    keep = [mi.load_dict({"type": "sphere"}) for _ in range(7)]
     second = mi.load_string(UNNAMED)
     assert len(keep) == 7
     assert scene_digest(first) == scene_digest(second)

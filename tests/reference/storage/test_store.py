@@ -37,7 +37,11 @@ from airlight.reference.storage.store import (
 )
 from airlight.reports.machine.driver_check import DriverInputs
 from airlight.reports.report.others import PaperInputs, ScalingInputs, StabilityInputs
-from airlight.validation.estimates.monte_carlo import CloudPathInputs, SingleScatterInputs, VolpathInputs
+from airlight.validation.estimates.monte_carlo import (
+    CloudPathInputs,
+    SingleScatterInputs,
+    VolpathInputs,
+)
 from airlight.validation.estimates.quadrature import ReferenceInputs
 from airlight.validation.kernels.rays import RayInputs, table
 from airlight.validation.study.configuration import Configuration
@@ -98,7 +102,11 @@ def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_t
     assert (first.spent, first.made) == (second.spent, second.made)
     for value in (first.value, second.value):
         np.testing.assert_array_equal(value.a, np.ones(3))
-        assert (value.words, value.parts["x"], value.parts["y"].pair) == (["a"], Inner((1, 0.1 * 3)), (2, 2.0))
+        assert (value.words, value.parts["x"], value.parts["y"].pair) == (
+            ["a"],
+            Inner((1, 0.1 * 3)),
+            (2, 2.0),
+        )
         assert (value.parts["y"].array.dtype, value.parts["y"].array.shape) == (np.float32, (2, 1))
         assert math.isnan(value.number)
     with fresh_results(time.time()):
@@ -108,7 +116,13 @@ def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_t
         # Another process of the run does the same.
         code = f"from airlight.reference.storage.store import *\nprint(is_kept('{inputs.key}'), fresh_since())"
         environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-        ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+        ran = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env=environment,
+        )
         assert ran.stdout.split() == ["True", repr(fresh_since())]
     assert fresh_since() is None
     assert page(inputs, calls).made > first.made
@@ -117,7 +131,9 @@ def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_t
 
 def test_what_is_not_worth_it_is_not_cached():
     for status in ("done", "refused"):
-        result = stored(Page(status), lambda status=status: status, str, lambda value: value == "done")
+        result = stored(
+            Page(status), lambda status=status: status, str, lambda value: value == "done"
+        )
         assert result.value == status
     assert (is_kept(Page("done").key), is_kept(Page("refused").key)) == (True, False)
 
@@ -132,7 +148,9 @@ def test_another_process_may_have_computed_a_value_and_parts_of_it_go_once_it_is
 
 
 def test_times_are_those_of_computing_and_never_of_loading():
-    """The time of a result includes the original times of the cached results that it uses, and of no other thread's."""
+    """The time of a result includes the original times of the cached results that it uses,
+    and of no other thread's.
+    """
     store("reference-a", {"a": 1}, Spent(100.0, 150.0))
 
     def from_the_reference() -> int:
@@ -151,11 +169,13 @@ def test_times_are_those_of_computing_and_never_of_loading():
         assert ledger.spent().seconds == pytest.approx(made.spent.seconds, abs=5.0)
 
 
-# --- keys ------------------------------------------------------------------------------------------------------------
+# --- keys -----------------------------------------------------------------------------------------
 
 CHOSEN = Configuration("ray-march", None, (("steps", 4), ("map", 64)))
 REFERENCE = ReferenceInputs(Content("a"), 32, 1.0, "centre", 16)
-CELL = Cell("hall a", (32, 24), ("medium.sigma_t=0.1",), CHOSEN, Measure(timed_size=(8, 6)), ("map", 64.0))
+CELL = Cell(
+    "hall a", (32, 24), ("medium.sigma_t=0.1",), CHOSEN, Measure(timed_size=(8, 6)), ("map", 64.0)
+)
 MACHINE = {"host": "a"}
 BATCHES = (Content("a"), 16, 2, ("1", "2-3"), np.ones((2, 3), np.int64))
 
@@ -182,7 +202,9 @@ def every_inputs(tmp_path) -> list[Inputs]:
         *(kind(*BATCHES) for kind in (SingleScatterInputs, VolpathInputs, CloudPathInputs)),
         RayInputs(rays),
         DriverInputs("llvmpipe"),
-        RowInputs(reference, CHOSEN, code, CELL.measure, "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb"),
+        RowInputs(
+            reference, CHOSEN, code, CELL.measure, "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb"
+        ),
         CheckInputs(Content("a"), Checks(patience=1.0), 16),
         MultipleInputs(Content("a"), 8, 4),
         CellInputs(REFERENCE, CELL, code, MACHINE),
@@ -201,7 +223,11 @@ def changed(value: Any) -> list[Any]:
         return [Content(f"{value.digest} another")]
     if is_dataclass(value):
         names = [each.name for each in fields(value)]
-        return [replace(value, **{name: other}) for name in names for other in changed(getattr(value, name))]
+        return [
+            replace(value, **{name: other})
+            for name in names
+            for other in changed(getattr(value, name))
+        ]
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, int | float | str):
@@ -213,7 +239,11 @@ def changed(value: Any) -> list[Any]:
         others = [{**value, name: other} for name in value for other in changed(value[name])]
         return [*others, {f"{name} another": each for name, each in value.items()} | {"and": 1}]
     if isinstance(value, tuple):
-        inside = [(*value[:at], other, *value[at + 1 :]) for at in range(len(value)) for other in changed(value[at])]
+        inside = [
+            (*value[:at], other, *value[at + 1 :])
+            for at in range(len(value))
+            for other in changed(value[at])
+        ]
         return [*inside, (*value, 1)]
     if isinstance(value, Path):
         other, renamed = value.with_name("b" + value.name), value.parent / "other" / value.name
@@ -227,7 +257,9 @@ def changed(value: Any) -> list[Any]:
 
 @pytest.mark.claim("report-kept")
 def test_every_field_of_every_kind_of_inputs_is_in_its_key(tmp_path):
-    """Rows stood beside a reference of more light samples, and figures of papers beside other scenes."""
+    """Rows stood beside a reference of more light samples, and figures of
+    papers beside other scenes.
+    """
     examples = every_inputs(tmp_path)
     assert {type(each) for each in examples} == subclasses(Inputs) - {Page}
     for inputs in examples:
@@ -248,7 +280,9 @@ def test_the_code_of_inputs_within_inputs_counts(monkeypatch, tmp_path):
     """A row hangs on the code that computes its reference."""
     row = next(each for each in every_inputs(tmp_path) if isinstance(each, CellInputs))
     before, digest = row.key, module.source_digest
-    monkeypatch.setattr(module, "source_digest", lambda *names: digest(*names) + "x" * ("quadrature" in names[0]))
+    monkeypatch.setattr(
+        module, "source_digest", lambda *names: digest(*names) + "x" * ("quadrature" in names[0])
+    )
     assert replace(row).key != before
 
 
@@ -260,8 +294,28 @@ class Kind(Enum):
 def test_a_key_tells_types_apart_and_files_by_their_content(tmp_path):
     (tmp_path / "x").write_text("1")
     (tmp_path / "y").write_text("1")
-    values = [1, 2, 1.5, True, "1", None, (1,), ("1",), {"x": (1, 2.5)}, Kind.ONE, Kind.TWO, Inner((1, 2.0))]
-    values += [np.zeros(3), np.zeros((3, 1)), np.zeros(3, np.float32), np.float32(1), tmp_path / "x", tmp_path / "y"]
+    values = [
+        1,
+        2,
+        1.5,
+        True,
+        "1",
+        None,
+        (1,),
+        ("1",),
+        {"x": (1, 2.5)},
+        Kind.ONE,
+        Kind.TWO,
+        Inner((1, 2.0)),
+    ]
+    values += [
+        np.zeros(3),
+        np.zeros((3, 1)),
+        np.zeros(3, np.float32),
+        np.float32(1),
+        tmp_path / "x",
+        tmp_path / "y",
+    ]
     keys = [Page(value).key for value in values]
     assert len(set(keys)) == len(keys)
     assert Page({"a": 1, "b": 2}).key == Page({"b": 2, "a": 1}).key
@@ -270,7 +324,20 @@ def test_a_key_tells_types_apart_and_files_by_their_content(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "value", [{"a"}, frozenset("a"), [1], object(), print, b"a", {1: "a"}, np.array([object()]), int, mi, 1j]
+    "value",
+    [
+        {"a"},
+        frozenset("a"),
+        [1],
+        object(),
+        print,
+        b"a",
+        {1: "a"},
+        np.array([object()]),
+        int,
+        mi,
+        1j,
+    ],
 )
 def test_what_has_no_content_for_a_key_is_refused_and_not_spelt(value):
     with pytest.raises(TypeError, match="cannot be part of a key"):
@@ -279,7 +346,9 @@ def test_what_has_no_content_for_a_key_is_refused_and_not_spelt(value):
 
 def test_a_result_of_a_scene_that_has_no_digest_is_computed_and_not_cached(variant):
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), np.float32))}
-    scene = mi.load_dict(tiny_scene(ball={"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": texture}}))
+    scene = mi.load_dict(
+        tiny_scene(ball={"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": texture}})
+    )
     inputs, calls = SampledInputs(scene_content(scene)), list[int]()
 
     def compute() -> int:
@@ -288,5 +357,6 @@ def test_a_result_of_a_scene_that_has_no_digest_is_computed_and_not_cached(varia
 
     results = [stored(inputs, compute, int) for _ in range(2)]
     assert [(each.value, each.loaded) for each in results] == [(1, False), (2, False)]
-    assert CellInputs(replace(REFERENCE, scene=inputs.scene), CELL, (), MACHINE).key is None  # nor what hangs on it
+    # nor what hangs on it
+    assert CellInputs(replace(REFERENCE, scene=inputs.scene), CELL, (), MACHINE).key is None
     assert not list(cache_folder().glob("*"))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of point lights, samples, spots and suns: against the definition, closed forms, and cast rays."""
+"""Lit intervals of point lights, samples, spots and suns: against the definition,
+closed forms, and cast rays.
+"""
 
 from dataclasses import replace
 
@@ -31,7 +33,9 @@ def random_shapes(seed=4):
     draw = np.random.default_rng(seed)
     normal = draw.normal(size=(5, 3))
     disks = Disks(
-        draw.uniform(-4, 4, (5, 3)), normal / np.linalg.norm(normal, axis=1)[:, None], draw.uniform(0.2, 1, 5)
+        draw.uniform(-4, 4, (5, 3)),
+        normal / np.linalg.norm(normal, axis=1)[:, None],
+        draw.uniform(0.2, 1, 5),
     )
     triangles = draw.uniform(-4, 4, (60, 1, 3)) + draw.normal(size=(60, 3, 3)) * 0.6
     return Shapes(triangles, draw.uniform(-4, 4, (9, 3)), draw.uniform(0.1, 0.9, 9), disks)
@@ -61,12 +65,16 @@ PLACES = {
 @pytest.mark.parametrize(
     "place",
     [
-        pytest.param(each, marks=pytest.mark.slow if each in ("far", "sun overhead", "low sun") else ())
+        pytest.param(
+            each, marks=pytest.mark.slow if each in ("far", "sun overhead", "low sun") else ()
+        )
         for each in PLACES
     ],
 )
 def test_random_points_by_the_definition(variant, place):
-    """Triangles, spheres and disks all around: points far from an edge are lit or not, by a test of each shape."""
+    """Triangles, spheres and disks all around: points far from an edge are lit or not,
+    by a test of each shape.
+    """
     shapes, (light, w) = random_shapes(), PLACES[place]
     light = shapes.centre[2] + 0.03 if light is None else light
     direction = random_directions(300)
@@ -85,7 +93,8 @@ def test_random_points_by_the_definition(variant, place):
     start = np.broadcast_to(light, target.shape) if w else target + 30 * light
     hidden = segments_blocked(start, target, shapes)
     assert 0.05 < hidden.mean() < 1 if place == "in a sphere" else 0.05 < hidden.mean() < 0.95
-    # Where a plane all but touches a sphere, or a ray is all but along the light, rounding is worth more.
+    # Where a plane all but touches a sphere, or a ray is all but along the
+    # light, rounding is worth more.
     assert not np.any((inside == hidden)[gap > 1e-8])
 
 
@@ -118,7 +127,9 @@ def test_no_shape_in_the_light_is_left_out(variant, radius, w):
 
 @pytest.mark.claim("directional-reference", tolerance="1e-13")
 def test_one_triangle_in_closed_form(variant):
-    """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
+    """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where
+    it goes through the ray.
+    """
     direction = np.array([[1.0, 0, 0]])
     light = unit([3.0, 0.0, 4.0])  # cot = 3/4 for a ray along x
     rays, ends = rays_at(np.zeros(3), direction, light, w=0), (np.zeros(1), np.array([10.0]))
@@ -139,7 +150,9 @@ def test_one_triangle_in_closed_form(variant):
 
 @pytest.mark.claim("exact-shadows", tolerance="1e-12")
 def test_a_slit_of_a_billionth_is_found(variant):
-    """A light at the height 2 over a ray, two sheets at the height 1 with a slit: its image is twice as wide."""
+    """A light at the height 2 over a ray, two sheets at the height 1 with a slit:
+    its image is twice as wide.
+    """
     slit, direction = 1e-9, np.array([[1.0, 0, 0]])
     sheets = [
         [[-9.0, -1, 1], [-9.0, 1, 1], [0.5, 1, 1]],
@@ -152,7 +165,8 @@ def test_a_slit_of_a_billionth_is_found(variant):
     known = obstacles_of(shapes, Ball(light), np.zeros(3), direction, ends[1])
     found = lit_intervals(rays, ends, known, checks=0)
     assert found.low == pytest.approx([0.75], abs=1e-12)
-    assert found.high - found.low == pytest.approx([2 * slit], rel=1e-5)  # 1e-14 of rounding over 2e-9
+    # 1e-14 of rounding over 2e-9
+    assert found.high - found.low == pytest.approx([2 * slit], rel=1e-5)
 
 
 def setup(scene):
@@ -162,7 +176,9 @@ def setup(scene):
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_the_certificate_is_clean_and_notices_a_fault(variant):
-    """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
+    """Intervals from which one box is missing contradict the shadow rays, and
+    the test of all triangles.
+    """
     reference, rays, ends, known = setup(box_scene())
     right = lit_intervals(rays, ends, known)
     assert right.random_checks.checked == 32 * np.sum(ends[1] > ends[0])
@@ -172,7 +188,9 @@ def test_the_certificate_is_clean_and_notices_a_fault(variant):
     fewer = replace(known.shapes, triangles=known.shapes.triangles[12:])
     near = near_shapes(known.light, reference.origin, reference.direction, ends[1], fewer)
     wrong = lit_intervals(rays, ends, replace(known, shapes=fewer, near=near), checks=0)
-    checked = certified(wrong, rays, ends, occluders=reference.occluders, shapes=known.shapes, checks=16)
+    checked = certified(
+        wrong, rays, ends, occluders=reference.occluders, shapes=known.shapes, checks=16
+    )
     assert checked.random_checks.left > 20
     assert len(checked.doubt[0]) == checked.random_checks.left
 
@@ -191,13 +209,23 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
     doubted = quadrature.ray_values(reference)
     assert np.array_equal(doubted.airlight, plain.airlight)
     assert np.flatnonzero((doubted.bound > plain.bound).any(axis=1)).tolist() == [5]
-    # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian, if it were lit, is worth no more than this.
-    most = reference.medium.albedo * reference.medium.sigma_t * light.intensity / (4 * np.pi) * 1e-3 / rays.height[5]
+    # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian, if it were lit, is
+    # worth no more than this.
+    most = (
+        reference.medium.albedo
+        * reference.medium.sigma_t
+        * light.intensity
+        / (4 * np.pi)
+        * 1e-3
+        / rays.height[5]
+    )
     assert doubted.bound[5] - plain.bound[5] == pytest.approx(most, rel=1e-9)
 
 
 def test_surfaces_are_reached_as_rays_are(variant):
-    """The last interval reaches the surface where a float64 segment from just above it meets nothing."""
+    """The last interval reaches the surface where a float64 segment from
+    just above it meets nothing.
+    """
     _, rays, ends, known = setup(box_scene())
     lit = lit_intervals(rays, ends, known, checks=0)
     seen = np.flatnonzero(np.isfinite(ends[1]))
@@ -209,7 +237,9 @@ def test_surfaces_are_reached_as_rays_are(variant):
 
 @pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
-    """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
+    """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel,
+    and nothing contradicted.
+    """
     image = quadrature_image(read_reference(load_scene("colonnade", size=(32, 24)).scene))
     reached = image.airlight_bound < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999
@@ -217,7 +247,7 @@ def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     assert image.checked == 32 * 32 * 24
 
 
-# Spots ---------------------------------------------------------------------------------------------------------------
+# Spots --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.claim("spot-falloff")
@@ -233,7 +263,9 @@ def test_interval_against_sampling(degrees):
     rays = rays_at(origin, direction, light.position)
     low, high = cone_interval(rays, light, angle)
     theta = np.linspace(-0.499 * np.pi, 0.499 * np.pi, 401)
-    away = direction[:, None] * np.sin(theta)[:, None] + rays.normal[:, None] * np.cos(theta)[:, None]
+    away = (
+        direction[:, None] * np.sin(theta)[:, None] + rays.normal[:, None] * np.cos(theta)[:, None]
+    )
     cosine = away @ axis
     clear = np.abs(cosine - np.cos(angle)) > 1e-9
     inside = (theta >= low[:, None]) & (theta <= high[:, None])
@@ -250,7 +282,10 @@ def test_profile_is_that_of_mitsuba(variant):
     normal = rays.normal
     theta = np.linspace(-1.3, 1.3, 57)
     value = falloff(np.broadcast_to(theta, (len(normal), 57)), rays, light)
-    away = reference.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    away = (
+        reference.direction[:, None] * np.sin(theta)[:, None]
+        + normal[:, None] * np.cos(theta)[:, None]
+    )
     interaction = dr.zeros(mi.Interaction3f, away[..., 0].size)
     interaction.p = mi.Point3f((light.position + away).reshape(-1, 3).T)
     _, arriving = scene.emitters()[0].sample_direction(interaction, mi.Point2f(0.5))

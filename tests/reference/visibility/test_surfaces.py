@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: distances to surfaces are exact to float64, and where Mitsuba starts its shadow rays an exact test follows."""
+"""Claim: distances to surfaces are exact to float64, and where Mitsuba starts its shadow
+rays an exact test follows.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -20,14 +22,20 @@ def test_distance_to_a_plane_is_exact(variant):
     distance = exact_distance(reference, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)
     assert met.sum() > 50
-    assert distance[met] == pytest.approx((-reference.origin[2] / reference.direction[:, 2])[met], rel=1e-14)
+    assert distance[met] == pytest.approx(
+        (-reference.origin[2] / reference.direction[:, 2])[met], rel=1e-14
+    )
     assert np.isinf(distance[~met]).all()
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
 def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
-    sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
+    sphere = (
+        {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9}
+        if inside
+        else tiny_scene()["ball"]
+    )
     reference = read_reference(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
     hits = surface_hits(reference)
     distance = exact_distance(reference, hits.interaction, hits.distance)
@@ -35,20 +43,25 @@ def test_distance_to_a_sphere_is_exact(variant, inside):
     assert met.all() if inside else 5 < met.sum() < 100
     shapes = read_shapes(reference.occluders)
     point = reference.origin + distance[met, None] * reference.direction[met]
-    assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
+    assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(
+        shapes.radius.item(), rel=1e-14
+    )
     assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
     assert np.isinf(distance[~met]).all()
 
 
-# Where Mitsuba starts its shadow rays: edges that move ---------------------------------------------------------------
+# Where Mitsuba starts its shadow rays: edges that move --------------------------------------------
 
 
 LIGHT = np.array([1.0, 0.0, 3.0])
-NEAR, FAR = 2e-5, 1e-3  # from the edge of the shadow: less and more than half of what the rays start off the floor [m]
+# from the edge of the shadow: less and more than half of what the rays start off the floor [m]
+NEAR, FAR = 2e-5, 1e-3
 
 
 def half_covered_floor():
-    """A floor whose left is shadowed: the edge of a roof at x = 0, one above it, has its shadow at x = -1/2."""
+    """A floor whose left is shadowed: the edge of a roof at x = 0, one above it,
+    has its shadow at x = -1/2.
+    """
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     return mi.load_dict(
         {
@@ -77,7 +90,9 @@ def test_edges_of_shadows_move(variant):
 
 
 def test_segments_are_blocked_as_rays_are(variant):
-    """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
+    """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on
+    edges, one in a million.
+    """
     scene = mi.load_dict(tiny_scene())
     shapes = read_shapes(read_reference(scene).occluders)
     random = np.random.default_rng(5)
@@ -93,7 +108,9 @@ def test_segments_are_blocked_as_rays_are(variant):
 
 @pytest.mark.claim("shadow-rays-start-off-the-surface")
 def test_the_reference_of_a_renderer_with_an_epsilon_has_its_edges(variant):
-    """A camera that sees nothing but the band between the two edges: lit in the reference, dark for such a renderer."""
+    """A camera that sees nothing but the band between the two edges: lit in the reference,
+    dark for such a renderer.
+    """
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     camera = mi.ScalarTransform4f().look_at(
         origin=[-0.5 + NEAR, 0.1, 0.4], target=[-0.5 + NEAR, 0.1, 0.0], up=[0, 1, 0]

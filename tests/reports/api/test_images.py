@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`import airlight`: the functions do what the parts they are made of do, and refuse in one line what they cannot."""
+"""`import airlight`: the functions do what the parts they are made of do, and refuse in
+one line what they cannot.
+"""
 
 import doctest
 import importlib
@@ -48,7 +50,9 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
     named = airlight.load_scene(SCENES["open-fog"].build(), TINY)
     assert named.size == TINY
     assert airlight.load_scene(mi.load_dict(SCENES["open-fog"].build())).size == (800, 600)
-    by_name, by_dictionary = (airlight.render(described, "unshadowed") for described in (scene, named))
+    by_name, by_dictionary = (
+        airlight.render(described, "unshadowed") for described in (scene, named)
+    )
     np.testing.assert_array_equal(by_name.airlight, by_dictionary.airlight)
     assert "1 point" in scene._repr_html_()
 
@@ -59,7 +63,9 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
 def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
     from airlight.validation.study.configuration import configuration, prepared
 
-    frame = airlight.render("sphere-spot", "shadow-planes-2006", "quadrature-32", size=TINY, order="none")
+    frame = airlight.render(
+        "sphere-spot", "shadow-planes-2006", "quadrature-32", size=TINY, order="none"
+    )
     scene = airlight.read_scene(airlight.load_scene("sphere-spot", TINY).scene)
     chosen = configuration("shadow-planes-2006", "quadrature-32", {"order": "none"})
     direct = airlight.render_frame(prepared(scene, chosen))
@@ -84,7 +90,9 @@ def test_a_function_of_ones_own_is_a_method(variant):
     assert airlight.render("open-fog", own.method, size=TINY).kernel == "exact"
     thirds = airlight.render("open-fog", brighter, third, size=TINY)
     np.testing.assert_allclose(thirds.airlight, 2 / 3 * usual.airlight, rtol=1e-6)
-    with pytest.raises(airlight.InputError, match=r"test_images\.py, line \d+: ZeroDivisionError: nothing there"):
+    with pytest.raises(
+        airlight.InputError, match=r"test_images\.py, line \d+: ZeroDivisionError: nothing there"
+    ):
         airlight.render("open-fog", gone, size=TINY)
 
 
@@ -94,12 +102,16 @@ def test_a_function_of_ones_own_is_a_method(variant):
 def test_the_reference_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
-    reference = airlight.reference(scene, progress=lambda fraction, what: told.append((fraction, what)))
+    reference = airlight.reference(
+        scene, progress=lambda fraction, what: told.append((fraction, what))
+    )
     np.testing.assert_array_equal(reference.airlight, reference_image(scene.scene).airlight)
     assert reference.bound.shape == reference.airlight.shape == (12, 16, 3)
     assert reference.airlight.dtype == np.float64
     assert reference.standard_error is reference.surface_standard_error is None
-    assert reference.relative_error == pytest.approx(float(reference.bound.mean() / reference.airlight.mean()))
+    assert reference.relative_error == pytest.approx(
+        float(reference.bound.mean() / reference.airlight.mean())
+    )
     assert reference.how.left == 0
     assert told[-1] == (1.0, "quadrature")
     assert np.isfinite(reference.depth).any()
@@ -115,7 +127,8 @@ def test_a_reference_by_samples_with_its_standard_error(variant):
     compared = airlight.compare(traced, reference, margin=0.1)
     assert compared.statistics.equivalent
     assert compared.passed
-    # Student's law for 32 batches: one of 576 values is beyond 8 standard errors with a probability of 3e-6.
+    # Student's law for 32 batches: one of 576 values is beyond 8 standard errors
+    # with a probability of 3e-6.
     assert np.max(np.abs(traced.airlight - reference.airlight) / traced.standard_error) < 8
 
 
@@ -125,7 +138,10 @@ def test_a_reference_by_samples_with_its_standard_error(variant):
 def test_images_files_and_arrays_compare_alike(variant, tmp_path):
     reference = airlight.reference("sphere-spot", size=TINY)
     frame = airlight.render("sphere-spot", "ray-march", size=TINY, steps=16)
-    reference_file, frame_file = reference.save(tmp_path / "reference.exr"), frame.save(tmp_path / "frame.exr")
+    reference_file, frame_file = (
+        reference.save(tmp_path / "reference.exr"),
+        frame.save(tmp_path / "frame.exr"),
+    )
     direct = airlight.compare(reference, frame)
     assert direct.metrics == airlight.error_metrics(reference.airlight, frame.airlight)
     assert airlight.compare(reference.airlight, frame.airlight).metrics == direct.metrics
@@ -159,13 +175,21 @@ SMALL = {"scene": "open-fog", "size": (8, 6)}
         ("render", SMALL | {"method": "ray-marhc"}, "did you mean 'ray-march'"),
         ("render", SMALL | {"method": "ray-march", "kernel": "exact"}, "calls no kernel"),
         ("render", SMALL | {"method": "ray-march", "steps": 2.5}, "expected a whole number"),
-        ("render", SMALL | {"method": lambda view: 0}, "expected a name or a function at the top of a module"),
+        (
+            "render",
+            SMALL | {"method": lambda view: 0},
+            "expected a name or a function at the top of a module",
+        ),
         ("render", SMALL | {"precision": "half"}, "precision"),
         ("reference", SMALL | {"pixel": "corner"}, "'centre' or 'area'"),
         ("compare", {"reference": ONES, "test": np.ones((2, 3, 3))}, "two sizes"),
         ("compare", {"reference": ONES, "test": ONES, "margin": 0.1}, "a margin needs errors"),
         ("compare", {"reference": [["a"]], "test": ONES}, "the reference: got list"),
-        ("compare", {"reference": ONES, "test": ONES, "mask": np.ones((2, 2))}, "expected truth values"),
+        (
+            "compare",
+            {"reference": ONES, "test": ONES, "mask": np.ones((2, 2))},
+            "expected truth values",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(variant, name, arguments, words):

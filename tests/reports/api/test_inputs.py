@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arguments from Python mean what the words of a command mean, and what neither can say is refused in one line."""
+"""Arguments from Python mean what the words of a command mean, and what neither can
+say is refused in one line.
+"""
 
 import numpy as np
 import pytest
@@ -23,16 +25,22 @@ from tests.helpers.api import third
 
 def test_changes_by_name_are_those_of_words():
     words = ["medium.sigma_t=0.1,0.2,0.3", "medium.albedo=0.5"]
-    assert changes_of({"medium.sigma_t": (0.1, 0.2, 0.3), "medium.albedo": 0.5}) == changes_of(words)
+    assert changes_of({"medium.sigma_t": (0.1, 0.2, 0.3), "medium.albedo": 0.5}) == changes_of(
+        words
+    )
     assert changes_of({"medium.sigma_t": [0.1, 0.2, 0.3]}) == changes_of(words[0])
     assert changes_of(()) == changes_of(None) == changes_of({}) == {}
 
 
 def test_a_size_is_two_whole_numbers_or_words():
-    assert pixels_of("16x12") == pixels_of((16, 12)) == pixels_of(np.array([16.0, 12.0])) == (16, 12)
+    assert (
+        pixels_of("16x12") == pixels_of((16, 12)) == pixels_of(np.array([16.0, 12.0])) == (16, 12)
+    )
     assert pixels_of(None) is None
     for wrong in [(16.5, 12), (16,), 16, ("wide", 12)]:
-        with pytest.raises(airlight.InputError, match=r"^size: got .*, expected \(width, height\) in pixels"):
+        with pytest.raises(
+            airlight.InputError, match=r"^size: got .*, expected \(width, height\) in pixels"
+        ):
             pixels_of(wrong)
 
 
@@ -41,7 +49,9 @@ def test_a_kernel_is_a_name_or_a_function_that_another_process_can_import():
     assert kernel_name(None) is None
     assert kernel_name(third) == "tests.helpers.api:third"
     for wrong in (lambda *rays: 0.0, 3):
-        with pytest.raises(airlight.InputError, match=r"^kernel: got .*, expected a name or a function at the top"):
+        with pytest.raises(
+            airlight.InputError, match=r"^kernel: got .*, expected a name or a function at the top"
+        ):
             kernel_name(wrong)
 
 
@@ -49,14 +59,18 @@ def test_a_configuration_has_its_own_kernel_and_parameters(variant):
     chosen = configuration("shadow-planes", "taylor", {"points": 8})
     assert configuration_of(chosen, None, {}) is chosen
     assert configuration_of("shadow-planes", "taylor", {"points": 8}) == chosen
-    with pytest.raises(airlight.InputError, match=r"its own kernel and parameters; leave out kernel, points$"):
+    with pytest.raises(
+        airlight.InputError, match=r"its own kernel and parameters; leave out kernel, points$"
+    ):
         configuration_of(chosen, "exact", {"points": 3})
 
 
 def test_files_have_one_of_the_endings_and_none_is_no_file(tmp_path):
     assert output_files(None) == output_files(()) == []
     assert output_files(tmp_path / "a.EXR", ".exr (values)") == [tmp_path / "a.EXR"]
-    with pytest.raises(airlight.InputError, match=r"expected a name that ends in \.exr \(values\) or \.png"):
+    with pytest.raises(
+        airlight.InputError, match=r"expected a name that ends in \.exr \(values\) or \.png"
+    ):
         output_files([tmp_path / "a.exr", tmp_path / "a.jpg"], ".exr (values)", ".png")
 
 
@@ -64,7 +78,11 @@ def test_files_have_one_of_the_endings_and_none_is_no_file(tmp_path):
     ("raised", "seen", "words"),
     [
         (InputError("no light"), airlight.InputError, "^no light$"),
-        (NoDriverError("EGL 1.4"), MissingError, r"^shaders need OpenGL 4\.3, and it does not start \(EGL 1\.4\)"),
+        (
+            NoDriverError("EGL 1.4"),
+            MissingError,
+            r"^shaders need OpenGL 4\.3, and it does not start \(EGL 1\.4\)",
+        ),
         (NoDriverError("no moderngl"), MissingError, "^shaders need the package moderngl"),
         (ZeroDivisionError("a fault"), ZeroDivisionError, "^a fault$"),
     ],
@@ -104,14 +122,38 @@ OF_SCENE = {"reference": "open-fog", "test": np.ones((3, 4, 3))}
             OF_SCENE | {"frames": "f.json"},
             "save the images",
         ),
-        (airlight.reference, {"scene": "open-fog", "estimator": "volpaht"}, "did you mean 'volpath'"),
-        (airlight.reference, {"scene": object(), "cluster": "local:2"}, "by its name or path; give that"),
-        (airlight.reference, {"scene": "a", "estimator": "volpath", "seconds": 3, "cluster": "local"}, "is chance"),
-        (airlight.render, {"scene": "open-fog", "samples": 0}, "samples: got 0, expected 1 or more"),
+        (
+            airlight.reference,
+            {"scene": "open-fog", "estimator": "volpaht"},
+            "did you mean 'volpath'",
+        ),
+        (
+            airlight.reference,
+            {"scene": object(), "cluster": "local:2"},
+            "by its name or path; give that",
+        ),
+        (
+            airlight.reference,
+            {"scene": "a", "estimator": "volpath", "seconds": 3, "cluster": "local"},
+            "is chance",
+        ),
+        (
+            airlight.render,
+            {"scene": "open-fog", "samples": 0},
+            "samples: got 0, expected 1 or more",
+        ),
         (airlight.render, {"scene": "open-fog", "frames": 0}, "frames: got 0, expected 1 or more"),
-        (airlight.render, {"scene": "open-fog", "run": -1}, "run: got -1, expected a whole number from 0"),
+        (
+            airlight.render,
+            {"scene": "open-fog", "run": -1},
+            "run: got -1, expected a whole number from 0",
+        ),
         (airlight.render, {"scene": "open-fog", "frame": 2**31}, "frame: got 2147483648"),
-        (airlight.render, {"scene": "open-fog", "animate": "light"}, "animate: got no number of frames"),
+        (
+            airlight.render,
+            {"scene": "open-fog", "animate": "light"},
+            "animate: got no number of frames",
+        ),
         (airlight.list, {"what": "scene"}, "did you mean 'scenes'"),
     ],
 )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
+"""Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from
+made-up numbers, no scene.
+"""
 
 import base64
 import dataclasses
@@ -28,7 +30,13 @@ def layered(scale=1.0, dtype=np.float32, **more):
 
 
 def rendering(scale=1.0, dtype=np.float32, **fields):
-    made = {"kernel": None, "parameters": {"steps": 3}, "precision": "single", "plan": {}, "label": "slow (steps=3)"}
+    made = {
+        "kernel": None,
+        "parameters": {"steps": 3},
+        "precision": "single",
+        "plan": {},
+        "label": "slow (steps=3)",
+    }
     image = sealed(layered(scale, dtype))
     return Rendering(scene="<made & up>", image=image, method="slow", **(made | fields))
 
@@ -38,7 +46,11 @@ def reference(**more):
     return Reference(scene="<made & up>", image=image, estimator="quadrature", relative_error=1e-9)
 
 
-RESULTS = {"rendering": rendering, "reference": reference, "comparison": lambda: compare(reference(), rendering(1.01))}
+RESULTS = {
+    "rendering": rendering,
+    "reference": reference,
+    "comparison": lambda: compare(reference(), rendering(1.01)),
+}
 
 
 @pytest.mark.claim("results-are-frozen")
@@ -54,23 +66,35 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
     own[0] = 0  # one's own
 
 
-@pytest.mark.parametrize("show", [Reference.text, Reference._repr_html_], ids=["terminal", "notebook"])
+@pytest.mark.parametrize(
+    "show", [Reference.text, Reference._repr_html_], ids=["terminal", "notebook"]
+)
 def test_a_quadrature_of_an_area_light_says_where_its_standard_errors_come_from(show):
-    """Its header has a number of batches, but no samples a pixel and no seeds: it traced nothing."""
+    """Its header has a number of batches, but no samples a pixel and no
+    seeds: it traced nothing.
+    """
     image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3))
     image.attributes["airlight:batches"] = 8
-    shown = show(Reference(scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3))
+    shown = show(
+        Reference(scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3)
+    )
     assert "standard errors from 8 independent sets of light samples" in shown
     assert "seeds" not in shown
 
 
 def traced(*, batches=64, reached=None, masked=0, cached=0, damaged=0, errors=None):
     """A reference by samples, as its run ended."""
-    image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3), surface_se=np.full((4, 6, 3), 2e-3))
-    image.attributes.update({"airlight:batches": batches, "airlight:spp": 2 * batches, "airlight:seeds": "3-66"})
+    image = layered(
+        dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3), surface_se=np.full((4, 6, 3), 2e-3)
+    )
+    image.attributes.update(
+        {"airlight:batches": batches, "airlight:spp": 2 * batches, "airlight:seeds": "3-66"}
+    )
     errors = errors or RelativeErrors(0.0123, 0.456)
     how = MonteCarloReference(image, errors, reached, masked, cached, damaged)
-    return Reference(scene="fog", image=sealed(image), estimator="volpath", relative_error=0.0123, how=how)
+    return Reference(
+        scene="fog", image=sealed(image), estimator="volpath", relative_error=0.0123, how=how
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,13 +103,17 @@ def traced(*, batches=64, reached=None, masked=0, cached=0, damaged=0, errors=No
         ({}, "  standard error 1.23 % of the image, 45.6 % of the worst pixel"),
         (
             {"masked": 7},
-            "  standard error 1.23 % of the image, 45.6 % of the worst pixel; 7 pixels beside a light left",
+            "  standard error 1.23 % of the image, 45.6 % of the worst pixel; 7 pixels beside a "
+            "light left",
         ),
         ({"cached": 40}, "  40 of 64 batches from the cache"),
         ({"damaged": 1}, "  1 damaged file of the cache traced again"),
         ({"damaged": 2}, "  2 damaged files of the cache traced again"),
         ({"batches": 9}, "  a standard error from 9 batches is known to 25 % only"),
-        ({"errors": RelativeErrors(None, None, "all pixels are beside a light")}, "unknown: all pixels are beside"),
+        (
+            {"errors": RelativeErrors(None, None, "all pixels are beside a light")},
+            "unknown: all pixels are beside",
+        ),
         ({"reached": False}, "  the target error was not reached"),
     ],
 )
@@ -94,7 +122,8 @@ def test_a_reference_by_samples_says_how_well_it_is_known_and_how_it_came_about(
     assert words in text
     assert (words in traced().text()) is (changes == {})
     assert (
-        f"{2 * changes.get('batches', 64)} samples a pixel in {changes.get('batches', 64)} batches, seeds 3-66" in text
+        f"{2 * changes.get('batches', 64)} samples a pixel in {changes.get('batches', 64)} "
+        "batches, seeds 3-66" in text
     )
 
 
@@ -107,7 +136,10 @@ def test_a_run_fails_where_the_error_that_was_asked_for_was_not_reached(reached,
 def test_a_reference_by_samples_has_its_standard_errors_and_no_bound():
     run = traced()
     assert run.bound is None
-    assert (float(run.standard_error[0, 0, 0]), float(run.surface_standard_error[0, 0, 0])) == (1e-3, 2e-3)
+    assert (float(run.standard_error[0, 0, 0]), float(run.surface_standard_error[0, 0, 0])) == (
+        1e-3,
+        2e-3,
+    )
     assert reference(airlight_bound=np.full((4, 6, 3), 1e-9)).bound.shape == (4, 6, 3)
 
 
@@ -127,14 +159,15 @@ def test_an_animation_says_what_a_frame_costs_and_which_files_there_are():
     )
     assert frames.text().splitlines() == [
         "hall, ray-march: 2 frames, light and medium moving",
-        "  20 ms a frame (50 frames/s): 1.5 ms to move, 18.5 ms to render, reusing what stood still; llvm_ad_rgb",
+        "  20 ms a frame (50 frames/s): 1.5 ms to move, 18.5 ms to render, reusing what stood "
+        "still; llvm_ad_rgb",
         "wrote a-0001.exr to a-0002.exr: 2 files, 16 x 12 pixels",
         "wrote a-0001.png to a-0002.png: 2 files, 16 x 12 pixels",
         "wrote a.json: what changes",
     ]
 
 
-# In a notebook --------------------------------------------------------------------------------------------------------
+# In a notebook ------------------------------------------------------------------------------------
 
 
 def pixels(png):
@@ -156,7 +189,9 @@ def test_a_notebook_shows_all_light_and_the_airlight_where_that_is_another_pictu
     np.testing.assert_array_equal(shown["airlight"], frame.picture("airlight"))
     assert (shown["airlight"] < shown["all light"]).all()  # in the exposure of the total
     monkeypatch.setattr("airlight.reports.tables.record._NARROW", 1)  # no picture is enlarged
-    assert re.findall(r"inline-block;width:(\d+)px", frame._repr_html_()) == 2 * [str(frame.size[0])]
+    assert re.findall(r"inline-block;width:(\d+)px", frame._repr_html_()) == 2 * [
+        str(frame.size[0])
+    ]
     assert "nothing written" not in frame._repr_html_()  # the command's words
     assert "&lt;made &amp; up&gt; by slow (steps=3)" in frame._repr_html_()
     fog = dataclasses.replace(frame, image=sealed(layered(surface=np.zeros((4, 6, 3), np.float32))))
@@ -170,7 +205,10 @@ def test_a_comparison_in_a_notebook_has_both_images_in_one_exposure_and_where_th
     compared = compare(exact, dark)
     shown = figures(compared._repr_html_())
     first, second, scale = shown
-    assert (first, second) == ("&lt;made &amp; up&gt;, the reference by quadrature", "the test image")
+    assert (first, second) == (
+        "&lt;made &amp; up&gt;, the reference by quadrature",
+        "the test image",
+    )
     assert "blue too dark, red too bright" in scale
     same = np.ones((4, 6), bool)
     same[2, 3] = False
@@ -187,7 +225,8 @@ def test_a_comparison_is_an_array_of_relative_errors_and_one_line():
     compared = compare(exact, 1.01 * exact.airlight)
     np.testing.assert_allclose(np.asarray(compared), 0.01, rtol=1e-9)
     assert repr(compared) == (
-        "ImageComparison(airlight of the test image against <made & up>, the reference by quadrature: "
+        "ImageComparison(airlight of the test image against <made & up>, the reference by "
+        "quadrature: "
         f"relative RMSE {compared.metrics.relative_rmse:.3g}, relative bias 0.01, passed)"
     )
     assert "relative 1 %" in compared.text()
@@ -225,7 +264,8 @@ def test_numpy_takes_a_result_as_its_total():
     assert np.shares_memory(np.asarray(frame), frame.total)
     assert not np.shares_memory(np.array(frame), frame.total)
     assert np.asarray(frame, dtype=np.float64).dtype == np.float64
-    assert float(np.mean(frame)) == pytest.approx(0.55 + 0.25, rel=1e-6)  # the mean of a ramp is its middle
+    # the mean of a ramp is its middle
+    assert float(np.mean(frame)) == pytest.approx(0.55 + 0.25, rel=1e-6)
     with pytest.raises(ValueError, match="copy"):
         np.array(frame, dtype=np.float64, copy=False)
 
@@ -236,7 +276,10 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     read = read_exr(frame.save(tmp_path / "frame.exr"))
     np.testing.assert_array_equal(read.layers["airlight"], frame.airlight)
     assert any(key.startswith("airlight:version:") for key in read.attributes)
-    assert (read.attributes["airlight:commit"], read.attributes["airlight:digest"]) == (build().commit, build().digest)
+    assert (read.attributes["airlight:commit"], read.attributes["airlight:digest"]) == (
+        build().commit,
+        build().digest,
+    )
     with Picture.open(frame.save(tmp_path / "frame.png")) as shown:
         assert shown.size == (6, 4)
     with pytest.raises(InputError, match=r"\.exr .* or \.png"):
@@ -246,11 +289,22 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
 
 @pytest.mark.claim("image-files")
 def test_the_picture_that_users_look_at_first_has_all_light_the_right_way_up(tmp_path):
-    """16 x 12 pixels against a picture by hand: Reinhard's curve on airlight and surface, encoded as sRGB."""
+    """16 x 12 pixels against a picture by hand: Reinhard's curve on airlight and
+    surface, encoded as sRGB.
+    """
     random = np.random.default_rng(7)
-    airlight, surface = (random.uniform(0.0, top, (12, 16, 3)).astype(np.float32) for top in (0.3, 1.0))
+    airlight, surface = (
+        random.uniform(0.0, top, (12, 16, 3)).astype(np.float32) for top in (0.3, 1.0)
+    )
     image = Image({"airlight": airlight, "surface": surface}, np.ones((12, 16), np.float32), {})
-    fields = {"kernel": None, "parameters": {}, "precision": "single", "plan": {}, "label": "m", "method": "m"}
+    fields = {
+        "kernel": None,
+        "parameters": {},
+        "precision": "single",
+        "plan": {},
+        "label": "m",
+        "method": "m",
+    }
     frame = Rendering(scene="golden", image=sealed(image), **fields)
     with Picture.open(frame.save(tmp_path / "frame.png")) as shown:
         pixels = np.asarray(shown.convert("RGB")).astype(int)
@@ -264,7 +318,9 @@ def test_the_picture_that_users_look_at_first_has_all_light_the_right_way_up(tmp
 
 
 def test_rows_are_records_and_columns_by_their_paths():
-    rows = [Row("fog", label, "m", None, "{}", 8, 6, "refused", reason="no <lights>") for label in "ab"]
+    rows = [
+        Row("fog", label, "m", None, "{}", 8, 6, "refused", reason="no <lights>") for label in "ab"
+    ]
     benched = MethodsStudy(name="methods", data={}, rows=tuple(rows))
     assert benched.fastest(0.5) is None
     assert len(benched) == 2

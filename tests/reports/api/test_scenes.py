@@ -21,23 +21,32 @@ def test_a_loaded_scene_is_neither_changed_nor_loaded_at_another_size(variant):
     scene = airlight.load_scene("open-fog", TINY)
     with pytest.raises(airlight.InputError, match="change: is for a scene by name or path"):
         airlight.render(scene, "unshadowed", change={"medium.sigma_t": 0.1})
-    with pytest.raises(airlight.InputError, match=r"size: got 8x6 for a scene that is loaded already, at 16x12"):
+    with pytest.raises(
+        airlight.InputError, match=r"size: got 8x6 for a scene that is loaded already, at 16x12"
+    ):
         airlight.load_scene(scene, (8, 6))
-    with pytest.raises(airlight.InputError, match=r"got 8x6 for a scene that is loaded already, at 800x600"):
+    with pytest.raises(
+        airlight.InputError, match=r"got 8x6 for a scene that is loaded already, at 800x600"
+    ):
         airlight.load_scene(mi.load_dict(SCENES["open-fog"].build()), (8, 6))
     assert scene.size == TINY
 
 
 def test_a_dictionary_has_its_own_size_and_one_that_mitsuba_refuses_says_why(variant):
     assert airlight.load_scene(DARK).size == TINY
-    with pytest.raises(airlight.InputError, match=r"Mitsuba cannot build the dictionary: .*no_such_shape") as raised:
+    with pytest.raises(
+        airlight.InputError, match=r"Mitsuba cannot build the dictionary: .*no_such_shape"
+    ) as raised:
         airlight.load_scene(DARK | {"floor": {"type": "no_such_shape"}})
     assert "\n" not in str(raised.value)
 
 
 def test_a_scene_of_another_variant_says_when_to_build_it(variant):
     other = type("Scene", (), {"__module__": "mitsuba.scalar_rgb"})()
-    with pytest.raises(airlight.InputError, match=rf"of another variant than {variant}; call airlight\.activate\(\)"):
+    with pytest.raises(
+        airlight.InputError,
+        match=rf"of another variant than {variant}; call airlight\.activate\(\)",
+    ):
         airlight.load_scene(other)
 
 

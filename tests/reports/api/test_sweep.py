@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight sweep`: what becomes of each cell is counted, said and kept; what went wrong is computed again.
+"""`airlight sweep`: what becomes of each cell is counted, said and kept; what went
+wrong is computed again.
 
-The workers are a stub, which ends each task as the test says: `tests/reports/cluster` has the processes.
+The workers are a stub, which ends each task as the test says:
+`tests/reports/cluster` has the processes.
 """
 
 import json
@@ -25,7 +27,9 @@ times = "{}"
 
 
 class Workers:
-    """Stubs of a cluster and of what it makes of tasks: done, unless `ends` has a status for a method or a kind."""
+    """Stubs of a cluster and of what it makes of tasks: done, unless `ends` has a
+    status for a method or a kind.
+    """
 
     def __init__(self, folder):
         self.folder, self.ends, self.places, self.seen = folder, {}, [], []
@@ -80,7 +84,9 @@ def rows(folder):
     return [json.loads(line) for line in (folder / "sweep.jsonl").read_text().splitlines()]
 
 
-@pytest.mark.claim("sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again")
+@pytest.mark.claim(
+    "sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again"
+)
 def test_every_cell_becomes_a_row_and_the_same_study_computes_none_again(sweep, workers):
     printed = sweep("--cluster", "local:3")
     assert printed.splitlines() == [
@@ -91,9 +97,13 @@ def test_every_cell_becomes_a_row_and_the_same_study_computes_none_again(sweep, 
         f"  what they say: airlight sweep --from {workers.folder}",
     ]
     assert workers.places == [(3, True)]  # images that nobody times are compiled quickly
-    found = [(row["scene"], row["method"], row["study"], row["attempts"]) for row in rows(workers.folder)]
+    found = [
+        (row["scene"], row["method"], row["study"], row["attempts"]) for row in rows(workers.folder)
+    ]
     assert found == [
-        (scene, name, "small", 2) for scene in ("open-fog", "omni-box") for name in ("unshadowed", "ray-march")
+        (scene, name, "small", 2)
+        for scene in ("open-fog", "omni-box")
+        for name in ("unshadowed", "ray-march")
     ]
     again = sweep("--json")
     assert (again["cached"], again["computed"], again["left"], again["counts"]) == (4, 0, 0, {})
@@ -101,15 +111,24 @@ def test_every_cell_becomes_a_row_and_the_same_study_computes_none_again(sweep, 
 
 
 @pytest.mark.parametrize("status", ["failed", "hung", "aborted"])
-def test_cells_that_went_wrong_are_named_end_with_one_and_are_computed_again(sweep, workers, status):
+def test_cells_that_went_wrong_are_named_end_with_one_and_are_computed_again(
+    sweep, workers, status
+):
     workers.ends["ray-march"] = status
     printed = sweep(status=1)
     assert f"  {status}: 2\n" in printed
     assert f"  {status}: open-fog, ray-march: why {status}\n" in printed
-    assert [row["reason"] for row in rows(workers.folder) if row["method"] == "ray-march"] == [f"why {status}"] * 2
+    assert [row["reason"] for row in rows(workers.folder) if row["method"] == "ray-march"] == [
+        f"why {status}"
+    ] * 2
     workers.ends.clear()
     again = sweep("--json")
-    assert (again["cached"], again["computed"], again["counts"], again["problems"]) == (2, 2, {"done": 2}, [])
+    assert (again["cached"], again["computed"], again["counts"], again["problems"]) == (
+        2,
+        2,
+        {"done": 2},
+        [],
+    )
 
 
 def test_a_refusal_is_a_result(sweep, workers):
@@ -157,7 +176,9 @@ def test_images_are_timed_by_one_process_after_all_errors(sweep, workers, tmp_pa
     assert {(row[FRAME_MS], row["cost.alone"]) for row in rows(workers.folder)} == {(1.5, True)}
 
 
-def test_without_a_study_a_number_of_random_scenes_is_swept_into_a_folder_of_its_name(workers, tmp_path, capsys):
+def test_without_a_study_a_number_of_random_scenes_is_swept_into_a_folder_of_its_name(
+    workers, tmp_path, capsys
+):
     workers.ends["unshadowed"] = "refused"
     assert run(["sweep", "2", "--cluster", "local:1", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)

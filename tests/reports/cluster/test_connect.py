@@ -45,7 +45,8 @@ def test_where_no_scheduler_answers(monkeypatch):
 def _dask(*words, root=ROOT):
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *words],
-        env=os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'src'}"},  # its tests, and its package
+        # its tests, and its package
+        env=os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'src'}"},
         cwd=root,  # which stands first among the places of modules
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -84,10 +85,14 @@ def _ended(*processes):
 
 
 def other_version(tmp_path):
-    """Return a copy of the package whose code has one more statement: comments do not make another version."""
+    """Return a copy of the package whose code has one more statement: comments do
+    not make another version.
+    """
     other = tmp_path / "other"
     for name in ("analytic", "realtime", "reference", "validation", "reports", "tests"):
-        shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__", "data"))
+        shutil.copytree(
+            ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__", "data")
+        )
     shutil.copytree(ROOT / "src" / "airlight", other / "src" / "airlight", symlinks=True)
     changed = other / "realtime" / "scene" / "read_scene.py"
     changed.write_text(changed.read_text() + "\nOTHER_VERSION = True\n")
@@ -96,7 +101,9 @@ def other_version(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.claim("workers-of-one-version", tolerance="none")
-def test_a_worker_of_another_version_that_joins_a_run_is_refused_by_name(tmp_path, monkeypatch, variant):
+def test_a_worker_of_another_version_that_joins_a_run_is_refused_by_name(
+    tmp_path, monkeypatch, variant
+):
     monkeypatch.setattr(connect, "_PATIENCE", 120.0)  # of a busy machine
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"

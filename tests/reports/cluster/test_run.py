@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: every task ends in one outcome, whatever happens to its process, and only the guilty one is given up."""
+"""Claim: every task ends in one outcome, whatever happens to its process, and only
+the guilty one is given up.
+"""
 
 import os
 import signal
@@ -27,7 +29,9 @@ def cluster():
 def outcomes(cluster, *groups, **options):
     """Return status, value and reason of every task by name; no task has two outcomes."""
     ended = list(run_groups(cluster, groups, **options))
-    assert not [name for name, count in Counter(each.task.name for each in ended).items() if count > 1]
+    assert not [
+        name for name, count in Counter(each.task.name for each in ended).items() if count > 1
+    ]
     return {each.task.name: each for each in ended}
 
 
@@ -39,8 +43,13 @@ def test_values_refusals_and_faults(cluster):
     ended = outcomes(
         cluster,
         alone(*(Task(f"s{n}", tasks.square, (n,)) for n in range(20))),
-        alone(Task("dark", tasks.refuse), Task("fault", tasks.fail), Task("large", tasks.large, (7,))),
-        Group((Task("one", tasks.add, (1,)), Task("two", tasks.add, (2,))), Task("ten", tasks.square, (10,))),
+        alone(
+            Task("dark", tasks.refuse), Task("fault", tasks.fail), Task("large", tasks.large, (7,))
+        ),
+        Group(
+            (Task("one", tasks.add, (1,)), Task("two", tasks.add, (2,))),
+            Task("ten", tasks.square, (10,)),
+        ),
         Group((Task("dim", tasks.add, (1,)),), Task("night", tasks.refuse)),
     )
     assert [ended[f"s{n}"].value for n in range(20)] == [n * n for n in range(20)]
@@ -54,7 +63,9 @@ def test_values_refusals_and_faults(cluster):
 
 
 def test_what_belongs_together_is_done_by_one_process_and_all_have_work(cluster):
-    groups = [Group(tuple(Task(f"{g}-{n}", tasks.process, (0.05,)) for n in range(4))) for g in range(8)]
+    groups = [
+        Group(tuple(Task(f"{g}-{n}", tasks.process, (0.05,)) for n in range(4))) for g in range(8)
+    ]
     ended = outcomes(cluster, *groups)
     processes = [{ended[task.name].value for task in group.tasks} for group in groups]
     assert [len(each) for each in processes] == [1] * len(groups)
@@ -72,10 +83,15 @@ def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
 
 @pytest.mark.slow
 @pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
-@pytest.mark.parametrize("hang", [tasks.sleep_for_ever, tasks.hold_the_interpreter], ids=lambda task: task.__name__)
+@pytest.mark.parametrize(
+    "hang", [tasks.sleep_for_ever, tasks.hold_the_interpreter], ids=lambda task: task.__name__
+)
 def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
     ended = outcomes(
-        cluster, alone(Task("hang", hang, limit=1.0), *(Task(f"s{n}", tasks.square, (n,)) for n in range(4)))
+        cluster,
+        alone(
+            Task("hang", hang, limit=1.0), *(Task(f"s{n}", tasks.square, (n,)) for n in range(4))
+        ),
     )
     assert (ended["hang"].status, ended["hang"].reason) == ("hung", "stopped after 1 s")
     assert sum(each.status == "done" for each in ended.values()) == 4
@@ -85,7 +101,9 @@ def test_what_hangs_is_stopped_and_its_process_too(cluster, hang):
 
 
 @pytest.mark.slow
-@pytest.mark.claim("sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value")
+@pytest.mark.claim(
+    "sweeps-lose-nothing", tolerance="none: every task has one outcome, with its value"
+)
 def test_twenty_kills_during_two_hundred_tasks(cluster):
     """Claim: no task is lost or counted twice when workers are killed at any moment."""
     killed = []
@@ -106,7 +124,8 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
 
     groups = [
         Group(
-            tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)), Task(f"reference {g}", tasks.square, (g, 0.2))
+            tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)),
+            Task(f"reference {g}", tasks.square, (g, 0.2)),
         )
         for g in range(20)
     ]
@@ -118,7 +137,9 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
         ended = outcomes(cluster, *groups, *slowly, retries=30)
         while len(killed) < 20 and time.monotonic() - begin < 120:
             more = [alone(*(Task(f"more {n}", tasks.square, (n, 0.1)) for n in range(40)))]
-            assert {each.status for each in outcomes(cluster, *more, retries=30).values()} == {"done"}
+            assert {each.status for each in outcomes(cluster, *more, retries=30).values()} == {
+                "done"
+            }
     finally:
         stop.set()
         thread.join()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight compare`: the margin decides the status, masks leave out, differences are values and pictures."""
+"""`airlight compare`: the margin decides the status, masks leave out, differences
+are values and pictures.
+"""
 
 import json
 
@@ -18,7 +20,9 @@ SHAPE = (16, 20, 3)
 
 @pytest.fixture
 def files(tmp_path):
-    """Write a reference with standard errors of 2 %, a test image that is 1 % too bright, and a mask."""
+    """Write a reference with standard errors of 2 %, a test image that is 1
+    % too bright, and a mask.
+    """
     rng = np.random.default_rng(4)
     reference = rng.gamma(2.0, 0.3, SHAPE)
     error = 0.02 * reference
@@ -43,7 +47,9 @@ def printed(capsys, *arguments, status=0):
 def test_the_margin_decides(files, capsys):
     images, _ = files
     assert printed(capsys, *images, "--margin", "0.03")["statistics"]["equivalent"] is True
-    assert printed(capsys, *images, "--margin", "0.001", status=1)["statistics"]["equivalent"] is False
+    assert (
+        printed(capsys, *images, "--margin", "0.001", status=1)["statistics"]["equivalent"] is False
+    )
     assert run(["compare", *images]) == 0
 
 
@@ -66,7 +72,9 @@ def test_text_and_json_name_the_errors_that_both_files_state(tmp_path, capsys):
 
 @pytest.mark.claim("engine-margin", "scenes-stand-first")
 def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
-    """The reference is found at the size of the file; upside down it is suspected, and the margin decides."""
+    """The reference is found at the size of the file; upside down it is
+    suspected, and the margin decides.
+    """
     path, difference = tmp_path / "open-fog.exr", tmp_path / "difference.exr"
     airlight = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     write_exr(path, Image({"airlight": airlight}))
@@ -90,20 +98,28 @@ def test_from_python_a_result_or_an_array_is_judged_against_a_scene(variant):
     assert compared.metrics.relative_bias == pytest.approx(0.01, rel=1e-4)
     assert compared.metrics == compared.of.comparison.metrics
     assert compared.status == 1
-    assert compared.title == "airlight of the test image against open-fog"  # and no file that is gone
+    # and no file that is gone
+    assert compared.title == "airlight of the test image against open-fog"
     with pytest.raises(airlight.InputError, match=r"^the test image: 0 pixels"):
         airlight.compare("open-fog", np.full((24, 32, 3), np.nan), diagnose=True)
-    with pytest.raises(airlight.InputError, match="under a mask that is an EXR file; save it first"):
+    with pytest.raises(
+        airlight.InputError, match="under a mask that is an EXR file; save it first"
+    ):
         airlight.compare("open-fog", exact, mask=np.ones((24, 32), bool))
 
 
 @pytest.mark.claim("diagnosis-right")
-def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(variant, tmp_path, capsys):
+def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(
+    variant, tmp_path, capsys
+):
     """Both layers as they should be: no fault is looked for, which would take seconds."""
     path = str(airlight.reference("sphere-spot", size=(32, 24)).save(tmp_path / "spot.exr"))
     asked = ["sphere-spot", path, "--diagnose", "--pixel", "centre"]
     data = printed(capsys, *asked)
-    assert [(each["layer"], each["first"]) for each in data["layers"]] == [("airlight", "right"), ("surface", "right")]
+    assert [(each["layer"], each["first"]) for each in data["layers"]] == [
+        ("airlight", "right"),
+        ("surface", "right"),
+    ]
     assert data["diagnosis"] == data["layers"][0]
     assert run(["compare", *asked]) == 0
     first, said, blank, second, also = capsys.readouterr().out.splitlines()
@@ -112,7 +128,9 @@ def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(var
     assert blank == ""
     for line, each in ((said, data["layers"][0]), (also, data["layers"][1])):
         assert line == f"Nothing is wrong with it: {each['verdict']}."
-    again = airlight.compare("sphere-spot", airlight.reference("sphere-spot", size=(32, 24)), diagnose=True)
+    again = airlight.compare(
+        "sphere-spot", airlight.reference("sphere-spot", size=(32, 24)), diagnose=True
+    )
     assert [each.path for each in again.of] == ["sphere-spot, the reference by quadrature"] * 2
 
 
@@ -142,7 +160,9 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
 
 def test_the_command_and_python_find_the_fog_that_made_an_image(variant, tmp_path, capsys):
     path = tmp_path / "fog.exr"
-    write_exr(path, Image({"airlight": reference_image(load_scene("open-fog", (32, 24)).scene).airlight}))
+    write_exr(
+        path, Image({"airlight": reference_image(load_scene("open-fog", (32, 24)).scene).airlight})
+    )
     arguments = ["open-fog", str(path), "--fit", "sigma_t=0.9,intensity"]
     data = printed(capsys, *arguments)
     assert {"parameters", "residual", "explained", "confounded"} <= set(data)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight diff`: what is worse, what is better and what is not compared, beyond the noise of a machine."""
+"""`airlight diff`: what is worse, what is better and what is not compared,
+beyond the noise of a machine.
+"""
 
 import copy
 import json
@@ -21,12 +23,17 @@ def found(difference, verdict="worse"):
 
 def words(difference, verdict="worse"):
     chosen = found(difference, verdict)
-    return [" ".join(part for part in (finding.scene, finding.method, finding.what) if part) for finding in chosen]
+    return [
+        " ".join(part for part in (finding.scene, finding.method, finding.what) if part)
+        for finding in chosen
+    ]
 
 
 @pytest.fixture
 def files(tmp_path):
-    """Return a function that writes two reports and returns their paths as words: a folder and a file."""
+    """Return a function that writes two reports and returns their paths as
+    words: a folder and a file.
+    """
 
     def write(old, new):
         for name, data in (("old", old), ("new", new)):
@@ -46,11 +53,19 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     paths = files(report(), new)
     assert run(["diff", *paths, "--json"]) == 1
     data = json.loads(capsys.readouterr().out)
-    assert {finding["what"] for finding in data["findings"]} >= {"relative_rmse", "relative_bias", "p50", "p99", "max"}
+    assert {finding["what"] for finding in data["findings"]} >= {
+        "relative_rmse",
+        "relative_bias",
+        "p50",
+        "p99",
+        "max",
+    }
     assert data["worse"] == 5
     assert run(["diff", paths[1], paths[0]]) == 0
     assert "5 better" in capsys.readouterr().out
-    method(new, "fog").update(status="refused", reason="expected a mesh [obj] in [0, 1]", times=None, error=None)
+    method(new, "fog").update(
+        status="refused", reason="expected a mesh [obj] in [0, 1]", times=None, error=None
+    )
     assert run(["diff", *files(report(), new)]) == 1
     assert "expected a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
 
@@ -73,7 +88,9 @@ def test_errors_of_noisy_methods_are_compared_by_their_intervals():
         reports.append(data)
     old, by_chance, other = reports
     assert words(compare_reports(old, by_chance)) == []
-    assert [what.rpartition(" ")[2] for what in words(compare_reports(old, other))] == ["relative_rmse"]
+    assert [what.rpartition(" ")[2] for what in words(compare_reports(old, other))] == [
+        "relative_rmse"
+    ]
 
 
 def test_options_choose_what_counts(files, capsys):
@@ -81,7 +98,10 @@ def test_options_choose_what_counts(files, capsys):
     gone["scenes"] = gone["scenes"][:2]
     assert run(["diff", *files(report(), gone)]) == 1
     slow = files(report(), report(machine=5.0))
-    assert [run(["diff", *slow, *more]) for more in ([], ["--time-tolerance", "inf"], ["--time-tolerance", "6"])] == [
+    assert [
+        run(["diff", *slow, *more])
+        for more in ([], ["--time-tolerance", "inf"], ["--time-tolerance", "6"])
+    ] == [
         1,
         0,
         0,
@@ -98,7 +118,9 @@ def test_options_choose_what_counts(files, capsys):
 @pytest.mark.claim("diff")
 @pytest.mark.parametrize(("busy", "alarms"), [(0.0, 0), (0.2, 1)])
 def test_the_same_code_on_the_same_machine_does_not_fail(busy, alarms):
-    """Pairs with other noise: none fails on a quiet machine, hardly any where 20 % of the timings were hit."""
+    """Pairs with other noise: none fails on a quiet machine, hardly any where 20 %
+    of the timings were hit.
+    """
     pairs = [(report(seed, busy=busy), report(seed + 1, busy=busy)) for seed in range(0, 80, 2)]
     assert sum(bool(compare_reports(*pair).worse) for pair in pairs) <= alarms
 
@@ -125,7 +147,8 @@ def test_a_quarter_of_a_time_is_the_tolerance_that_nobody_set(files, capsys):
 
 def test_another_machine_is_compared_beside_the_median_of_all():
     new = report(machine=2.0)
-    (finding,) = found(compare_reports(report(), new))  # the same machine: everything is slower, which is one finding
+    # the same machine: everything is slower, which is one finding
+    (finding,) = found(compare_reports(report(), new))
     assert "every frame" in finding.what
     assert finding.new == pytest.approx(2.0)
     new["environment"]["threads"] = 16
@@ -138,24 +161,42 @@ def test_another_machine_is_compared_beside_the_median_of_all():
 
 def _refused(new):
     method(new).update(
-        status="refused", reason="too many planes", times=None, error=None, surface_error=None, flip=None
+        status="refused",
+        reason="too many planes",
+        times=None,
+        error=None,
+        surface_error=None,
+        flip=None,
     )
 
 
-#: A change of a report, and what of it is worse; None where something must be and the words do not matter.
+#: A change of a report, and what of it is worse; None where something must be and
+#: the words do not matter.
 CHANGES = [
     # The 99 % quantile, three times as large, grows by 1.2e-6, which rounding was seen to do.
     (lambda new: method(new).update(error=errors(1.0008e-3)), []),
     (lambda new: method(new).update(surface_error=errors(1e-3)), None),
     (lambda new: method(new)["flip"].update(value=0.06), ["hall shadow-planes (exact) HDR-FLIP"]),
-    (lambda new: method(new)["error"].update(nonfinite=1), ["hall shadow-planes (exact) nonfinite"]),
+    (
+        lambda new: method(new)["error"].update(nonfinite=1),
+        ["hall shadow-planes (exact) nonfinite"],
+    ),
     (lambda new: method(new)["error"].update(negative=60), []),  # of 76800: less than a thousandth
     (lambda new: method(new)["error"].update(negative=90), None),
     (lambda new: new["scenes"][0]["methods"].pop(1), ["fog ray-march (steps=100) gone"]),
     (_refused, ["hall shadow-planes (exact) refused: too many planes"]),
-    (lambda new: (_refused(new), method(new).update(status="left out")), []),  # a decision of who measured
-    (lambda new: new["scenes"][0]["agreement"].update({"volpath airlight": agreement(False)}), None),
-    (lambda new: new["scenes"][0]["reference"].update(mean=1.001 * new["scenes"][0]["reference"]["mean"]), None),
+    # a decision of who measured
+    (lambda new: (_refused(new), method(new).update(status="left out")), []),
+    (
+        lambda new: new["scenes"][0]["agreement"].update({"volpath airlight": agreement(False)}),
+        None,
+    ),
+    (
+        lambda new: new["scenes"][0]["reference"].update(
+            mean=1.001 * new["scenes"][0]["reference"]["mean"]
+        ),
+        None,
+    ),
     (lambda new: new["scenes"][1]["reference"].update(disagreements=2), None),
     (lambda new: new["stability"][0].update(broken=["float32 maximum 0.1 > 0.01"]), None),
 ]
@@ -200,7 +241,8 @@ def test_times_of_two_devices_are_never_compared():
     difference = compare_reports(old, new)
     assert words(difference) == []
     assert (
-        "times not compared: llvmpipe (LLVM 15.0.6, 256 bits) before, NVIDIA A100 now" in words(difference, "note")[0]
+        "times not compared: llvmpipe (LLVM 15.0.6, 256 bits) before, NVIDIA A100 now"
+        in words(difference, "note")[0]
     )
 
 
@@ -214,24 +256,39 @@ def test_one_run_is_not_compared_with_itself_and_a_change_of_the_machine_is_name
         row["times"]["run"] |= {"steady": False, "between": 1.9, "within": 1.1}
     different = compare_reports(old, new)
     assert different.times.compared > 0
-    changed = [each for each in found(different, "note") if "the machine changed while" in each.what]
+    changed = [
+        each for each in found(different, "note") if "the machine changed while" in each.what
+    ]
     assert {(note.scene, note.old, note.new) for note in changed} == {("hall", 1.1, 1.9)}
 
 
 @pytest.mark.claim("build-named")
 def test_reports_of_two_commits_of_one_version_say_so():
     old, new = report(), report()
-    old["environment"]["build"] = {"airlight": "0.9", "commit": "1a2b3c", "changed": False, "digest": "ab"}
+    old["environment"]["build"] = {
+        "airlight": "0.9",
+        "commit": "1a2b3c",
+        "changed": False,
+        "digest": "ab",
+    }
     new["environment"]["build"] = old["environment"]["build"] | {"changed": True, "digest": "cd"}
     said = "airlight: 0.9, commit 1a2b3c, files ab -> 0.9, commit 1a2b3c with changes, files cd"
     assert said in words(compare_reports(old, new), "note")
     new["environment"]["build"] = dict(old["environment"]["build"])
-    assert not [note for note in words(compare_reports(old, new), "note") if note.startswith("airlight")]
+    assert not [
+        note for note in words(compare_reports(old, new), "note") if note.startswith("airlight")
+    ]
 
 
 def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
     """Return a report with one verdict on a paper."""
-    row = {"paper": "biri", "item": item, "words": "words", "verdict": verdict, "published": published}
+    row = {
+        "paper": "biri",
+        "item": item,
+        "words": "words",
+        "verdict": verdict,
+        "published": published,
+    }
     row |= {"measured": measured, "low": measured, "high": measured, "unit": unit, "why": "so"}
     return report() | {"papers": [row]}
 
@@ -239,10 +296,14 @@ def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
 def test_verdicts_on_papers_are_compared():
     good, bad = claimed("reproduced", 1.0), claimed("not reproduced", 2.0)
     assert words(compare_reports(good, bad)) == ["biri, eq. 1: not reproduced, was reproduced"]
-    assert words(compare_reports(bad, good), "better") == ["biri, eq. 1: reproduced, was not reproduced"]
+    assert words(compare_reports(bad, good), "better") == [
+        "biri, eq. 1: reproduced, was not reproduced"
+    ]
     gone = compare_reports(bad, claimed("impossible", None))
     assert words(gone, "note") == ["biri, eq. 1: impossible, was not reproduced"]
-    assert words(compare_reports(good, claimed("reproduced", 1.0, item="eq. 2"))) == ["biri, eq. 1: the row is gone"]
+    assert words(compare_reports(good, claimed("reproduced", 1.0, item="eq. 2"))) == [
+        "biri, eq. 1: the row is gone"
+    ]
     other = claimed("reproduced", 1.0, published=4.0)
     assert words(compare_reports(good, other)) == ["biri, eq. 1: the published figure"]
     assert words(compare_reports(good, report())) == []  # a report of few scenes measures no claims

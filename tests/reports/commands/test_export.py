@@ -31,7 +31,10 @@ def test_the_head_states_the_error_that_was_measured_and_none_where_none_was(cap
     errors = json.loads(MEASURED.read_text(encoding="utf-8"))["errors"]
     exact = airlight.export("exact", phase="rayleigh")
     assert exact.error == errors["exact"]["rayleigh"]["error"]
-    assert f"Largest relative error of J: {exact.error:.1e} on {errors['exact']['rayleigh']['rays']} " in exact.code
+    assert (
+        f"Largest relative error of J: {exact.error:.1e} on {errors['exact']['rayleigh']['rays']} "
+        in exact.code
+    )
     assert "that keeps the bounds of Vulkan at most" in exact.code
     nodes = airlight.export("quadrature-16", phase="rayleigh")
     assert f"{nodes.error:.1e}" in nodes.code
@@ -45,4 +48,7 @@ def test_the_head_states_the_error_that_was_measured_and_none_where_none_was(cap
 @pytest.mark.parametrize("phase", ["hg:0.5", "mie:6", "tabulated"])
 def test_a_phase_function_that_is_no_function_of_g_is_refused(phase, capsys):
     assert run(["export", "--phase", phase]) == 2
-    assert f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg" in capsys.readouterr().err
+    assert (
+        f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg"
+        in capsys.readouterr().err
+    )

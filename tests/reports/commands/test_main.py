@@ -18,7 +18,9 @@ from airlight.reports.studies.registry import STUDIES
 
 ROOT = Path(__file__).resolve().parents[3]
 _COMMANDS = [["study"], *(["study", name] for name in STUDIES)]
-_COMMANDS += [[cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several]
+_COMMANDS += [
+    [cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several
+]
 
 
 @pytest.fixture
@@ -39,16 +41,27 @@ def command_that_raises(monkeypatch):
 @pytest.mark.parametrize(
     ("error", "status", "words"),
     [
-        (InputError("albedo: got 2,\n  expected at most 1"), 2, "airlight: error: albedo: got 2, expected at most 1"),
+        (
+            InputError("albedo: got 2,\n  expected at most 1"),
+            2,
+            "airlight: error: albedo: got 2, expected at most 1",
+        ),
         (MissingError("no libLLVM"), 3, "airlight: error: no libLLVM"),
-        (FileNotFoundError(2, "No such file or directory", "a.exr"), 2, "error: a.exr: No such file or directory"),
+        (
+            FileNotFoundError(2, "No such file or directory", "a.exr"),
+            2,
+            "error: a.exr: No such file or directory",
+        ),
         (PermissionError(13, "Permission denied", "out"), 2, "error: out: Permission denied"),
         (OSError(28, "No space left on device"), 2, "error: output: No space left on device"),
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_expected_failures_give_one_line(error, status, words, command_that_raises, capfd, monkeypatch):
-    monkeypatch.setattr(cli, "_drop_output", lambda status: status)  # it would silence pytest's own output
+def test_expected_failures_give_one_line(
+    error, status, words, command_that_raises, capfd, monkeypatch
+):
+    # it would silence pytest's own output
+    monkeypatch.setattr(cli, "_drop_output", lambda status: status)
     command_that_raises(error)
     assert cli.run(["list"]) == status
     captured = capfd.readouterr()
@@ -70,7 +83,9 @@ def test_faults_of_the_program_keep_their_traceback(error, command_that_raises, 
 
 
 @pytest.mark.claim("exit-status")
-@pytest.mark.parametrize("error", [ImportError("libLLVM.so"), NameError("drjit_ext")], ids=lambda e: type(e).__name__)
+@pytest.mark.parametrize(
+    "error", [ImportError("libLLVM.so"), NameError("drjit_ext")], ids=lambda e: type(e).__name__
+)
 def test_a_system_library_that_is_missing_is_named_with_how_to_install_it(
     error, command_that_raises, monkeypatch, capsys
 ):
@@ -84,9 +99,13 @@ def test_a_system_library_that_is_missing_is_named_with_how_to_install_it(
 
 @pytest.mark.claim("exit-status")
 @pytest.mark.claim("extras-when-needed")
-def test_a_command_that_lacks_an_extra_has_the_launcher_add_it_once(command_that_raises, monkeypatch, capsys):
+def test_a_command_that_lacks_an_extra_has_the_launcher_add_it_once(
+    command_that_raises, monkeypatch, capsys
+):
     started = []
-    monkeypatch.setattr(os, "execve", lambda path, words, world: started.append((path, words[1:], world[EXTRAS])))
+    monkeypatch.setattr(
+        os, "execve", lambda path, words, world: started.append((path, words[1:], world[EXTRAS]))
+    )
     monkeypatch.setattr(sys, "argv", ["airlight", "list"])
     error = MissingError("no pyarrow")
     error.extra = "sweep"
@@ -101,7 +120,8 @@ def test_a_command_that_lacks_an_extra_has_the_launcher_add_it_once(command_that
 
 @pytest.mark.claim("extras-when-needed")
 @pytest.mark.parametrize(
-    ("words", "package"), [("view", "websockets"), ("sweep", "pyarrow"), ("test", "pytest"), ("render", "moderngl")]
+    ("words", "package"),
+    [("view", "websockets"), ("sweep", "pyarrow"), ("test", "pytest"), ("render", "moderngl")],
 )
 def test_help_asks_for_no_extra(words, package, monkeypatch, capfd):
     monkeypatch.setattr(os, "execve", lambda *given: pytest.fail(f"it starts again: {given}"))
@@ -128,11 +148,14 @@ def test_a_folder_that_was_deleted_is_said_before_any_work(tmp_path, monkeypatch
     (tmp_path / "gone").rmdir()
     assert cli.run(["list"]) == 2
     assert capsys.readouterr().err == (
-        "airlight: error: the current folder was deleted: change into another folder, then run this again\n"
+        "airlight: error: the current folder was deleted: change into another folder, then run "
+        "this again\n"
     )
 
 
-@pytest.mark.parametrize(("closed", "status"), [(True, 1), (False, 2)], ids=["reader left", "disk full"])
+@pytest.mark.parametrize(
+    ("closed", "status"), [(True, 1), (False, 2)], ids=["reader left", "disk full"]
+)
 def test_an_output_that_cannot_be_written_is_written_no_more(closed, status, monkeypatch, capsys):
     """Text that is still in the buffer would fail when Python ends."""
     if closed:
@@ -165,7 +188,9 @@ def test_every_command_has_help_that_fits_80_columns(command, capfd, monkeypatch
 @pytest.mark.claim("documented-commands")
 @pytest.mark.parametrize("words", cli.command_names(), ids=" ".join)
 def test_every_argument_and_option_has_help(words):
-    arguments = [each for each in cli.find_command(words).assemble_argument_collection() if each.parse]
+    arguments = [
+        each for each in cli.find_command(words).assemble_argument_collection() if each.parse
+    ]
     assert [each.name for each in arguments if not each.parameter.help] == []
     assert arguments or words == ("doctor",)
 
@@ -186,7 +211,10 @@ def test_a_path_may_begin_at_home(tmp_path, monkeypatch, capfd):
     [
         (["compare", "open-fog", "a.exr", "--margin", "0,5"], "write 0.5"),
         (["render", "open-fog", "--change", "medium.sigma_t=0,5"], "such as 0.5"),
-        (["render", "open-fog", "--method", "cloud-collectors", "--set", "stride=0,5"], "such as 0.5"),
+        (
+            ["render", "open-fog", "--method", "cloud-collectors", "--set", "stride=0,5"],
+            "such as 0.5",
+        ),
     ],
 )
 def test_decimal_commas_are_refused_with_how_to_write_the_number(variant, words, hint, capfd):

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every command on every kind of scene: it ends as the table says, without a traceback, and its text is its JSON.
+"""Every command on every kind of scene: it ends as the table says, without a traceback,
+and its text is its JSON.
 
-The default tier has every command on four kinds; the slow tier has it on all, and each method and estimator with each.
+The default tier has every command on four kinds; the slow tier has it on all, and each method
+and estimator with each.
 """
 
 import contextlib
@@ -23,10 +25,18 @@ from tests.helpers.kinds import HEIGHT, KINDS, WIDTH, write_kind
 
 FOG = tuple(name for name in METHODS if not METHODS[name].renders_clouds)
 CLOUDS = tuple(name for name in METHODS if METHODS[name].renders_clouds)
-#: The methods that take turns: published ones share all but their sums with them, and are of the slow tier.
+#: The methods that take turns: published ones share all but their sums with them,
+#: and are of the slow tier.
 TURNS = tuple(name for name in METHODS if name not in PUBLISHED_METHODS)
 #: Methods that add up lit segments.
-SUMS = ("unshadowed", "shadow-planes", "light-volumes", "min-max", "shadow-planes-2006", "light-volumes-2010")
+SUMS = (
+    "unshadowed",
+    "shadow-planes",
+    "light-volumes",
+    "min-max",
+    "shadow-planes-2006",
+    "light-volumes-2010",
+)
 ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 
 #: By kind, the methods and estimators that refuse it, with a word of why.
@@ -89,7 +99,7 @@ def refused(why: str, *words: object) -> None:
     assert why in last, (words, last)
 
 
-# Numbers of the text that the JSON has, too ---------------------------------------------------------------------------
+# Numbers of the text that the JSON has, too -------------------------------------------------------
 
 _NUMBER = re.compile(r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 #: How the text may give a number of the JSON: as it is, in percent, in milliseconds.
@@ -115,21 +125,29 @@ def strays(text: str, data: object, folder: Path) -> list[str]:
     for word in _NUMBER.findall(re.sub(rf"{re.escape(str(folder))}\S*", "", text)):
         digits = re.sub(r"^0+|\.", "", re.sub(r"e.*|-", "", word))
         # Half of the last digit that is printed.
-        unit = 10.0 ** (-len(word.partition("e")[0].partition(".")[2]) + int(word.partition("e")[2] or 0))
-        if digits and not np.any(np.abs(known - float(word)) <= 0.501 * unit + 1e-12 * abs(float(word))):
+        unit = 10.0 ** (
+            -len(word.partition("e")[0].partition(".")[2]) + int(word.partition("e")[2] or 0)
+        )
+        if digits and not np.any(
+            np.abs(known - float(word)) <= 0.501 * unit + 1e-12 * abs(float(word))
+        ):
             found.append(word)
     return found
 
 
-def same_numbers(folder: Path, *words: object, ignore: str = r"$^", status: int = 0) -> tuple[str, dict]:
-    """Run a command for its text and for its JSON; return both. Numbers in what matches `ignore` are the text's own."""
+def same_numbers(
+    folder: Path, *words: object, ignore: str = r"$^", status: int = 0
+) -> tuple[str, dict]:
+    """Run a command for its text and for its JSON; return both. Numbers in what matches
+    `ignore` are the text's own.
+    """
     text = ended(status, *words)
     data = json.loads(ended(status, *words, "--json"))
     assert strays(re.sub(ignore, "", text), data, folder) == [], (words, text)
     return text, data
 
 
-# The cells ------------------------------------------------------------------------------------------------------------
+# The cells ----------------------------------------------------------------------------------------
 
 
 def look(path: Path, monkeypatch) -> None:
@@ -139,7 +157,9 @@ def look(path: Path, monkeypatch) -> None:
     def shown(session) -> None:
         page = SimpleNamespace(
             tell=lambda kind, **values: json.dumps(values, allow_nan=False),
-            show=lambda picture, **values: frames.append((np.frombuffer(picture, np.uint8), values)),
+            show=lambda picture, **values: frames.append(
+                (np.frombuffer(picture, np.uint8), values)
+            ),
             close=lambda why: None,
         )
         session.opened(page)
@@ -150,7 +170,9 @@ def look(path: Path, monkeypatch) -> None:
     monkeypatch.setattr(Session, "run", shown)
     size = f"{WIDTH}x{HEIGHT}"
     method = "cloud-octaves" if path.stem == "cloud" else "ray-march"
-    assert ended(0, "view", path, "--method", method, "--size", size).startswith("http://127.0.0.1:")
+    assert ended(0, "view", path, "--method", method, "--size", size).startswith(
+        "http://127.0.0.1:"
+    )
     picture, values = frames[0]
     assert values["kind"] == "frame"
     assert len(np.unique(picture)) > 10
@@ -194,7 +216,9 @@ def compared(path: Path, reference: Path, frame: Path) -> None:
     ignore = r"(?<![\d.])(95 %|\d+ % power|\d+ % level)|over \d+ %|the worst \d+ %|known to \S+ of its mean"
     text, data = same_numbers(path.parent, "compare", reference, frame, ignore=ignore)
     assert f"relative {100 * data['metrics']['relative_rmse']:.4g} %" in text
-    text, data = same_numbers(path.parent, "compare", path, frame, "--pixel", "centre", ignore=ignore)
+    text, data = same_numbers(
+        path.parent, "compare", path, frame, "--pixel", "centre", ignore=ignore
+    )
     assert f"relative {100 * data['comparison']['metrics']['relative_rmse']:.4g} %" in text
     known = data["known"]
     assert f"known to {known['error'] / known['value']:.2g} of its mean ({known['kind']})" in text
@@ -219,9 +243,19 @@ def accepted(kind: str, names: tuple[str, ...]) -> list[str]:
 
 
 def chosen(kind: str) -> tuple[str, str, str]:
-    """Return the estimator, the method to render and the one to report of a kind in the default tier: all by turns."""
-    turn, estimators, methods = list(KINDS).index(kind), accepted(kind, ESTIMATORS)[1:], accepted(kind, TURNS)
-    return estimators[(turn + 2) % len(estimators)], methods[(turn + 1) % len(methods)], methods[turn % len(methods)]
+    """Return the estimator, the method to render and the one to report of a kind in the
+    default tier: all by turns.
+    """
+    turn, estimators, methods = (
+        list(KINDS).index(kind),
+        accepted(kind, ESTIMATORS)[1:],
+        accepted(kind, TURNS),
+    )
+    return (
+        estimators[(turn + 2) % len(estimators)],
+        methods[(turn + 1) % len(methods)],
+        methods[turn % len(methods)],
+    )
 
 
 @pytest.mark.claim("every-command-on-every-kind")
@@ -233,7 +267,11 @@ def test_every_command_on_this_kind(variant, kind, tmp_path, monkeypatch):
     estimator, method, measured = chosen(kind)
     described(path)
     for name, why in REFUSED[kind].items():
-        command = ("reference", path, "--estimator") if name in ESTIMATORS else ("render", path, "--method")
+        command = (
+            ("reference", path, "--estimator")
+            if name in ESTIMATORS
+            else ("render", path, "--method")
+        )
         refused(why, *command, name, "-o", path.with_name("refused.exr"))
     assert not path.with_name("refused.exr").exists()
     exact = referenced(path, "quadrature")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A mistake in a command ends with status 2 and one line that names the culprit; nothing is printed or written."""
+"""A mistake in a command ends with status 2 and one line that names the culprit;
+nothing is printed or written.
+"""
 
 import shlex
 
@@ -9,7 +11,8 @@ import pytest
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reports.commands.main import WRONG_INPUT, run
 
-#: A line as one types it, and what its one line says: the culprit, and where there is one the nearest name.
+#: A line as one types it, and what its one line says: the culprit, and where there
+#: is one the nearest name.
 MISTAKES = (
     ("rendr", 'Did you mean "render"'),
     ("render", "SCENE"),
@@ -17,24 +20,36 @@ MISTAKES = (
     ("render open-fog --frames 3", "frames: got no place"),
     ("render open-fog --samples 3 --frames 3 -o x.exr", "leave out samples"),
     ("render open-fog --size 8x6 --frames 3 --animate lamp -o x.exr", "got 'lamp'"),
-    ("render open-fog --size 8x6 --frames 3 --animate objects -o x.exr", "no closed mesh that could turn"),
+    (
+        "render open-fog --size 8x6 --frames 3 --animate objects -o x.exr",
+        "no closed mesh that could turn",
+    ),
     ("render open-fog --method unshadowed --method ray-march", "--method"),
     ("render open-fog -o frame.jpg", "output: got 'frame.jpg', expected a name that ends in .exr"),
     ("render open-fog --method unshadowed --set kernel=tayler", "did you mean 'taylor'"),
     ("render open-fog --plan --timed", "plan: renders nothing"),
-    ("render open-fog --size 8x6 --method unshadowed --run 3", "draws no random numbers; leave out run"),
+    (
+        "render open-fog --size 8x6 --method unshadowed --run 3",
+        "draws no random numbers; leave out run",
+    ),
     ("render open-fog --change medium.sigma=1", "did you mean 'medium.sigma_t'"),
     ("view colonade", "did you mean 'colonnade'"),
     ("view sphere-spot --method shadow-plains", "did you mean 'shadow-planes'"),
     ("view sphere-spot --set pionts=1", "did you mean 'points'"),
     ("view sphere-spot --size huge", "expected WIDTHxHEIGHT"),
     ("view sphere-spot --address 127.0.0.1:70000", "65535"),
-    ("reference open-fog --estimator volpath --samples 128 --seconds 3", "samples and seconds exclude"),
+    (
+        "reference open-fog --estimator volpath --samples 128 --seconds 3",
+        "samples and seconds exclude",
+    ),
     ("reference open-fog --estimator volpath --error 0", "error: got 0"),
     ("reference open-fog --estimator volpath --error 1.5", "expected less than 1"),
     ("reference open-fog --estimator volpath --seed -1 --samples 64 --size 8x6", "seed: got -1"),
     ("reference open-fog --estimator volpath --pixel area", "volpath traces pixel centres"),
-    ("reference open-fog --estimator volpath --seed 1048570 --samples 64 --size 8x6", "seed: got 1048570"),
+    (
+        "reference open-fog --estimator volpath --seed 1048570 --samples 64 --size 8x6",
+        "seed: got 1048570",
+    ),
     ("reference open-fog --samples 128", "quadrature: draws no samples; leave out samples"),
     ("reference open-fog --orders 1,2-inf", "orders"),
     ("reference open-fog --merge image.exr --merge image.exr -o m.exr", "image.exr"),
@@ -61,8 +76,14 @@ MISTAKES = (
         "compare open-fog image.exr --diagnose --all-metrics",
         "all pixels of one image; leave out all_metrics",
     ),
-    ("compare open-fog runs/#.exr --diagnose", "runs/#.exr, which stands for several files; expected one image"),
-    ("compare open-fog runs/#.exr --fit sigma_t", "fit: got runs/#.exr, which stands for several files"),
+    (
+        "compare open-fog runs/#.exr --diagnose",
+        "runs/#.exr, which stands for several files; expected one image",
+    ),
+    (
+        "compare open-fog runs/#.exr --fit sigma_t",
+        "fit: got runs/#.exr, which stands for several files",
+    ),
     ("compare open-fog image.exr --fit sigmat", "did you mean"),
     ("compare open-fog image.exr --fit sigma_t=", "expected NAME or NAME=VALUE"),
     ("compare smoke image.exr --fit sigma_t", "the medium is a density grid"),
@@ -96,12 +117,16 @@ MISTAKES = (
 
 @pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(("line", "culprit"), MISTAKES, ids=[line for line, _ in MISTAKES])
-def test_a_mistake_is_one_line_that_names_the_culprit(variant, tmp_path, monkeypatch, capsys, own_cache, line, culprit):
+def test_a_mistake_is_one_line_that_names_the_culprit(
+    variant, tmp_path, monkeypatch, capsys, own_cache, line, culprit
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rays.csv").write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n")
     (tmp_path / "mine.py").write_text("def half(view):\n    return 1.0\n")
     ones = np.ones((6, 8, 3))
-    image = Image({"airlight": ones, "airlight_se": 0.1 * ones}, attributes={"airlight:batches": 32})
+    image = Image(
+        {"airlight": ones, "airlight_se": 0.1 * ones}, attributes={"airlight:batches": 32}
+    )
     write_exr(tmp_path / "image.exr", image)
     (tmp_path / "empty.xml").touch()
     (tmp_path / "engine").mkdir()
@@ -114,5 +139,7 @@ def test_a_mistake_is_one_line_that_names_the_culprit(variant, tmp_path, monkeyp
     assert printed.err.count("\n") == 1
     assert printed.err.startswith("airlight: error: ")
     assert [
-        path for path in sorted(tmp_path.rglob("*")) if own_cache not in path.parents and path != own_cache
+        path
+        for path in sorted(tmp_path.rglob("*"))
+        if own_cache not in path.parents and path != own_cache
     ] == before

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: `airlight paper` measures each experiment once, prints verdicts, and tables and JSON where asked."""
+"""Claim: `airlight paper` measures each experiment once, prints verdicts, and
+tables and JSON where asked.
+"""
 
 import json
 
@@ -20,7 +22,12 @@ def experiments(own_cache, monkeypatch):
     def run(self):
         (name,) = (name for name, each in papers.experiments().items() if each is self)
         ran.append(name)
-        names = [part for each in papers.claims() if each.experiment == name for part in each.figure.split(" / ")]
+        names = [
+            part
+            for each in papers.claims()
+            if each.experiment == name
+            for part in each.figure.split(" / ")
+        ]
         return dict.fromkeys(names, 1.0)
 
     monkeypatch.setattr(papers.Experiment, "run", run)
@@ -50,8 +57,12 @@ def test_quick_leaves_out_what_needs_images(variant, experiments, capfd):
     assert {row["verdict"] for row in printed["papers"] if row["paper"] == "ali"} == {"impossible"}
 
 
-def test_figures_are_drawn_into_the_folder_with_their_data(variant, experiments, tmp_path, monkeypatch, capfd):
-    """The figure of the paper that is named, small where that is asked for; not those of other papers."""
+def test_figures_are_drawn_into_the_folder_with_their_data(
+    variant, experiments, tmp_path, monkeypatch, capfd
+):
+    """The figure of the paper that is named, small where that is asked for;
+    not those of other papers.
+    """
     made = []
 
     def make(quick, progress):
@@ -59,7 +70,10 @@ def test_figures_are_drawn_into_the_folder_with_their_data(variant, experiments,
         images, rows = {"picture": np.ones((2, 3, 3))}, [{"depth": 1.5, "radiance": 0.25}]
         return PaperFigure(lambda column: new_figure(1, 1), images, rows)
 
-    shown = {"slab": (("bouthors",), make), "others": (("biri",), lambda quick, progress: pytest.fail("of another"))}
+    shown = {
+        "slab": (("bouthors",), make),
+        "others": (("biri",), lambda quick, progress: pytest.fail("of another")),
+    }
     monkeypatch.setattr("airlight.reports.figures.papers._FIGURES", shown)
     folder = tmp_path / "figures"
     assert cli.run(["paper", "bouthors", "--quick", "--figures", str(folder)]) == 0

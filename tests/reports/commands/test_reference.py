@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight reference`: what is kept, what is said of it, and what a stopped run leaves.
 
-Random numbers stand in the place of the tracer, as everything here is about files; `tests/reference` traces. The slow
-test at the end runs the command in a process of its own, with the tracer.
+Random numbers stand in the place of the tracer, as everything here is about files;
+`tests/reference` traces. The slow test at the end runs the command in a process of its own, with
+the tracer.
 """
 
 import json
@@ -37,15 +38,21 @@ def traced(variant, monkeypatch):
     def trace(reference, seed, samples, **options):
         if seed in stops:
             raise KeyboardInterrupt
-        # The standard deviation of a pixel is its mean, so that the image is known to 1/sqrt(144 batches).
-        return single_batch(seed, samples, np.random.default_rng([seed, samples]).exponential(size=(2, 48, 3)))
+        # The standard deviation of a pixel is its mean, so that the image is
+        # known to 1/sqrt(144 batches).
+        return single_batch(
+            seed, samples, np.random.default_rng([seed, samples]).exponential(size=(2, 48, 3))
+        )
 
     monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "volpath_batch", trace)
     return stops
 
 
 def run(output, *arguments, status=0, estimator="volpath"):
-    assert cli.run(["reference", *SCENE, "--estimator", estimator, "-o", str(output), *arguments]) == status
+    assert (
+        cli.run(["reference", *SCENE, "--estimator", estimator, "-o", str(output), *arguments])
+        == status
+    )
 
 
 def summary(output, capfd, *arguments, **options):
@@ -61,7 +68,14 @@ def test_same_samples_and_seed_are_the_same_bytes(traced, tmp_path, monkeypatch,
     second = summary(tmp_path / "b.exr", capfd, "--samples", "64", "--seed", "3")
     assert (first["how"]["cached"], second["how"]["cached"]) == (0, 32)
     attributes = read_exr(tmp_path / "a.exr").attributes
-    expected = {"estimator": "volpath", "spp": 64, "batch_spp": 2, "batches": 32, "seed": 3, "seeds": "3-34"}
+    expected = {
+        "estimator": "volpath",
+        "spp": 64,
+        "batch_spp": 2,
+        "batches": 32,
+        "seed": 3,
+        "seeds": "3-34",
+    }
     assert {name: attributes[f"airlight:{name}"] for name in expected} == expected
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
     run(tmp_path / "more.exr", "--samples", "72")
@@ -84,8 +98,12 @@ def test_target_error_is_reached_and_no_more(traced, tmp_path, capfd):
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
-def test_an_error_that_is_not_known_is_said_so_in_text_and_json(traced, tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(airlight.validation.estimates.images, "near_light", lambda reference, distance: distance > 0)
+def test_an_error_that_is_not_known_is_said_so_in_text_and_json(
+    traced, tmp_path, capfd, monkeypatch
+):
+    monkeypatch.setattr(
+        airlight.validation.estimates.images, "near_light", lambda reference, distance: distance > 0
+    )
     printed = summary(tmp_path / "a.exr", capfd, "--error", "0.02", status=1)
     errors = printed["how"]["errors"]
     assert (printed["relative_error"], errors["pooled"], errors["worst"]) == (None, None, None)
@@ -137,15 +155,23 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
     for name, layer in whole.layers.items():
         # float32 means, and errors that come from differences of them: relative 6e-8 of the image
         np.testing.assert_allclose(merged.layers[name], layer, rtol=1e-5, atol=1e-6 * layer.max())
-    assert cli.run(["reference", SCENE[0], *files[:2], *files[:2], "-o", str(tmp_path / "no.exr")]) == 2
+    assert (
+        cli.run(["reference", SCENE[0], *files[:2], *files[:2], "-o", str(tmp_path / "no.exr")])
+        == 2
+    )
     assert "share the seeds 0-31" in capfd.readouterr().err
     assert cli.run(["reference", "open-fog", *files, "-o", str(tmp_path / "no.exr")]) == 2
-    assert "merge: the files are of the scene sphere-spot, got open-fog; name that one" in capfd.readouterr().err
+    assert (
+        "merge: the files are of the scene sphere-spot, got open-fog; name that one"
+        in capfd.readouterr().err
+    )
     assert not (tmp_path / "no.exr").exists()
 
 
 class Workers:
-    """A stub of a cluster: this process does the tasks of its two workers; `sent` are their names."""
+    """A stub of a cluster: this process does the tasks of its two
+    workers; `sent` are their names.
+    """
 
     def __init__(self):
         self.sent = []
@@ -173,7 +199,8 @@ class Workers:
     [
         ("quadrature", [], ["reference 0"]),
         ("volpath", ["--samples", "64", "--seed", "3"], [f"batch {seed}" for seed in range(3, 35)]),
-        ("volpath", ["--error", "0.02"], None),  # as many as that takes, in waves of 8 for each worker
+        # as many as that takes, in waves of 8 for each worker
+        ("volpath", ["--error", "0.02"], None),
     ],
 )
 def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
@@ -184,7 +211,8 @@ def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
     workers = Workers()
     monkeypatch.setattr("airlight.reports.cluster.connect.connected", workers.connected)
     monkeypatch.setattr("airlight.reports.cluster.references.run_groups", workers.run_groups)
-    monkeypatch.setattr("airlight.reports.cluster.references.facts", lambda: None)  # which takes long
+    # which takes long
+    monkeypatch.setattr("airlight.reports.cluster.references.facts", lambda: None)
     run(tmp_path / "here.exr", *words, estimator=estimator)
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
     for name in ("there", "again"):
@@ -199,16 +227,30 @@ def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
 def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache):
     """The real tracer in a process, killed when the cache has three of its batches."""
     (tmp_path / "a.exr").write_text("an older file")
-    command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(tmp_path / "a.exr"), "--samples", "400000"]
+    command = [
+        "reference",
+        *SCENE,
+        "--estimator",
+        "volpath",
+        "-o",
+        str(tmp_path / "a.exr"),
+        "--samples",
+        "400000",
+    ]
     code = f"import sys\nfrom airlight.reports.commands.main import run\nsys.exit(run({command!r}))"
-    process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, cwd=ROOT)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, cwd=ROOT
+    )
     while len(list(own_cache.glob("volpath-*/0*.npz"))) < 3 and process.poll() is None:
         time.sleep(0.05)
     process.kill()
     assert process.wait() == -9
     assert (tmp_path / "a.exr").read_text() == "an older file"
     # Every file that has its final name is whole.
-    names = [str(path.relative_to(own_cache).with_suffix("")) for path in own_cache.glob("volpath-*/0*.npz")]
+    names = [
+        str(path.relative_to(own_cache).with_suffix(""))
+        for path in own_cache.glob("volpath-*/0*.npz")
+    ]
     assert len(names) >= 3
     assert all(load_arrays(name) is not None for name in names)
     resumed = summary(tmp_path / "b.exr", capfd, "--samples", "2048")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight render`: one frame, numbered frames, the plan; what is written is said, and times are measured if asked."""
+"""`airlight render`: one frame, numbered frames, the plan; what is written is said, and
+times are measured if asked.
+"""
 
 import json
 
@@ -20,7 +22,9 @@ def run(*arguments, status=0):
     assert cli.run(["render", *arguments]) == status
 
 
-def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(variant, tmp_path, capfd):
+def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(
+    variant, tmp_path, capfd
+):
     output, preview = tmp_path / "fog.exr", tmp_path / "fog.png"
     run("open-fog", *SMALL, "-o", str(tmp_path / "still" / "one.exr"))
     capfd.readouterr()
@@ -32,16 +36,24 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(var
     assert [path.rsplit("/", 1)[-1] for path in printed["files"]] == names
     assert printed["moves"] == ["light"]
     assert printed["frame_ms"] == pytest.approx(printed["move_ms"] + printed["render_ms"])
-    images = [read_exr(tmp_path / f"fog-000{number}.exr").layers["airlight"] for number in (1, 2, 3)]
-    np.testing.assert_array_equal(images[0], read_exr(tmp_path / "still" / "one.exr").layers["airlight"])
+    images = [
+        read_exr(tmp_path / f"fog-000{number}.exr").layers["airlight"] for number in (1, 2, 3)
+    ]
+    np.testing.assert_array_equal(
+        images[0], read_exr(tmp_path / "still" / "one.exr").layers["airlight"]
+    )
     assert not np.array_equal(images[0], images[1])
     assert not np.array_equal(images[1], images[2])
 
 
-def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_beside_them(variant, tmp_path):
+def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_beside_them(
+    variant, tmp_path
+):
     moves = ("--method", "shadow-planes", "--frames", "3", "--animate", "objects")
     run("sphere-spot", *SMALL, *moves, "-o", str(tmp_path / "a.exr"))
-    found = airlight.compare("sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json")
+    found = airlight.compare(
+        "sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json"
+    )
     assert found.of.verdict.kind == "exact"
 
 
@@ -56,7 +68,10 @@ def test_the_plan_says_what_the_scene_needs_and_renders_nothing(variant, capfd):
     run("open-fog", *SMALL, "--plan", "--json")
     data = json.loads(capfd.readouterr().out)
     assert data["plan"] == airlight.load_scene("open-fog").plan()
-    assert text.splitlines() == [f"{name}: {words}" for name, words in data["plan"].items()] + data["notes"]
+    assert (
+        text.splitlines()
+        == [f"{name}: {words}" for name, words in data["plan"].items()] + data["notes"]
+    )
     assert "lights: 1 point\n" in text
 
 
@@ -69,10 +84,14 @@ def test_a_configuration_is_rendered_as_its_words_are(variant):
 
 
 @pytest.mark.claim("render-says-what-it-wrote")
-def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, tmp_path, capfd, monkeypatch):
+def test_what_was_written_is_said_and_times_are_measured_only_if_asked(
+    variant, tmp_path, capfd, monkeypatch
+):
     timed = []
     real = airlight.validation.study.turns.time_alone
-    monkeypatch.setattr("airlight.validation.study.turns.time_alone", lambda *given: timed.append(1) or real(*given))
+    monkeypatch.setattr(
+        "airlight.validation.study.turns.time_alone", lambda *given: timed.append(1) or real(*given)
+    )
     layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
     run("open-fog", *SMALL, "--samples", "4", "-o", layers, "-o", picture)
     printed = capfd.readouterr().out
@@ -86,7 +105,13 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
     times = json.loads(capfd.readouterr().out)
     assert len(timed) == 1
     assert times["files"] == []
-    measured = ("frame", "light_moved", "objects_moved", "light_moved_camera_cached", "colours_changed")
+    measured = (
+        "frame",
+        "light_moved",
+        "objects_moved",
+        "light_moved_camera_cached",
+        "colours_changed",
+    )
     assert all(times["times"][name]["median_ms"] > 0 for name in measured)
     run("open-fog", *SMALL, "--timed")
     printed = capfd.readouterr().out
@@ -104,7 +129,9 @@ def test_open_occluders_are_warned_of_where_planes_have_an_order_of_a_paper(vari
     assert err.count("airlight: warning: shape 'floor' is open") == 1
 
 
-def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pays_for_what_it_renders(monkeypatch):
+def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pays_for_what_it_renders(
+    monkeypatch,
+):
     """A mean over rays has no layer of a method; frames that are only timed count as work."""
     asked = []
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `airlight report`: what it refuses, and what it hands on; nothing is measured here but tiny frames."""
+"""The command `airlight report`: what it refuses, and what it hands on; nothing is
+measured here but tiny frames.
+"""
 
 from contextlib import contextmanager
 
@@ -65,8 +67,12 @@ def handed_on(monkeypatch):
     given = {}
 
     def write(folder, study, **options):
-        given.update(options, folder=folder, scenes=study.scenes, configurations=study.configurations)
-        return checked(report_of([], claims=[{"kind": "image", "text": "`--full` has all.", "good": None}]))
+        given.update(
+            options, folder=folder, scenes=study.scenes, configurations=study.configurations
+        )
+        return checked(
+            report_of([], claims=[{"kind": "image", "text": "`--full` has all.", "good": None}])
+        )
 
     monkeypatch.setattr("airlight.reports.report.measure.write_report", write)
     return given
@@ -84,7 +90,9 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.claim("own-method-process")
-def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd, own_cache, monkeypatch):
+def test_a_report_goes_on_without_methods_that_are_at_fault(
+    variant, mine, capfd, own_cache, monkeypatch
+):
     import json
 
     monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", "45")
@@ -100,21 +108,44 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
         assert words in rows[name]["reason"]
         assert f"airlight: error: method fog_of_mine:{name}: " in printed.err
         assert f"method fog_of_mine:{name}: " in page
-    # Those that are at fault in a small frame are told before the work, and nothing of a fault is kept.
-    assert printed.err.index("warning: method fog_of_mine:crashes") < printed.err.index("error: method")
+    # Those that are at fault in a small frame are told before the work, and
+    # nothing of a fault is kept.
+    assert printed.err.index("warning: method fog_of_mine:crashes") < printed.err.index(
+        "error: method"
+    )
     assert "warning: method fog_of_mine:darkens" not in printed.err
-    assert run(["report", *options, "--method", "fog_of_mine:exits", "--method", "fog_of_mine:half", "--json"]) == 1
-    again = {row["method"].partition(":")[2]: row for row in json.loads(capfd.readouterr().out)["scenes"][0]["methods"]}
+    assert (
+        run(
+            [
+                "report",
+                *options,
+                "--method",
+                "fog_of_mine:exits",
+                "--method",
+                "fog_of_mine:half",
+                "--json",
+            ]
+        )
+        == 1
+    )
+    again = {
+        row["method"].partition(":")[2]: row
+        for row in json.loads(capfd.readouterr().out)["scenes"][0]["methods"]
+    }
     assert (again["exits"]["cached"], again["half"]["cached"]) == (False, True)
 
 
 def _measured(handed_on):
-    return [(each.method, each.kernel, dict(each.parameters)) for each in handed_on["configurations"]]
+    return [
+        (each.method, each.kernel, dict(each.parameters)) for each in handed_on["configurations"]
+    ]
 
 
 @pytest.mark.claim("methods-are-named-alike")
 def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on):
-    """One configuration of each method that is named, with the kernel and the parameters that are given."""
+    """One configuration of each method that is named, with the kernel and the
+    parameters that are given.
+    """
     assert run(["report", "open-fog", "--method", "ray-march", "--set", "steps=32"]) == 0
     assert handed_on["scenes"] == ("open-fog",)
     assert _measured(handed_on) == [("ray-march", None, {"steps": 32})]
@@ -127,14 +158,21 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
 
 
 @pytest.mark.claim("methods-are-named-alike")
-def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys, monkeypatch):
+def test_what_is_named_is_measured_alone_and_all_are_a_word(
+    variant, mine, handed_on, capsys, monkeypatch
+):
     from airlight.validation.study.configuration import QUICK
 
     # `tests/reports/machine/test_own_process.py` has the process that imports it.
-    monkeypatch.setattr("airlight.reports.machine.own_process.in_own_process", lambda work, *given, **how: work(*given))
+    monkeypatch.setattr(
+        "airlight.reports.machine.own_process.in_own_process",
+        lambda work, *given, **how: work(*given),
+    )
     assert run(["report", "--quick", "--method", "fog_of_mine:half"]) == 0
     assert [each[0] for each in _measured(handed_on)] == ["fog_of_mine:half"]
-    assert "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
+    assert (
+        "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
+    )
     assert run(["report", "--quick", "--method", "all", "--method", "fog_of_mine:half"]) == 0
     assert handed_on["configurations"][:-1] == QUICK
     assert handed_on["configurations"][-1].method == "fog_of_mine:half"
@@ -152,27 +190,49 @@ def test_from_python_a_function_runs_in_this_process(variant, tmp_path, handed_o
 
 @pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(("equivalent", "status"), [(True, 0), (None, 1), (False, 1)])
-def test_a_report_ends_with_one_where_its_reference_is_not_confirmed(variant, monkeypatch, capsys, equivalent, status):
+def test_a_report_ends_with_one_where_its_reference_is_not_confirmed(
+    variant, monkeypatch, capsys, equivalent, status
+):
     """Confirmed, not decided, contradicted; no method is at fault in any of them."""
     from tests.helpers.reports import agreement, entry, scene
 
-    studied = scene("fog", [entry("unshadowed (exact)")], agreement={"volpath airlight": agreement(equivalent)})
+    studied = scene(
+        "fog", [entry("unshadowed (exact)")], agreement={"volpath airlight": agreement(equivalent)}
+    )
     made = checked(report_of([studied]))
-    monkeypatch.setattr("airlight.reports.report.measure.write_report", lambda folder, study, **options: made)
+    monkeypatch.setattr(
+        "airlight.reports.report.measure.write_report", lambda folder, study, **options: made
+    )
     assert run(["report", "open-fog", "--method", "unshadowed"]) == status
     assert "error:" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("progress", [None, True])
 def test_how_to_reproduce_a_report_is_what_made_it(variant, tmp_path, handed_on, progress):
-    """Typed, called from Python by names, and with a function; never the arguments of the process that called."""
+    """Typed, called from Python by names, and with a function; never the arguments of
+    the process that called.
+    """
     import shlex
 
     import airlight
 
-    asked = {"quick": True, "method": "ray-march", "settings": {"steps": 32}, "output": tmp_path / "two words"}
+    asked = {
+        "quick": True,
+        "method": "ray-march",
+        "settings": {"steps": 32},
+        "output": tmp_path / "two words",
+    }
     airlight.report("open-fog", progress=progress, **asked)
-    words = ["report", "open-fog", "--method", "ray-march", "--set", "steps=32", "--quick", "--output"]
+    words = [
+        "report",
+        "open-fog",
+        "--method",
+        "ray-march",
+        "--set",
+        "steps=32",
+        "--quick",
+        "--output",
+    ]
     assert shlex.split(handed_on["command"]) == ["airlight", *words, str(tmp_path / "two words")]
     called, measured = handed_on["command"], _measured(handed_on)
     assert run(shlex.split(called)[1:]) == 0
@@ -194,20 +254,28 @@ def images(tmp_path):
 def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
     assert run(["report", "--quick", "--images", str(images)]) == 0
     assert sorted(handed_on["scenes"]) == ["omni-box", "open-fog"]
-    labels = {name: [image.label for image in several] for name, several in handed_on["images"].items()}
+    labels = {
+        name: [image.label for image in several] for name, several in handed_on["images"].items()
+    }
     assert labels == {"omni-box": ["engine"], "open-fog": ["a", "b"]}
     assert run(["report", "--quick", "--images", str(images), "omni-box", "sphere-spot"]) == 0
     assert handed_on["scenes"] == ("omni-box", "sphere-spot")
     assert list(handed_on["images"]) == ["omni-box"]
 
 
-def test_images_of_other_scenes_than_those_that_are_named_are_refused(variant, images, handed_on, capsys):
+def test_images_of_other_scenes_than_those_that_are_named_are_refused(
+    variant, images, handed_on, capsys
+):
     assert run(["report", "--quick", "--images", str(images), "sphere-spot", "hall"]) == 2
-    assert "has no image of hall, sphere-spot, only of omni-box, open-fog" in capsys.readouterr().err
+    assert (
+        "has no image of hall, sphere-spot, only of omni-box, open-fog" in capsys.readouterr().err
+    )
     assert not handed_on
 
 
-def test_workers_of_a_cluster_are_handed_on_while_the_report_is_made(variant, tmp_path, handed_on, monkeypatch):
+def test_workers_of_a_cluster_are_handed_on_while_the_report_is_made(
+    variant, tmp_path, handed_on, monkeypatch
+):
     pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
     open_places = []
 
@@ -224,7 +292,9 @@ def test_workers_of_a_cluster_are_handed_on_while_the_report_is_made(variant, tm
 
 
 @pytest.mark.claim("report-drawn-again")
-def test_a_page_is_drawn_in_its_place_with_the_figures_that_are_asked_for(tmp_path, monkeypatch, capsys):
+def test_a_page_is_drawn_in_its_place_with_the_figures_that_are_asked_for(
+    tmp_path, monkeypatch, capsys
+):
     """`tests/reports/figures` draws them."""
     from tests.helpers.page import write_report_files
 
@@ -261,7 +331,8 @@ def test_a_report_in_a_notebook_has_its_claims_and_leads_to_its_page(tmp_path, m
     assert "<li>The reference is confirmed.</li>" in shown
     assert f'<a href="{(tmp_path / "r" / "report.html").as_uri()}">' in shown
     monkeypatch.chdir(tmp_path)
-    assert '<a href="r/report.html">' in report._repr_html_()  # a notebook shows files below its folder alone
+    # a notebook shows files below its folder alone
+    assert '<a href="r/report.html">' in report._repr_html_()
 
 
 @pytest.mark.claim("report-drawn-again")
@@ -274,8 +345,15 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     folder = write_report_files(tmp_path / "r")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(report_text(small_report()))
-    assert "The reference is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
-    assert json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8")) == report_data()
-    (folder / next(name for name in named_files(small_report()) if name.endswith(".png"))).write_bytes(b"half a file")
+    assert "The reference is confirmed." in (tmp_path / "again" / "report.html").read_text(
+        encoding="utf-8"
+    )
+    assert (
+        json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8"))
+        == report_data()
+    )
+    (
+        folder / next(name for name in named_files(small_report()) if name.endswith(".png"))
+    ).write_bytes(b"half a file")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "third")]) == 2
     assert "is no picture that can be read" in capsys.readouterr().err

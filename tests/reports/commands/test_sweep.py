@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: one command sweeps a study, a killed run goes on, and the same study twice computes nothing."""
+"""Claim: one command sweeps a study, a killed run goes on, and the same
+study twice computes nothing.
+"""
 
 import json
 import os
@@ -31,7 +33,9 @@ COMMAND = [sys.executable, "-m", "airlight", "sweep"]
 
 
 def _run(*words, **options):
-    return subprocess.run([*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=900, **options)
+    return subprocess.run(
+        [*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=900, **options
+    )
 
 
 def _rows(folder):
@@ -41,18 +45,24 @@ def _rows(folder):
 
 
 def _has_a_row(folder, empty):
-    """Return whether the file of a sweep that runs has grown, and its journal no longer has what would undo that."""
+    """Return whether the file of a sweep that runs has grown, and its journal no longer
+    has what would undo that.
+    """
     rows, journal = folder / ROWS, folder / f"{ROWS}-journal"
     grown = rows.exists() and rows.stat().st_size > empty
     return grown and (not journal.exists() or not any(journal.read_bytes()[:8]))
 
 
 @pytest.mark.slow
-@pytest.mark.claim("sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again")
+@pytest.mark.claim(
+    "sweeps-go-on", tolerance="none: a row for every cell, none twice, none computed again"
+)
 def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     study, folder = tmp_path / "study.toml", tmp_path / "rows"
     study.write_text(STUDY)
-    begun = subprocess.Popen([*COMMAND, study, "-o", folder, "--cluster", "local:1"], stderr=subprocess.DEVNULL)
+    begun = subprocess.Popen(
+        [*COMMAND, study, "-o", folder, "--cluster", "local:1"], stderr=subprocess.DEVNULL
+    )
     until = time.monotonic() + 600
     with RowStore(tmp_path / "empty") as store:
         empty = store.path.stat().st_size
@@ -75,7 +85,11 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     rows = _rows(folder)
     assert len({row["key"] for row in rows}) == len(rows) == 8
     assert {row["status"] for row in rows} == {"done"}
-    assert {key: value for key, value in ((row["key"], row["origin.started"]) for row in rows) if key in kept} == kept
+    assert {
+        key: value
+        for key, value in ((row["key"], row["origin.started"]) for row in rows)
+        if key in kept
+    } == kept
     assert {row["seed"] for row in rows} == {None, 3}
     assert {row["properties.lights"] is None for row in rows} == {False}
     assert all(row["picture"][:4] == b"RIFF" for row in rows)
@@ -88,9 +102,16 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
 @pytest.mark.claim("sweep-timed-alone", tolerance="none")
 def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
     study, folder = tmp_path / "study.toml", tmp_path / "rows"
-    study.write_text('times = "alone"\n' + STUDY.replace(', "light-volumes"', "").split("[parameters.light")[0])
+    study.write_text(
+        'times = "alone"\n' + STUDY.replace(', "light-volumes"', "").split("[parameters.light")[0]
+    )
     summary = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
-    assert (summary["cells"], summary["computed"], summary["timed_alone"], summary["problems"]) == (6, 6, 6, [])
+    assert (summary["cells"], summary["computed"], summary["timed_alone"], summary["problems"]) == (
+        6,
+        6,
+        6,
+        [],
+    )
     rows = _rows(folder)
     assert len({row["key"] for row in rows}) == len(rows) == 6
     assert {(row["status"], row["cost.alone"]) for row in rows} == {("done", True)}
@@ -99,7 +120,8 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
         row = store.row(rows[0]["key"])
         store.add(row | {FRAME_MS: None, "cost.alone": None})
     again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
-    # The three cells of its image: they are compared with one another, so their times are of one run.
+    # The three cells of its image: they are compared with one another, so
+    # their times are of one run.
     assert (again["cached"], again["computed"], again["timed_alone"]) == (6, 0, 3)
     assert {row["cost.alone"] for row in _rows(folder)} == {True}
 
@@ -115,10 +137,23 @@ def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):
     files = []
     for where in ([], ["--cluster", "local:2"]):
         file = tmp_path / f"{len(files)}.exr"
-        command = [sys.executable, "-m", "airlight", "reference", "sphere-spot", "--size", "16x12", *words]
+        command = [
+            sys.executable,
+            "-m",
+            "airlight",
+            "reference",
+            "sphere-spot",
+            "--size",
+            "16x12",
+            *words,
+        ]
         environment = os.environ | {"AIRLIGHT_CACHE_DIR": str(tmp_path / f"cache-{len(files)}")}
         ran = subprocess.run(
-            [*command, *where, "-o", str(file), "--json"], capture_output=True, text=True, timeout=900, env=environment
+            [*command, *where, "-o", str(file), "--json"],
+            capture_output=True,
+            text=True,
+            timeout=900,
+            env=environment,
         )
         assert ran.returncode == 0, ran.stderr
         files.append(file.read_bytes())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight test` and the start of a command: what pytest is asked, and what is written of a run of all tiers.
+"""`airlight test` and the start of a command: what pytest is asked, and what is
+written of a run of all tiers.
 
 No suite runs within the suite: a stub stands in the place of pytest.
 """
@@ -32,14 +33,18 @@ class Replaced(Exception):
 
 @pytest.fixture(autouse=True)
 def _own_environment(variant, monkeypatch, tmp_path):
-    """Four cores, memory for two workers, an environment in which nothing is set, and another current folder."""
+    """Four cores, memory for two workers, an environment in which nothing is set,
+    and another current folder.
+    """
 
     def replaced(program, words):
         assert program == sys.executable
         raise Replaced(*words)
 
     memory = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": int(2.5 * command.WORKER_MEMORY) // 4096}
-    monkeypatch.setattr(os, "environ", {name: os.environ[name] for name in os.environ if name != VARIABLE})
+    monkeypatch.setattr(
+        os, "environ", {name: os.environ[name] for name in os.environ if name != VARIABLE}
+    )
     monkeypatch.setattr(os, "sysconf", memory.__getitem__)
     monkeypatch.setattr(os, "execv", replaced)
     monkeypatch.setattr("airlight.reports.machine.environment.threads", lambda: 4)
@@ -53,8 +58,17 @@ def asked(*words):
     return list(raised.value.args)
 
 
-def test_the_default_tier_is_shared_by_as_many_processes_as_have_memory_and_compiles_quickly(variant):
-    assert asked("tests/reports", "-k", "fog") == [*PYTEST, *SHARED, *DEFAULT, "tests/reports", "-k", "fog"]
+def test_the_default_tier_is_shared_by_as_many_processes_as_have_memory_and_compiles_quickly(
+    variant,
+):
+    assert asked("tests/reports", "-k", "fog") == [
+        *PYTEST,
+        *SHARED,
+        *DEFAULT,
+        "tests/reports",
+        "-k",
+        "fog",
+    ]
     assert Path.cwd() == ROOT  # the checkout, which paths are relative to
     quick = variant == "llvm_ad_rgb"  # CUDA compiles by other means
     assert (os.environ.get(VARIABLE) == "quick") is quick
@@ -91,7 +105,9 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
     def run(words, **how):
         assert words[: len(PYTEST + SHARED)] == PYTEST + SHARED
         assert "--allowed-skips=.ci/skips" in words
-        (results,) = (word.removeprefix("--junit-xml=") for word in words if word.startswith("--junit-xml="))
+        (results,) = (
+            word.removeprefix("--junit-xml=") for word in words if word.startswith("--junit-xml=")
+        )
         Path(results).write_text(SUITE)
         clock.now += 61.2
         return SimpleNamespace(returncode=status)
@@ -102,7 +118,9 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
     monkeypatch.setenv(VARIABLE, "quick")
     assert cli.run(["test", "--all"]) == status
     record = json.loads((tmp_path / "record.json").read_text())
-    assert {name: record[name] for name in ("commit", "changed", "passed", "failed", "skipped")} == {
+    assert {
+        name: record[name] for name in ("commit", "changed", "passed", "failed", "skipped")
+    } == {
         "commit": commit,
         "changed": changed,
         "passed": 3,
@@ -124,13 +142,19 @@ def test_a_run_that_counted_nothing_leaves_the_record_and_fails(monkeypatch, tmp
     monkeypatch.setattr(command, "subprocess", killed)
     assert cli.run(["test", "--all"]) == 1
     assert record.read_text() == "the run before"
-    assert capsys.readouterr().err == "airlight: error: pytest ended with -9 and counted no tests: no record\n"
+    assert (
+        capsys.readouterr().err
+        == "airlight: error: pytest ended with -9 and counted no tests: no record\n"
+    )
 
 
 def test_an_installed_package_has_no_tests_and_says_where_they_are(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(command, "__file__", str(tmp_path / "reports" / "commands" / "test.py"))
     assert cli.run(["test"]) == 3
-    assert f"there are no tests in {tmp_path}, they come with the source only" in capsys.readouterr().err
+    assert (
+        f"there are no tests in {tmp_path}, they come with the source only"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_command_begins_with_signals_of_the_system_and_ends_with_its_status(monkeypatch, capsys):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight view`: it listens here alone, refuses in one line, and Ctrl-C ends it with all that it started."""
+"""`airlight view`: it listens here alone, refuses in one line, and Ctrl-C ends it
+with all that it started.
+"""
 
 import os
 import signal
@@ -48,7 +50,9 @@ def test_a_port_that_is_taken_is_said_and_the_reference_ends(variant, monkeypatc
         run("open-fog", *SMALL, "--address", f"127.0.0.1:{port}", status=2)
     printed = capfd.readouterr()
     assert printed.out == ""
-    assert f"address: cannot listen at 127.0.0.1, port {port}: Address already in use" in printed.err
+    assert (
+        f"address: cannot listen at 127.0.0.1, port {port}: Address already in use" in printed.err
+    )
     assert ended == [True]
 
 
@@ -74,7 +78,11 @@ def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
         stderr=subprocess.PIPE,
         text=True,
         # Quick compilation has a child of its own.
-        env={name: value for name, value in os.environ.items() if name not in (VARIABLE, CACHE_VARIABLE)},
+        env={
+            name: value
+            for name, value in os.environ.items()
+            if name not in (VARIABLE, CACHE_VARIABLE)
+        },
     )
     address = process.stdout.readline().strip()
     assert address.startswith("http://127.0.0.1:")

@@ -31,10 +31,14 @@ def changed(folder, change):
     [
         ("{", "is not valid JSON"),
         ("[]", "has no schema, expected 'airlight-report/4'"),
-        ('{"schema": "airlight-report/3"}', "the schema 'airlight-report/3', expected 'airlight-report/4'; make the"),
+        (
+            '{"schema": "airlight-report/3"}',
+            "the schema 'airlight-report/3', expected 'airlight-report/4'; make the",
+        ),
         (
             '{"schema": "airlight-report/4"}',
-            "does not keep to airlight-report/4: report: Object missing required field `created`; make",
+            "does not keep to airlight-report/4: report: Object missing required field `created`; "
+            "make",
         ),
     ],
 )
@@ -46,7 +50,10 @@ def test_what_is_no_report_is_refused(folder, text, message):
 
 def test_a_damaged_report_is_refused_with_the_place(folder):
     changed(folder, lambda data: data["scenes"][0]["methods"][0]["times"].pop("frame"))
-    with pytest.raises(InputError, match=r"report\.scenes\[0\]\.methods\[0\]\.times: .* missing .* `frame`; make the"):
+    with pytest.raises(
+        InputError,
+        match=r"report\.scenes\[0\]\.methods\[0\]\.times: .* missing .* `frame`; make the",
+    ):
         load_report(folder)
     changed(folder, lambda data: data["scenes"][0]["methods"][0].update(width="wide"))
     with pytest.raises(InputError, match=r"methods\[0\]\.width: Expected `int`, got `str`"):
@@ -57,12 +64,16 @@ def test_a_damaged_report_is_refused_with_the_place(folder):
 def test_a_number_that_is_not_finite_is_refused_with_its_place(folder, number):
     text = json.dumps(report_data()).replace('"exposure": 2.5', f'"exposure": {number}')
     (folder / "report.json").write_text(text)
-    with pytest.raises(InputError, match=r"report\.scenes\[0\]\.exposure: Expected `float`, got `str`"):
+    with pytest.raises(
+        InputError, match=r"report\.scenes\[0\]\.exposure: Expected `float`, got `str`"
+    ):
         read_report(folder)
 
 
 def test_the_kept_report_can_be_compared():
-    """`replicate` compares the quick report with this one: errors are compared at one size alone."""
+    """`replicate` compares the quick report with this one: errors are
+    compared at one size alone.
+    """
     (scene,) = read_report(ROOT / "docs" / "data" / "replicate.json").scenes
     assert scene.name == "colonnade"
     assert tuple(scene.size) in standard_study("quick").sizes
@@ -76,7 +87,9 @@ def test_a_missing_file_is_named(folder, tmp_path):
         load_report(tmp_path / "nowhere")
 
 
-@pytest.mark.parametrize("name", ["../outside.exr", "/etc/hostname", "s/../../outside.exr", "C:outside.exr"])
+@pytest.mark.parametrize(
+    "name", ["../outside.exr", "/etc/hostname", "s/../../outside.exr", "C:outside.exr"]
+)
 def test_files_elsewhere_are_refused(folder, name):
     """A report is copied with its files: none may lie, or be written, outside of its folder."""
     (folder.parent / "outside.exr").write_text("x")

@@ -53,9 +53,18 @@ def report(tmp_path_factory):
         wrong[2:6, 20:24] *= 1.5 if error > 1e-3 else 1.0
         write_exr(folder / f"{label[:5]}.exr", Image({"airlight": wrong}))
         methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))
-    methods += [engine("engine", 0.1) | {"layer": "airlight"}, refused("refused_one", "no such media")]
-    files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
-    studied = scene("a_scene", methods, size=[32, 24], reference=reference_of(relative_bound=4e-11), files=files)
+    methods += [
+        engine("engine", 0.1) | {"layer": "airlight"},
+        refused("refused_one", "no such media"),
+    ]
+    files = {
+        "exr": "reference.exr",
+        "picture": "reference.png",
+        "airlight": "reference-airlight.png",
+    }
+    studied = scene(
+        "a_scene", methods, size=[32, 24], reference=reference_of(relative_bound=4e-11), files=files
+    )
     data = report_of(
         [studied],
         created="2031-01-02 03:04:05 +0000",
@@ -73,14 +82,21 @@ def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(repor
     """In another process, by the command; and what is embedded are TrueType fonts, no date."""
     program = (
         "import sys; from airlight.reports.commands.main import run\n"
-        f"assert run(['report', '--from', {str(report)!r}, '-o', 'OUT', '--figures', 'single']) == 0\n"
+        f"assert run(['report', '--from', {str(report)!r}, '-o', 'OUT', '--figures', 'single']) == "
+        "0\n"
         "assert not {'mitsuba', 'drjit'} & set(sys.modules), 'drawing started Mitsuba'\n"
     )
     drawn = []
     for name in ("first", "again"):
         code = program.replace("OUT", str(tmp_path / name))
         subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
-        drawn.append({path.name: path.read_bytes() for path in (tmp_path / name).iterdir() if path.suffix == ".pdf"})
+        drawn.append(
+            {
+                path.name: path.read_bytes()
+                for path in (tmp_path / name).iterdir()
+                if path.suffix == ".pdf"
+            }
+        )
     assert drawn[0] == drawn[1]
     assert set(drawn[0]) == {"frame-speed.pdf", "strip.pdf"}
     for pdf in drawn[0].values():

@@ -34,13 +34,17 @@ def parts(path):
 
 
 def project(document, points):
-    """Return where points of glTF's world are in the image, in fractions of its size from the upper left."""
+    """Return where points of glTF's world are in the image, in fractions of its
+    size from the upper left.
+    """
     node = next(node for node in document["nodes"] if "camera" in node)
     lens = document["cameras"][node["camera"]]["perspective"]
     matrix = np.array(node["matrix"]).reshape(4, 4).T
     x, y, z = ((points - matrix[:3, 3]) @ matrix[:3, :3]).T
     half = np.tan(lens["yfov"] / 2)
-    return np.stack([0.5 + 0.5 * x / (-z * half * lens["aspectRatio"]), 0.5 - 0.5 * y / (-z * half)], axis=1)
+    return np.stack(
+        [0.5 + 0.5 * x / (-z * half * lens["aspectRatio"]), 0.5 - 0.5 * y / (-z * half)], axis=1
+    )
 
 
 @pytest.mark.claim("gltf", tolerance="1e-6: float32")
@@ -49,7 +53,8 @@ def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up)
     sensor = tiny_scene(size=(40, 24))["sensor"]
     view = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.2, 0.6], list(up))
     cube = loaded(
-        sensor=sensor | {"to_world": view}, ball={"type": "cube", "to_world": mi.ScalarTransform4f().scale(0.4)}
+        sensor=sensor | {"to_world": view},
+        ball={"type": "cube", "to_world": mi.ScalarTransform4f().scale(0.4)},
     )
     write_gltf(tmp_path / "tiny.glb", cube)
     document, _ = parts(tmp_path / "tiny.glb")
@@ -57,7 +62,9 @@ def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up)
     projected = project(document, np.asarray(ball.vertices))
     shape = next(shape for shape in cube.scene.shapes() if shape.id() == "ball")
     interaction = mi.Interaction3f()
-    interaction.p = mi.Point3f(mi.traverse(shape)["vertex_positions"].numpy().reshape(-1, 3).T.copy())
+    interaction.p = mi.Point3f(
+        mi.traverse(shape)["vertex_positions"].numpy().reshape(-1, 3).T.copy()
+    )
     sample, _ = cube.scene.sensors()[0].sample_direction(interaction, mi.Point2f(0.5))
     wanted = np.array(sample.uv, dtype=np.float64).T / [40, 24]
     assert wanted.min() > 0
@@ -79,8 +86,11 @@ def test_trimesh_reads_it_back(variant, tmp_path):
     # Biri's sphere, at (0.11, -0.07, 1.93) with z up.
     np.testing.assert_allclose(sphere.bounds.mean(axis=0), [0.11, 1.93, 0.07], atol=2e-3)
     # trimesh keeps a colour in 8 bits.
-    np.testing.assert_allclose(sphere.visual.material.baseColorFactor[:3] / 255, [0.57, 0.31, 0.23], atol=0.003)
-    # trimesh takes the aspect ratio for the ratio of the angles of view, so the other one comes back wrong.
+    np.testing.assert_allclose(
+        sphere.visual.material.baseColorFactor[:3] / 255, [0.57, 0.31, 0.23], atol=0.003
+    )
+    # trimesh takes the aspect ratio for the ratio of the angles of view, so the
+    # other one comes back wrong.
     np.testing.assert_allclose(back.camera.fov[1], 39.9394506, rtol=1e-6)
     np.testing.assert_allclose(back.camera_transform[:3, 3], [0.63, 1.87, 5.31], rtol=1e-6)
 
@@ -93,13 +103,17 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
     lights = document["extensions"]["KHR_lights_punctual"]["lights"]
     assert [light["type"] for light in lights] == ["point", "spot", "spot"]
     for light, intensity in zip(lights, ([5, 4, 3], [9, 7, 8], [9, 7, 8])):
-        np.testing.assert_allclose(light["intensity"] * np.array(light["color"]), intensity, rtol=1e-12)
+        np.testing.assert_allclose(
+            light["intensity"] * np.array(light["color"]), intensity, rtol=1e-12
+        )
         assert light["extras"]["intensity_w_per_sr"] == intensity
         assert max(light["color"]) == 1
     np.testing.assert_allclose(np.rad2deg(lights[1]["spot"]["innerConeAngle"]), 25, rtol=1e-6)
     np.testing.assert_allclose(np.rad2deg(lights[1]["spot"]["outerConeAngle"]), 40, rtol=1e-6)
     assert 0.999 < lights[2]["spot"]["innerConeAngle"] / lights[2]["spot"]["outerConeAngle"] < 1
-    nodes = [node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})]
+    nodes = [
+        node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})
+    ]
     assert [node["extensions"]["KHR_lights_punctual"]["light"] for node in nodes] == [0, 1, 2]
     matrix = np.array(nodes[1]["matrix"]).reshape(4, 4).T
     np.testing.assert_allclose(matrix[:3, 3], [0.7, 2.6, 0.3], rtol=1e-6)
@@ -115,7 +129,14 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "flipped"),
     # Mitsuba's cube cannot be turned inside out.
-    [("cube", False), *((kind, way) for kind in ("sphere", "disk", "cylinder", "rectangle") for way in (False, True))],
+    [
+        ("cube", False),
+        *(
+            (kind, way)
+            for kind in ("sphere", "disk", "cylinder", "rectangle")
+            for way in (False, True)
+        ),
+    ],
 )
 def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped):
     """Rays of Mitsuba meet shape and mesh at the same place, with normals on the same side."""
@@ -158,14 +179,23 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped)
 
 @pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
 @pytest.mark.parametrize(("kind", "flipped"), [("rectangle", True), ("sphere", False)])
-def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(variant, tmp_path, kind, flipped):
-    """Rationale: core glTF has no such light; faces run counter-clockwise seen from where it shines."""
+def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(
+    variant, tmp_path, kind, flipped
+):
+    """Rationale: core glTF has no such light; faces run counter-clockwise
+    seen from where it shines.
+    """
     scale = {"rectangle": [0.5, 0.3, 1.0], "sphere": [0.3] * 3}[kind]
-    transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    transform = (
+        mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    )
     light = lamp(kind, radiance=(5.0, 4.0, 2.5), to_world=transform, flip_normals=flipped)
     write_gltf(tmp_path / "tiny.glb", loaded(lamp=light))
     document, _ = parts(tmp_path / "tiny.glb")
-    assert set(document["extensionsUsed"]) == {"KHR_materials_specular", "KHR_materials_emissive_strength"}
+    assert set(document["extensionsUsed"]) == {
+        "KHR_materials_specular",
+        "KHR_materials_emissive_strength",
+    }
     assert "extensions" not in document
     names = [mesh["name"] for mesh in document["meshes"]]
     assert sorted(names) == ["ball", "floor", "lamp"]
@@ -175,10 +205,14 @@ def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(va
     assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 5.0
     assert "core glTF has no area light" in material["extras"]["note"]
     assert material["extras"]["light"]["radiance"] == [5.0, 4.0, 2.5]
-    corners = np.asarray(trimesh.load(tmp_path / "tiny.glb", process=False).geometry["lamp"].triangles)
+    corners = np.asarray(
+        trimesh.load(tmp_path / "tiny.glb", process=False).geometry["lamp"].triangles
+    )
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # The sphere is of 128 sides.
-    assert 0.5 * np.linalg.norm(across, axis=1).sum() == pytest.approx(material["extras"]["light"]["area"], rel=2e-3)
+    assert 0.5 * np.linalg.norm(across, axis=1).sum() == pytest.approx(
+        material["extras"]["light"]["area"], rel=2e-3
+    )
     turn = np.array(document["scenes"][0]["extras"]["scene_to_gltf"])
     if kind == "sphere":
         outward = corners.mean(axis=1) - turn @ material["extras"]["light"]["position"]

@@ -28,14 +28,18 @@ cycles_properties = runpy.run_path(str(EXAMPLES / "cycles_properties.py"))["cycl
 
 
 def described(**changes):
-    return describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
+    return describe_scene(
+        LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", "")
+    )
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_camera_is_enough_to_make_mitsubas_rays(variant):
     camera = described(size=(16, 12))["camera"]
     forward, right, up = (np.array(camera[name]) for name in ("forward", "right", "up"))
-    tangents = [np.tan(0.5 * np.deg2rad(camera[f"fov_{way}"])) for way in ("horizontal", "vertical")]
+    tangents = [
+        np.tan(0.5 * np.deg2rad(camera[f"fov_{way}"])) for way in ("horizontal", "vertical")
+    ]
     sensor = mi.load_dict(tiny_scene(size=(16, 12))).sensors()[0]
     for column, row in ((0, 0), (15, 11), (3, 8)):
         x, y = 2 * (column + 0.5) / 16 - 1, 1 - 2 * (row + 0.5) / 12
@@ -43,14 +47,18 @@ def test_camera_is_enough_to_make_mitsubas_rays(variant):
         place = mi.Point2f((column + 0.5) / 16, (row + 0.5) / 12)
         ray, _ = sensor.sample_ray(0, 0, place, mi.Point2f(0.5))
         # float32
-        np.testing.assert_allclose(wanted / np.linalg.norm(wanted), np.array(ray.d)[:, 0], atol=5e-7)
+        np.testing.assert_allclose(
+            wanted / np.linalg.norm(wanted), np.array(ray.d)[:, 0], atol=5e-7
+        )
     assert camera["position"] == [0.2, -4.1, 1.3]
     # Right-handed.
     np.testing.assert_allclose(np.cross(right, up), -forward, atol=1e-6)
 
 
 def test_a_description_does_not_follow_the_print_options_of_the_process(variant):
-    """Importing `colour`, as pictures do, sets the oldest ones: a mean free path of 9.090909 m became 9.09091 m."""
+    """Importing `colour`, as pictures do, sets the oldest ones: a mean free path of
+    9.090909 m became 9.09091 m.
+    """
     usual = described(size=(16, 12))
     with np.printoptions(legacy="1.13"):
         assert described(size=(16, 12)) == usual
@@ -68,7 +76,9 @@ def test_medium_is_in_every_form_that_engines_ask_for(variant):
 
 def test_bodies_of_media_are_listed_with_their_bounds(variant):
     ball = bounded_medium(
-        {"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3)
+        {"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3},
+        (0.5, 0.25, 1.0),
+        (0.5, 0.4, 0.3),
     )
     cube = bounded_medium({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
     sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
@@ -102,7 +112,9 @@ def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
 )
 def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind, scale, area):
     """Rationale: power pi Le A, and 683 lm/W times 0.2126 R + 0.7152 G + 0.0722 B, here by hand."""
-    transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    transform = (
+        mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    )
     found = described(lamp=lamp(kind, radiance=(5.0, 4.0, 3.0), to_world=transform))
     (light,) = found["lights"]
     assert (light["kind"], light["shape"], light["material"]) == ("area", kind, "black")
@@ -119,7 +131,9 @@ def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind,
         assert light["axis"] == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.claim("described-power", tolerance="1e-9 relative: the quadrature's; 1e-7: float32 angles")
+@pytest.mark.claim(
+    "described-power", tolerance="1e-9 relative: the quadrature's; 1e-7: float32 angles"
+)
 @pytest.mark.parametrize(
     ("beam", "cutoff"), [(25.0, 40.0), (33.0, 33.0), (0.0, 90.0), (24.3, 24.3000001), (0.01, 0.02)]
 )
@@ -129,7 +143,8 @@ def test_power_of_a_spot_is_the_integral_of_its_falloff(beam, cutoff):
     b, c = np.deg2rad([beam, cutoff])
     inside = quad(np.sin, 0, b, epsabs=0)[0]
     edge = quad(lambda t: (c - t) / (c - b) * np.sin(t), b, c, epsabs=0)[0] if c > b else 0.0
-    tolerance = 1e-9 if cutoff > 1 else 1e-8  # 1 - cos of a hundredth of a degree has lost eight digits
+    # 1 - cos of a hundredth of a degree has lost eight digits
+    tolerance = 1e-9 if cutoff > 1 else 1e-8
     np.testing.assert_allclose(spot_power_angle(b, c), 2 * np.pi * (inside + edge), rtol=tolerance)
 
 
@@ -149,7 +164,9 @@ def test_every_built_in_scene_can_be_described_and_written(name, variant, tmp_pa
 
 
 def properties(**changes):
-    described = describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
+    described = describe_scene(
+        LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", "")
+    )
     return described, cycles_properties(described)
 
 
@@ -163,7 +180,10 @@ def test_a_camera_looks_along_minus_z_and_cuts_no_fog_away(variant):
     np.testing.assert_allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-6)
     assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1.0, abs=1e-6)
     data = cycles["camera"]["data"]
-    assert (data["sensor_fit"], math.degrees(data["angle"])) == ("HORIZONTAL", pytest.approx(camera["fov_horizontal"]))
+    assert (data["sensor_fit"], math.degrees(data["angle"])) == (
+        "HORIZONTAL",
+        pytest.approx(camera["fov_horizontal"]),
+    )
     assert data["clip_start"] < 1e-5
 
 
@@ -172,10 +192,14 @@ def test_lights_have_watts_whole_angles_and_directions(variant):
     lamp, hard = cycles["lights"]
     assert lamp["type"] == "POINT"
     np.testing.assert_allclose(
-        np.array(lamp["data"]["color"]) * lamp["data"]["energy"], described["lights"][0]["power_all_round"], rtol=1e-12
+        np.array(lamp["data"]["color"]) * lamp["data"]["energy"],
+        described["lights"][0]["power_all_round"],
+        rtol=1e-12,
     )
     assert (lamp["data"]["shadow_soft_size"], lamp["data"]["use_soft_falloff"]) == (0.0, False)
-    assert math.degrees(hard["data"]["spot_size"]) == pytest.approx(2 * described["lights"][1]["cutoff_angle"])
+    assert math.degrees(hard["data"]["spot_size"]) == pytest.approx(
+        2 * described["lights"][1]["cutoff_angle"]
+    )
     assert hard["data"]["spot_blend"] == 0.0
     matrix = np.array(hard["matrix_world"])
     np.testing.assert_allclose(-matrix[:3, 2], described["lights"][1]["axis"], atol=1e-12)
@@ -235,33 +259,57 @@ def test_describe_writes_it(variant, tmp_path):
         airlight.describe("open-fog", output=tmp_path / "open.vol")
 
 
-#: Units of the numbers that an engine programmer types, by their names: those of the notation of DESIGN.
+#: Units of the numbers that an engine programmer types, by their names: those
+#: of the notation of DESIGN.
 UNITS = {
     **dict.fromkeys(("position", "mean_free_path", "scale_height", "radius"), "m"),
     **dict.fromkeys(("sigma_t", "sigma_s", "sigma_a"), "1/m"),
     **dict.fromkeys(("cutoff_angle", "beam_angle"), "degrees from the axis"),
     **dict.fromkeys(("fov_horizontal", "fov_vertical"), "degrees"),
     **dict.fromkeys(("power", "power_all_round"), "W"),
-    **{"intensity": "W/sr", "size": "pixels", "albedo": "", "axis": "", "forward": "", "right": "", "up": ""},
+    **{
+        "intensity": "W/sr",
+        "size": "pixels",
+        "albedo": "",
+        "axis": "",
+        "forward": "",
+        "right": "",
+        "up": "",
+    },
 }
 
 
 def test_the_printed_description_has_the_numbers_of_the_json_with_their_units(variant, capsys):
-    """Each number of camera, medium and light, once, to seven digits, with the unit that its name has."""
+    """Each number of camera, medium and light, once, to seven digits, with
+    the unit that its name has.
+    """
     assert run(["describe", "sphere-spot", "--size", "16x12"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert run(["describe", "sphere-spot", "--size", "16x12", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     parts = {"camera": data["camera"], "medium": data["medium"], "light": data["lights"][0]}
-    begins = {part: next(n for n, line in enumerate(lines) if re.match(rf"{part}\s", line)) for part in parts}
+    begins = {
+        part: next(n for n, line in enumerate(lines) if re.match(rf"{part}\s", line))
+        for part in parts
+    }
     checked = set()
     for part, values in parts.items():
         for name, value in values.items():
             if isinstance(value, str | dict):
                 continue
-            written = ", ".join(f"{each:.7g}" for each in value) if isinstance(value, list) else f"{value:.7g}"
-            wanted = f"({written}) {UNITS[name]}" if isinstance(value, list) else f"{written} {UNITS[name]}"
-            shown = next(line for line in lines[begins[part] :] if re.search(rf"(^|\s){name}\s", line))
+            written = (
+                ", ".join(f"{each:.7g}" for each in value)
+                if isinstance(value, list)
+                else f"{value:.7g}"
+            )
+            wanted = (
+                f"({written}) {UNITS[name]}"
+                if isinstance(value, list)
+                else f"{written} {UNITS[name]}"
+            )
+            shown = next(
+                line for line in lines[begins[part] :] if re.search(rf"(^|\s){name}\s", line)
+            )
             assert shown.rpartition(f"{name} ")[2].strip() == wanted.strip()
             checked.add(name)
     assert checked == set(UNITS) - {"scale_height", "radius"}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which libLLVM and variant are taken, what is said where something is missing, and what `airlight doctor` shows."""
+"""Which libLLVM and variant are taken, what is said where something is missing, and what
+`airlight doctor` shows.
+"""
 
 import json
 import os
@@ -22,7 +24,9 @@ from airlight.reports.machine.llvm import find_llvm
 ROOT = Path(__file__).resolve().parents[3]
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="looks at ELF files and Linux' library names")
+linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="looks at ELF files and Linux' library names"
+)
 
 
 def _library(folder: Path, name: str, content: bytes = HEADER) -> Path:
@@ -38,7 +42,8 @@ def only(tmp_path, monkeypatch):
     folder = tmp_path / "lib"
     folder.mkdir()
     for name in ("DRJIT_LIBLLVM_PATH", "AIRLIGHT_VARIANT", "AIRLIGHT_COMPILATION"):
-        monkeypatch.setenv(name, "")  # so that it is as it was after the test, also where `prepare` sets it
+        # so that it is as it was after the test, also where `prepare` sets it
+        monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
     monkeypatch.setattr(llvm, "llvm_folders", lambda: [folder])
     monkeypatch.setattr(environment, "cuda_problem", lambda: "no GPU")
@@ -50,11 +55,23 @@ class TestFindLlvm:
     """Candidates by file name alone."""
 
     def test_the_newest_that_works_first_and_each_once(self, only):
-        for name in ("libLLVM-14.0.6.so", "libLLVM-16.so.1", "libLLVM.so.18.1", "libLLVM.so.20.1", "libLLVM.so.19.1"):
+        for name in (
+            "libLLVM-14.0.6.so",
+            "libLLVM-16.so.1",
+            "libLLVM.so.18.1",
+            "libLLVM.so.20.1",
+            "libLLVM.so.19.1",
+        ):
             _library(only, name)
         (only / "libLLVM-19.so").symlink_to(only / "libLLVM.so.19.1")
         found = [(library.version, library.works) for library in find_llvm()]
-        assert found == [((20, 1), True), ((19, 1), True), ((18, 1), True), ((16, 0), False), ((14, 0), False)]
+        assert found == [
+            ((20, 1), True),
+            ((19, 1), True),
+            ((18, 1), True),
+            ((16, 0), False),
+            ((14, 0), False),
+        ]
 
 
 @linux
@@ -71,7 +88,9 @@ class TestPrepare:
         own = _library(tmp_path, "libLLVM-14.so.1")
         _library(only, "libLLVM.so.19.1")
         monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(own))
-        with pytest.raises(MissingError, match=r"DRJIT_LIBLLVM_PATH names .*libLLVM-14.so.1.*unset it"):
+        with pytest.raises(
+            MissingError, match=r"DRJIT_LIBLLVM_PATH names .*libLLVM-14.so.1.*unset it"
+        ):
             prepare()
         assert "libllvm19" not in missing_packages()
 
@@ -79,7 +98,9 @@ class TestPrepare:
     def test_without_a_working_llvm(self, only, names):
         for name in names:
             _library(only, name)
-        with pytest.raises(MissingError, match=r"17 or newer is needed.*apt-get install -y libllvm19") as caught:
+        with pytest.raises(
+            MissingError, match=r"17 or newer is needed.*apt-get install -y libllvm19"
+        ) as caught:
             prepare()
         assert "\n" not in str(caught.value)
         assert "DRJIT_LIBLLVM_PATH" not in os.environ
@@ -146,7 +167,8 @@ def test_this_machine_works(diagnosis, variant):
     assert diagnosis.works
     assert diagnosis.problem is None
     assert diagnosis.variant == variant
-    # 15 000 roundings of float32, as Mitsuba 3.9 has it; a later rule would be of the same order or smaller
+    # 15 000 roundings of float32, as Mitsuba 3.9 has it; a later rule would be of
+    # the same order or smaller
     assert 0 < diagnosis.kernel.epsilon < 2e-3
 
 
@@ -166,7 +188,9 @@ def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
 
 def test_a_kernel_that_crashes_is_shown_and_crashes_nothing(monkeypatch):
     monkeypatch.setattr(doctor, "probe", os.abort)
-    with pytest.raises(EndedError, match="test kernel in llvm_ad_rgb: ended its process, killed by SIGABRT"):
+    with pytest.raises(
+        EndedError, match="test kernel in llvm_ad_rgb: ended its process, killed by SIGABRT"
+    ):
         doctor.try_kernel("llvm_ad_rgb")
 
 
@@ -181,13 +205,17 @@ def filled(own_cache):
 @pytest.mark.claim("build-named")
 def test_doctor_names_the_commit_and_the_digest(monkeypatch):
     monkeypatch.setattr(doctor, "prepare", lambda: environment.Prepared("llvm_ad_rgb", None))
-    monkeypatch.setattr(doctor, "try_kernel", lambda variant: doctor.Kernel(variant, 2, None, 8.94e-4))
+    monkeypatch.setattr(
+        doctor, "try_kernel", lambda variant: doctor.Kernel(variant, 2, None, 8.94e-4)
+    )
     (check,) = (check for check in doctor.diagnose().checks if check.what == "airlight")
     assert (check.works, check.details) == (True, build().words)
 
 
 def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
-    monkeypatch.setattr(doctor, "diagnose", lambda: doctor.Machine(True, None, "llvm_ad_rgb", None, ()))
+    monkeypatch.setattr(
+        doctor, "diagnose", lambda: doctor.Machine(True, None, "llvm_ad_rgb", None, ())
+    )
     monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "1GiB")
     size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
     shown = doctor.doctor().cache
@@ -209,7 +237,9 @@ def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
 
 @linux
 def test_files_of_mitsuba_are_read_on_one_core(tmp_path):
-    """With one thread Mitsuba waits for ever: a scene with a texture never came on a machine of one core."""
+    """With one thread Mitsuba waits for ever: a scene with a texture never came
+    on a machine of one core.
+    """
     code = (
         "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
         "from airlight.reports.machine.environment import activate\n"
@@ -220,5 +250,7 @@ def test_files_of_mitsuba_are_read_on_one_core(tmp_path):
     )
     world = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", code]
-    ran = subprocess.run(command, cwd=tmp_path, env=world, capture_output=True, text=True, timeout=120)
+    ran = subprocess.run(
+        command, cwd=tmp_path, env=world, capture_output=True, text=True, timeout=120
+    )
     assert ran.stdout.split() == ["4", "3"], ran.stderr

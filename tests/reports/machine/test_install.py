@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: packages are installed by uv, or by pip with the same checksums; the project once for each declaration.
+"""Claim: packages are installed by uv, or by pip with the same checksums; the project
+once for each declaration.
 
 A uv and a Python that only say what they were asked stand for the real ones.
 """
@@ -19,7 +20,8 @@ pytestmark = [
     pytest.mark.claim("launcher"),
 ]
 
-# It logs its name, what it is to install, and how many lines of a list have checksums; `NAME-fails` makes it fail.
+# It logs its name, what it is to install, and how many lines of a list have checksums;
+# `NAME-fails` makes it fail.
 _PROGRAM = """#!/bin/sh
 here=$(dirname "$0") name=$(basename "$0") what=project
 for word; do case $word in *.txt) what=$(grep -c -- --hash=sha256: "$word") ;; esac; done
@@ -47,7 +49,9 @@ def _log(environment: Path) -> list[str]:
     return lines
 
 
-def test_uv_installs_all_and_the_project_again_only_where_its_declaration_changed(environment, capfd):
+def test_uv_installs_all_and_the_project_again_only_where_its_declaration_changed(
+    environment, capfd
+):
     base, sweep = len(requirements([])), len(requirements(["sweep"]))
     assert install([], ROOT, environment)
     assert _log(environment) == [f"uv {base}", "uv project"]

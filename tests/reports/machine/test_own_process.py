@@ -33,14 +33,19 @@ def test_what_is_returned_comes_back_and_what_is_printed_goes_to_the_error_strea
     ids=lambda value: getattr(value, "__name__", None),
 )
 def test_a_process_that_ends_says_how(variant, function, arguments, words):
-    with pytest.raises(EndedError, match=rf"^method fog\.py:f: ended its process, {words}; expected"):
+    with pytest.raises(
+        EndedError, match=rf"^method fog\.py:f: ended its process, {words}; expected"
+    ):
         run(function, *arguments)
 
 
 def test_a_hang_is_ended_in_time(variant, monkeypatch):
     start = time.monotonic()
     monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", "0.5")
-    with pytest.raises(EndedError, match=r"no answer within 0\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=1 a"):
+    with pytest.raises(
+        EndedError,
+        match=r"no answer within 0\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=1 a",
+    ):
         run(time.sleep, 600, limit=None)
     assert time.monotonic() - start < 60
 
@@ -67,8 +72,20 @@ def test_the_process_ends_with_the_one_that_started_it(variant, tmp_path, sign):
         f"    os.rename({str(tmp_path / 'half')!r}, {str(tmp_path / 'pids')!r})\n"
         "    while True:\n        pass\n"
     )
-    command = [sys.executable, "-m", "airlight", "render", "open-fog", "--size", "8x6", "--method", f"{method}:f"]
-    process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    command = [
+        sys.executable,
+        "-m",
+        "airlight",
+        "render",
+        "open-fog",
+        "--size",
+        "8x6",
+        "--method",
+        f"{method}:f",
+    ]
+    process = subprocess.Popen(
+        command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     while not (tmp_path / "pids").exists() and process.poll() is None:
         time.sleep(0.05)
     process.send_signal(sign)

@@ -12,7 +12,9 @@ from airlight.reports.machine.progress import progress_bar
 def clock(monkeypatch):
     """A clock of our own; `clock.now` is what it shows [s]."""
     clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr(airlight.reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(
+        airlight.reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now)
+    )
     return clock
 
 
@@ -33,7 +35,9 @@ class Terminal(io.StringIO):
 
 @pytest.mark.claim("progress")
 @pytest.mark.parametrize(("seconds", "shown"), [(0.5, False), (5.0, True)])
-def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, clock, seconds, shown):
+def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(
+    monkeypatch, clock, seconds, shown
+):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setenv("TERM", "xterm-256color")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Kernels that compile quickly give the same images, in processes whose standard error is kept clean."""
+"""Kernels that compile quickly give the same images, in processes whose
+standard error is kept clean.
+"""
 
 import hashlib
 import os
@@ -28,7 +30,9 @@ os.write(2, b"one line\\n")
 
 def run(script: str, folder: Path, *, quick: bool) -> subprocess.CompletedProcess[str]:
     """Run a script in a process with a kernel cache of its own."""
-    plain = {name: value for name, value in os.environ.items() if name not in (VARIABLE, CACHE_VARIABLE)}
+    plain = {
+        name: value for name, value in os.environ.items() if name not in (VARIABLE, CACHE_VARIABLE)
+    }
     asked = {VARIABLE: "quick"} if quick else {}
     command = [sys.executable, "-c", script]
     given = plain | asked | {CACHE_VARIABLE: str(folder)}
@@ -37,11 +41,15 @@ def run(script: str, folder: Path, *, quick: bool) -> subprocess.CompletedProces
 
 def kernels(folder: Path) -> dict[str, str]:
     """By name, which says what is compiled, a digest of how that was compiled."""
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.glob("*.bin")}
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.glob("*.bin")
+    }
 
 
 @pytest.fixture(scope="module")
-def rendered(variant, tmp_path_factory) -> dict[str, tuple[subprocess.CompletedProcess[str], dict[str, str]]]:
+def rendered(
+    variant, tmp_path_factory
+) -> dict[str, tuple[subprocess.CompletedProcess[str], dict[str, str]]]:
     """By how its kernels are compiled, a process that rendered, and its kernels."""
     if variant != "llvm_ad_rgb":
         pytest.skip("LLVM compiles the kernels of processors alone")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: signals end a command at once with the shell's status; output that is closed, full or ASCII is no fault.
+"""Claim: signals end a command at once with the shell's status; output that is closed,
+full or ASCII is no fault.
 
 Each program says when it is where the signal shall meet it: no test hangs on the clock.
 """
@@ -38,14 +39,18 @@ run(dr.opaque(mi.UInt32, 2**31))  # for minutes
 MOMENTS = {
     "sleep": READY + "time.sleep(600)",
     "a callback": f"{READY}sorted(range(10), key=lambda n: time.sleep(600))",
-    "an exception that is caught": f"{READY}while True:\n try:\n  time.sleep(600)\n except BaseException: pass",
+    "an exception that is caught": (
+        f"{READY}while True:\n try:\n  time.sleep(600)\n except BaseException: pass"
+    ),
     "a kernel": KERNEL,
 }
 
 
 @pytest.fixture
 def shell():
-    """A function that lets a shell run a program, says when it is ready, and returns the shell and its number."""
+    """A function that lets a shell run a program, says when it is ready, and returns
+    the shell and its number.
+    """
     started = []
 
     def start(code, head=HEAD):
@@ -74,7 +79,9 @@ def shell():
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_a_signal_ends_the_process_at_once_with_the_shells_status(shell, moment, sign):
     # A shell lets programs in the background ignore Ctrl-C.
-    process, number = shell(MOMENTS[moment], "import signal\nsignal.signal(2, signal.default_int_handler)\n" + HEAD)
+    process, number = shell(
+        MOMENTS[moment], "import signal\nsignal.signal(2, signal.default_int_handler)\n" + HEAD
+    )
     os.kill(number, sign)
     out, err = process.communicate(timeout=60)
     assert (out, err.replace("Terminated", "").strip()) == (f"{STATUS[sign]}\n", "")
@@ -82,7 +89,9 @@ def test_a_signal_ends_the_process_at_once_with_the_shells_status(shell, moment,
 
 def test_what_the_parent_ignores_stays_ignored(shell):
     """As by nohup, and as a shell does it for programs in the background."""
-    process, _ = shell(f"{READY}import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nprint('done')")
+    process, _ = shell(
+        f"{READY}import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nprint('done')"
+    )
     assert process.stdout.read() == "done\n0\n"
 
 

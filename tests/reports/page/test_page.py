@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a report, from a golden report.json: its numbers, nothing from elsewhere, and names that are words."""
+"""The page of a report, from a golden report.json: its numbers, nothing from elsewhere,
+and names that are words.
+"""
 
 import json
 
@@ -29,9 +31,28 @@ STABILITY = [
     }
 ]
 
-_CLAIM = {"paper": "biri", "item": "eq. 0", "words": "a claim of words", "verdict": "not reproduced"}
-_CLAIM |= {"published": None, "measured": 3.0, "low": 2.5, "high": 3.5, "unit": "times", "why": "at most 1: so"}
-_RATE = {"item": "Fig. 0", "words": "a rate", "verdict": None, "published": 23.0, "unit": "frames/s", "why": ""}
+_CLAIM = {
+    "paper": "biri",
+    "item": "eq. 0",
+    "words": "a claim of words",
+    "verdict": "not reproduced",
+}
+_CLAIM |= {
+    "published": None,
+    "measured": 3.0,
+    "low": 2.5,
+    "high": 3.5,
+    "unit": "times",
+    "why": "at most 1: so",
+}
+_RATE = {
+    "item": "Fig. 0",
+    "words": "a rate",
+    "verdict": None,
+    "published": 23.0,
+    "unit": "frames/s",
+    "why": "",
+}
 PAPERS = [_CLAIM, _CLAIM | _RATE]
 
 
@@ -45,9 +66,15 @@ def data():
 
 @pytest.fixture(autouse=True)
 def _no_chart(monkeypatch):
-    """Draw no charts for the pages: they take longer than everything else, and have a test of their own."""
-    monkeypatch.setattr("airlight.reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>")
-    monkeypatch.setattr("airlight.reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>")
+    """Draw no charts for the pages: they take longer than everything else, and
+    have a test of their own.
+    """
+    monkeypatch.setattr(
+        "airlight.reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>"
+    )
+    monkeypatch.setattr(
+        "airlight.reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +90,30 @@ def test_page_shows_the_numbers_of_the_data(data, folder):
     whole = data | {"stability": STABILITY, "papers": PAPERS}
     page = render(whole | {"scaling": [growth_record()]}, folder)
     text = page.text
-    for shown in ("1.23 %", "-0.45 %", "5.55 %", "3.21", "312", "0.98765", "4321", "-0.110 … +0.140 %", "0.5 %", "11"):
+    for shown in (
+        "1.23 %",
+        "-0.45 %",
+        "5.55 %",
+        "3.21",
+        "312",
+        "0.98765",
+        "4321",
+        "-0.110 … +0.140 %",
+        "0.5 %",
+        "11",
+    ):
         assert shown in text, shown
     for claim in DATA["claims"]:
         assert claim["text"] in text
     for row in fastest_table(checked(DATA).scenes).rows:
         assert all(cell in text for cell in row.values.values())
-    for words in ("airlight report --quick", "mitsuba 3.9.1", "my-kernel", "not reproduced", "numbers beside ours"):
+    for words in (
+        "airlight report --quick",
+        "mitsuba 3.9.1",
+        "my-kernel",
+        "not reproduced",
+        "numbers beside ours",
+    ):
         assert words in text
     index = json.loads(page.script("images"))
     assert [entry["label"] for entry in index["scenes"][0]["methods"]] == ["good (k)", "flat"]
@@ -79,7 +123,12 @@ def test_page_shows_the_numbers_of_the_data(data, folder):
 @pytest.mark.claim("build-named")
 def test_page_names_the_commit_and_the_digest_where_the_report_has_them(data, folder):
     assert "airlight 0.1.0, effort" in render(data, folder).text
-    made = {"airlight": "0.9", "commit": "1a2b3c4d5e6f7a8b", "changed": True, "digest": "0f1e2d3c4b5a6978"}
+    made = {
+        "airlight": "0.9",
+        "commit": "1a2b3c4d5e6f7a8b",
+        "changed": True,
+        "digest": "0f1e2d3c4b5a6978",
+    }
     text = render(data | {"environment": data["environment"] | {"build": made}}, folder).text
     words = "airlight 0.9, commit 1a2b3c4d5e6f with changes, files 0f1e2d3c4b5a"
     assert f"{words}, effort" in text
@@ -89,13 +138,16 @@ def test_page_names_the_commit_and_the_digest_where_the_report_has_them(data, fo
 
 @pytest.mark.claim("report-stands-alone")
 def test_page_needs_nothing_but_itself(data, folder):
-    """Only the pictures that are named for readers without scripts are other files, and they are not loaded.
+    """Only the pictures that are named for readers without scripts are other files,
+    and they are not loaded.
 
     Their addresses begin in this folder: `random:7/a.png` would be of a scheme called random.
     """
     data["scenes"][0]["files"] |= {"picture": "random:7/reference.png"}
     page = render(data, folder)
-    linked = [address for tag, address in page.addresses() if tag == "a" and not address.startswith("#")]
+    linked = [
+        address for tag, address in page.addresses() if tag == "a" and not address.startswith("#")
+    ]
     others = [address for tag, address in page.addresses() if address not in linked]
     assert all(address.startswith(("#", "data:,")) for address in others), others
     assert "./random:7/reference.png" in linked
@@ -117,7 +169,8 @@ def test_names_and_notes_are_words_and_never_html(data, folder):
     page = render(data, folder)
     # Scripts of our own, the index and one scene's pixels; none by what a file is called.
     assert len(page.scripts) == len(SCRIPTS) + 2
-    # Claim twice, name, purpose, published, note, plan twice, label, refusal, command, environment: all as they came.
+    # Claim twice, name, purpose, published, note, plan twice, label, refusal, command,
+    # environment: all as they came.
     assert page.text.count(EVIL) >= 12
     index = json.loads(page.script("images"))
     assert index["scenes"][0]["name"] == index["scenes"][0]["methods"][0]["label"] == EVIL
@@ -128,15 +181,27 @@ def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
     scene["reference"] |= {"mean": None, "relative_bound": None, "missed": None}
     scene["methods"][0]["error"] |= dict.fromkeys(("relative_rmse", "relative_bias", "p50", "p99"))
     scene["methods"] += [refused("bad", "no series"), engine_image()]
-    scene["agreement"]["airlight"]["statistics"] |= {"relative_bias": None, "relative_bias_ci": [None, None]}
+    scene["agreement"]["airlight"]["statistics"] |= {
+        "relative_bias": None,
+        "relative_bias_ci": [None, None],
+    }
     scene["agreement"]["surface"]["statistics"] |= {"equivalent": False}
-    data["claims"] = [{"kind": "reference", "text": "The reference is NOT confirmed.", "good": False}]
+    data["claims"] = [
+        {"kind": "reference", "text": "The reference is NOT confirmed.", "good": False}
+    ]
     page = render(data, folder)
     assert "None" not in page.text
     assert "nan" not in page.text.lower().replace("airlight", "").split()
-    for words in (DASH, "refused: no series", "(image, total)", "does not hold: The reference is NOT confirmed."):
+    for words in (
+        DASH,
+        "refused: no series",
+        "(image, total)",
+        "does not hold: The reference is NOT confirmed.",
+    ):
         assert words in page.text
-    marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
+    marked = [
+        tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()
+    ]
     assert {"li", "td"} <= set(marked)
 
 
@@ -153,9 +218,14 @@ def test_bars_of_noisy_methods_go_down_to_their_bias():
 
 
 def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():
-    """A dollar begins mathematics in matplotlib; half a formula would end the report after all its work."""
-    scenes = [report_data()["scenes"][0] | {"name": name} for name in ("hall", "50$ a_b^c $\\frac{$")]
-    scenes[1]["methods"] += [refused("refused", "x"), engine_image()]  # no place on a logarithmic axis
+    """A dollar begins mathematics in matplotlib; half a formula would end the
+    report after all its work.
+    """
+    scenes = [
+        report_data()["scenes"][0] | {"name": name} for name in ("hall", "50$ a_b^c $\\frac{$")
+    ]
+    # no place on a logarithmic axis
+    scenes[1]["methods"] += [refused("refused", "x"), engine_image()]
     records = checked(report_data() | {"scenes": scenes}).scenes
     svg = speed_error_chart(records)
     assert svg == speed_error_chart(records)

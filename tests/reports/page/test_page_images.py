@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The images in a page: what is decoded is what the files hold, to the bound of the code, whatever the limit."""
+"""The images in a page: what is decoded is what the files hold, to the bound of the
+code, whatever the limit.
+"""
 
 import zlib
 from dataclasses import replace
@@ -30,7 +32,9 @@ from tests.helpers.page import small_report, write_files
 
 
 def difference_values(codes: Codes) -> Array:
-    """Return the relative differences that the codes of `difference_codes` stand for, in the same shape."""
+    """Return the relative differences that the codes of `difference_codes`
+    stand for, in the same shape.
+    """
     values = S * np.sinh(codes / K)
     values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
     return np.where(codes == NAN, np.nan, values)
@@ -67,7 +71,9 @@ def test_any_float_survives_as_a_difference(values):
 
 def test_a_reference_keeps_sixteen_binary_digits_and_what_is_not_finite():
     rng = np.random.default_rng(7)
-    values = np.concatenate([rng.lognormal(sigma=12, size=5000), -rng.lognormal(size=100), [0.0, 1.0, 2.0**-126]])
+    values = np.concatenate(
+        [rng.lognormal(sigma=12, size=5000), -rng.lognormal(size=100), [0.0, 1.0, 2.0**-126]]
+    )
     single = values.astype(np.float32)
     back = reference_values(reference_codes(single))
     assert np.all(np.abs(back - single) <= 2.0**-16 * np.abs(single.astype(np.float64)))
@@ -77,10 +83,15 @@ def test_a_reference_keeps_sixteen_binary_digits_and_what_is_not_finite():
 
 def test_planes_come_back_as_they_went():
     rng = np.random.default_rng(3)
-    for bits, low, high in ((DIFFERENCE_BITS, -(1 << 15), 1 << 15), (REFERENCE_BITS, 0, 1 << REFERENCE_BITS)):
+    for bits, low, high in (
+        (DIFFERENCE_BITS, -(1 << 15), 1 << 15),
+        (REFERENCE_BITS, 0, 1 << REFERENCE_BITS),
+    ):
         for size in ((1, 9), (37, 64)):
             codes = rng.integers(low, high, (*size, 3)).astype(np.int32)
-            np.testing.assert_array_equal(decode_planes(pack_planes(codes, bits), size[::-1], bits), codes)
+            np.testing.assert_array_equal(
+                decode_planes(pack_planes(codes, bits), size[::-1], bits), codes
+            )
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The scripts of pages compute what they should, in a JavaScript engine without a browser.
 
-The viewer of a report shows what the files hold, and the camera of the view goes where the mouse leads it. How pages
-look, and that browsers run them, is for `tests/reports/test_browser.py`.
+The viewer of a report shows what the files hold, and the camera of the view goes where the mouse
+leads it. How pages look, and that browsers run them, is for `tests/reports/test_browser.py`.
 """
 
 import base64
@@ -52,7 +52,10 @@ def viewer(folder):
     data = base64.b64decode(packed.data)
     entries = [*packed.index["reference"].values()]
     entries += [entry for each in packed.index["methods"] for entry in each["layers"].values()]
-    streams = {each["at"]: [*zlib.decompress(data[each["at"] : each["at"] + each["bytes"]])] for each in entries}
+    streams = {
+        each["at"]: [*zlib.decompress(data[each["at"] : each["at"] + each["bytes"]])]
+        for each in entries
+    }
     table = (signed_colours().astype(int) @ [1, 256, 65536] + 0xFF000000).tolist()
     context.eval(f"""
         bytesOfBase64 = () => new Uint8Array({len(data)});
@@ -85,7 +88,9 @@ def drawn(context, name):
 @pytest.mark.parametrize(("number", "name"), [(0, "good"), (1, "flat")])
 @pytest.mark.parametrize("stops", [0, -2])
 def test_the_viewer_draws_what_the_files_hold(viewer, folder, number, name, stops):
-    viewer.eval(f"viewer.set({{method: {number}, layer: 'airlight', mode: 'signed', stops: {stops}}})")
+    viewer.eval(
+        f"viewer.set({{method: {number}, layer: 'airlight', mode: 'signed', stops: {stops}}})"
+    )
     # The table of sRGB has 16385 steps and the reference 16 digits: one level at most.
     for which, file in (("reference", "reference"), ("method", name)):
         expected = tone_mapped(layer(folder, file), 2.5 * 2.0**stops).astype(int)
@@ -101,7 +106,9 @@ def test_the_viewer_draws_what_the_files_hold(viewer, folder, number, name, stop
 
 def as_number(words):
     mantissa, _, power = words.replace("\N{MINUS SIGN}", "-").removesuffix(" %").partition("·10")
-    return float(mantissa) * 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
+    return float(mantissa) * 10.0 ** int(
+        power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0
+    )
 
 
 @pytest.mark.parametrize("which", ["airlight", "surface", "total"])
@@ -119,15 +126,23 @@ def test_the_probe_says_what_the_files_hold(viewer, folder, which):
     assert np.all(np.abs([as_number(words) for words in radiance] - expected) <= allowed)
     relative = expected / reference - 1
     worst = relative[np.abs(relative).argmax()]
-    assert as_number(error) == pytest.approx(100 * worst, rel=6e-3)  # three digits of a difference coded to 0.2 %
-    assert float(flip) == pytest.approx(layer(folder, "flat", "flip")[row, column, 0], abs=0.5 / 255 + 5e-4)
+    # three digits of a difference coded to 0.2 %
+    assert as_number(error) == pytest.approx(100 * worst, rel=6e-3)
+    assert float(flip) == pytest.approx(
+        layer(folder, "flat", "flip")[row, column, 0], abs=0.5 / 255 + 5e-4
+    )
 
 
 def test_the_pointer_meets_the_pixel_under_it(viewer):
     event = "{{target: new Element(), clientX: {}, clientY: {}}}"
-    for x, y, pixel in ((10, 20, [0, 0]), (10 + 199.9, 20 + 99.9, [31, 23]), (10 + 105, 20 + 53.5, [16, 12])):
+    for x, y, pixel in (
+        (10, 20, [0, 0]),
+        (10 + 199.9, 20 + 99.9, [31, 23]),
+        (10 + 105, 20 + 53.5, [16, 12]),
+    ):
         assert asked(viewer, f"viewer.pixelAt({event.format(x, y)})") == pixel
-    assert asked(viewer, f"viewer.pixelAt({event.format(-50, 900)})") == [0, 23]  # outside: the nearest
+    # outside: the nearest
+    assert asked(viewer, f"viewer.pixelAt({event.format(-50, 900)})") == [0, 23]
 
 
 @pytest.fixture
@@ -144,14 +159,18 @@ def camera(context):
 
 @pytest.mark.claim("view-camera")
 def test_the_camera_goes_where_it_is_led(view):
-    """Round the target at the light's distance; nearer by a factor; beside and along its own axes; no flip overhead."""
+    """Round the target at the light's distance; nearer by a factor; beside and along its
+    own axes; no flip overhead.
+    """
     origin, target = camera(view)
     aim = np.array([0.2, 0.9, -0.1]) / np.linalg.norm([0.2, 0.9, -0.1])
     np.testing.assert_allclose(target, origin + aim * (aim @ [0.8, 4.0, -0.8]))
     view.eval("orbit(0.3, 0)")
     turned, same = camera(view)
     c, s = np.cos(0.3), np.sin(0.3)
-    np.testing.assert_allclose(turned - target, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ (origin - target))
+    np.testing.assert_allclose(
+        turned - target, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ (origin - target)
+    )
     np.testing.assert_array_equal(same, target)
     view.eval("dolly(-0.5)")
     np.testing.assert_allclose(camera(view)[0] - target, np.exp(-0.5) * (turned - target))
@@ -163,7 +182,9 @@ def test_the_camera_goes_where_it_is_led(view):
     moved = 0.4 * right + 0.7 * np.cross(right, forward)
     np.testing.assert_allclose(camera(view), [before + moved, target + moved])
     view.eval("fly(0.5, 0, 0)")
-    np.testing.assert_allclose(camera(view), [before + moved + 0.5 * forward, target + moved + 0.5 * forward])
+    np.testing.assert_allclose(
+        camera(view), [before + moved + 0.5 * forward, target + moved + 0.5 * forward]
+    )
     # The pole is never passed: there the view would turn over.
     view.eval("for (let i = 0; i < 100; i++) orbit(0, 0.05)")
     origin, target = camera(view)

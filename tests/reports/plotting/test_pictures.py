@@ -26,7 +26,16 @@ def relative(error, *, level=1.0):
 @pytest.mark.parametrize(
     ("linear", "encoded"),
     # IEC 61966-2-1: 12.92 v below 0.0031308, 1.055 v^(1/2.4) - 0.055 above, times 255.
-    [(0.0, 0), (0.001, 3), (0.0031308, 10), (0.18, 118), (0.5, 188), (1.0, 255), (7.0, 255), (-0.5, 0)],
+    [
+        (0.0, 0),
+        (0.001, 3),
+        (0.0031308, 10),
+        (0.18, 118),
+        (0.5, 188),
+        (1.0, 255),
+        (7.0, 255),
+        (-0.5, 0),
+    ],
 )
 def test_tone_mapping_is_srgb(linear, encoded):
     picture = tone_mapped(one_pixel(linear, linear, linear), 1.0)
@@ -60,7 +69,9 @@ def test_dark_pixels_are_measured_against_a_thousandth_of_the_mean():
 
 @pytest.mark.claim("previews-tone-curve")
 def test_previews_follow_the_stated_curve():
-    """Reinhard et al. 2002, eq. 4, by hand for a grey pixel; the mean becomes 0.3, and nothing above white is cut."""
+    """Reinhard et al. 2002, eq. 4, by hand for a grey pixel; the mean becomes 0.3, and
+    nothing above white is cut.
+    """
     rng = np.random.default_rng(5)
     radiance = rng.exponential(3.0, (40, 50, 1)) * np.ones(3)
     curve = tone_curve(radiance)
@@ -79,7 +90,9 @@ _SIGHTS = ("normal", "Protanomaly", "Deuteranomaly", "Tritanomaly")
 
 
 def lab(hexadecimal: str, sight: str):
-    """CIE Lab of a colour as seen without one kind of cones, by the matrices of Machado et al. 2009 on linear RGB."""
+    """CIE Lab of a colour as seen without one kind of cones, by the matrices of Machado
+    et al. 2009 on linear RGB.
+    """
     import colour
     import numpy as np
 
@@ -96,26 +109,44 @@ def lab(hexadecimal: str, sight: str):
 def test_any_two_colours_differ_for_every_sight(sight):
     import colour
 
-    seen = {name: lab(value, sight) for name, value in (COLOURS | {"reference": "#000000", "paper": "#ffffff"}).items()}
+    seen = {
+        name: lab(value, sight)
+        for name, value in (COLOURS | {"reference": "#000000", "paper": "#ffffff"}).items()
+    }
     for first, other in combinations(seen, 2):
         difference = float(colour.delta_E(seen[first], seen[other], method="CIE 2000"))
         assert difference > LEAST_DIFFERENCE, (first, other, sight, difference)
 
 
 def looks(styles):
-    return {(look["color"], look["marker"], look["fillstyle"], look["markeredgecolor"]) for look in styles.values()}
+    return {
+        (look["color"], look["marker"], look["fillstyle"], look["markeredgecolor"])
+        for look in styles.values()
+    }
 
 
 @pytest.mark.claim("colours-of-figures")
 def test_no_two_labels_of_a_chart_look_alike():
-    """Every built-in method, a variant and its history, three methods of users, a shader and two images of engines."""
+    """Every built-in method, a variant and its history, three methods of users, a shader
+    and two images of engines.
+    """
     users = ["mine.py:fog", "fog.glsl", "my_module:fog", "other:fog", "engine", "a"]
     shown = [(method, method) for method in (*METHODS, *users)]
-    more = [("ray-march", "ray-march (steps=9)"), ("ray-march+history", "history"), ("fog.glsl", "fog (x=1)")]
+    more = [
+        ("ray-march", "ray-march (steps=9)"),
+        ("ray-march+history", "history"),
+        ("fog.glsl", "fog (x=1)"),
+    ]
     styles = report_styles([*shown, *more])
-    fog = {label: style for label, style in styles.items() if label not in ("cloud-octaves", "cloud-collectors")}
-    assert len(looks(fog)) == len(fog) == len(shown) + 1  # no chart has methods for fog and for clouds
-    # A variant keeps the colour and the marker of its method; methods differ in more than the filling.
+    fog = {
+        label: style
+        for label, style in styles.items()
+        if label not in ("cloud-octaves", "cloud-collectors")
+    }
+    # no chart has methods for fog and for clouds
+    assert len(looks(fog)) == len(fog) == len(shown) + 1
+    # A variant keeps the colour and the marker of its method; methods differ
+    # in more than the filling.
     assert styles["ray-march"]["marker"] == styles["history"]["marker"]
     methods = [fog[label] for _, label in shown if label in fog]
     assert len({(look["color"], look["marker"]) for look in methods}) == len(methods)
@@ -124,6 +155,8 @@ def test_no_two_labels_of_a_chart_look_alike():
 
 
 def test_no_two_kernels_of_a_chart_look_alike():
-    styles = kernel_styles(["exact", "taylor", "taylor-printed", "quadrature", "mine:a", "mine:b", "mine:c"])
+    styles = kernel_styles(
+        ["exact", "taylor", "taylor-printed", "quadrature", "mine:a", "mine:b", "mine:c"]
+    )
     assert len(looks(styles)) == 7
     assert styles["quadrature"] == kernel_styles(["quadrature-32"])["quadrature-32"]

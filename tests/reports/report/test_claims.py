@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Each sentence at the top of a report follows from its numbers: which there are, and what they say is good."""
+"""Each sentence at the top of a report follows from its numbers: which there are,
+and what they say is good.
+"""
 
 import copy
 
@@ -54,7 +56,10 @@ SCENES = [
     scene(
         "hall",
         [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
-        agreement={"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
+        agreement={
+            "airlight": agreed(True, 0.0042),
+            "surface": agreed(True, 0.0007, layer="surface"),
+        },
     ),
 ]
 
@@ -69,11 +74,17 @@ def test_claims_on_a_reference_that_is_confirmed():
     assert [(claim.kind, claim.good) for claim in claims(scenes())] == kinds
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     # 0.123 of the airlight, which is the headline; 0.21 of everything, which is not.
-    assert "The fraction of the airlight that this leaves out: fog 12 %; hall 12 %." in texts(scenes())[1]
+    assert (
+        "The fraction of the airlight that this leaves out: fog 12 %; hall 12 %."
+        in texts(scenes())[1]
+    )
     assert claims([]) == []
     data = scenes()
     data[1]["agreement"]["airlight"] = agreed(True, 0.0042, margin=0.0125)
-    assert "fills most of its margin, 20 %, is +0..+0.1 %, in fog (airlight, ±0.5 %)." in texts(data)[0]
+    assert (
+        "fills most of its margin, 20 %, is +0..+0.1 %, in fog (airlight, ±0.5 %)."
+        in texts(data)[0]
+    )
 
 
 @pytest.mark.claim("claims-follow")
@@ -106,7 +117,9 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     # Where nothing was decided, nothing is called confirmed.
     only = claims([scene("hall", [], agreement={"airlight": out_of_time([-0.01, 0.004])})])[0]
     assert only.good is None
-    assert only.text.startswith("By Mitsuba's volpath it is not decided within the time in hall (airlight, ±0.5 %)")
+    assert only.text.startswith(
+        "By Mitsuba's volpath it is not decided within the time in hall (airlight, ±0.5 %)"
+    )
 
 
 def test_what_failed_is_named_with_its_pixels():
@@ -115,7 +128,10 @@ def test_what_failed_is_named_with_its_pixels():
     data[1]["reference"]["left"] = 7
     failed = [claim for claim in claims(data) if claim.kind == "failed"]
     assert [claim.good for claim in failed] == [False] * 3
-    assert all(words in claim.text for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))
+    assert all(
+        words in claim.text
+        for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed)
+    )
 
 
 @pytest.mark.claim("times-of-one-run", "claims-follow")
@@ -123,10 +139,16 @@ def test_a_machine_that_changed_while_a_scene_was_timed_is_named():
     data = scenes()
     assert "machine" not in texts(data)[-1]
     for row in data[1]["methods"]:
-        row["times"]["run"] = RUN | {"started": "2026-11-22 07:00:00 +0000", "steady": False, "between": 1.7}
+        row["times"]["run"] = RUN | {
+            "started": "2026-11-22 07:00:00 +0000",
+            "steady": False,
+            "between": 1.7,
+        }
     assert texts(data)[-1] == (
-        "The times of a scene are of one run, in which its methods took turns: between 2026-11-21 12:00:00 +0000 and "
-        "2026-11-22 07:00:00 +0000. The machine changed meanwhile, so that ratios count there, and no milliseconds: "
+        "The times of a scene are of one run, in which its methods took turns: between 2026-11-21 "
+        "12:00:00 +0000 and "
+        "2026-11-22 07:00:00 +0000. The machine changed meanwhile, so that ratios count there, and "
+        "no milliseconds: "
         "hall (1.70 times between rounds, 1.02 within one)."
     )
 
@@ -135,8 +157,17 @@ def test_a_machine_that_changed_while_a_scene_was_timed_is_named():
 def test_what_was_refused_and_what_was_left_out_for_its_time_are_named_apart():
     data = scenes()
     data[0]["methods"].append(refused_entry("picky", "no series"))
-    data[1]["methods"] += [refused_entry("picky", "no series"), refused_entry("slow", "one hour", status="left out")]
-    assert [claim.kind for claim in claims(data)] == ["reference", "left-out", "refused", "not-measured", "times"]
+    data[1]["methods"] += [
+        refused_entry("picky", "no series"),
+        refused_entry("slow", "one hour", status="left out"),
+    ]
+    assert [claim.kind for claim in claims(data)] == [
+        "reference",
+        "left-out",
+        "refused",
+        "not-measured",
+        "times",
+    ]
     assert texts(data)[2:4] == [
         "Refused, with the reason in the tables: picky in fog; picky in hall.",
         "Not measured for the time that they take, with the reason in the tables: slow in hall.",
@@ -147,7 +178,8 @@ def test_scenes_that_an_effort_leaves_out_are_named():
     assert made.unstudied(["fog", "hall"], ["hall", "fog"]) == []
     (claim,) = made.unstudied(["hall"], ["fog", "hall", "pens"])
     assert claim.text == (
-        "Scenes not studied, for the time that they take: fog, pens. A scene that is named is studied, `--full` has "
+        "Scenes not studied, for the time that they take: fog, pens. A scene that is named is "
+        "studied, `--full` has "
         "all."
     )
 
@@ -159,7 +191,9 @@ def test_a_time_that_jumps_as_the_work_grows_is_bad_and_none_is_good():
     said = "No time of a frame of hall jumps as the work grows: triangles."
     assert made.growth_claims([calm]) == [Claim(kind="growth", text=said, good=True)]
     (claim,) = made.growth_claims([calm, jumps])
-    assert claim.text.startswith("A time jumps: hall, shadow-planes (exact): frame grows with the power 1.9")
+    assert claim.text.startswith(
+        "A time jumps: hall, shadow-planes (exact): frame grows with the power 1.9"
+    )
     assert claim.good is False
 
 
@@ -190,7 +224,9 @@ def test_errors_that_a_paper_has_too_are_published_and_no_failures():
     data = scenes()
     wrong = errors(0.1, negative=1)
     data[0]["methods"] += [entry("biri (taylor)", error=wrong), entry("mine (exact)", error=wrong)]
-    found = [(claim.kind, claim.text, claim.good) for claim in claims(data) if "negative" in claim.text]
+    found = [
+        (claim.kind, claim.text, claim.good) for claim in claims(data) if "negative" in claim.text
+    ]
     assert found == [
         ("failed", "Images with negative values: mine (exact) in fog (1 pixel).", False),
         (

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A report holds what its study asks for, in whole files; kept parts are found again, and efforts add parts."""
+"""A report holds what its study asks for, in whole files; kept parts are found
+again, and efforts add parts.
+"""
 
 import errno
 import json
@@ -29,7 +31,9 @@ from tests.helpers.page import small_report, write_report_files
 from tests.helpers.reports import growth_record, record_of, stable
 from tests.helpers.scenes import LAMP, scene_xml
 
-FLOOR = '<shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>'
+FLOOR = (
+    '<shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>'
+)
 FOG = '<float name="sigma_t" value="0.31"/><rgb name="albedo" value="0.9, 0.8, 0.7"/>'
 FOG += '<phase type="tabphase"><string name="values" value="0.3, 0.2, 0.4, 0.9, 2.0"/></phase>'
 SCENE = scene_xml(LAMP, FLOOR, fog=FOG, size=(16, 12))
@@ -41,7 +45,13 @@ TINY = Study(
     sizes=((20, 15),),
     configurations=CHOSEN,
     measure=Measure("stages", 0.01, (12, 9), slow=0.04, limit=1e6, every_metric=False),
-    checks=Checks((10, 8), {"single-scatter": 0.2, "volpath": 0.5}, {"single-scatter": 4, "volpath": 4}, 32, (4, 1)),
+    checks=Checks(
+        (10, 8),
+        {"single-scatter": 0.2, "volpath": 0.5},
+        {"single-scatter": 4, "volpath": 4},
+        32,
+        (4, 1),
+    ),
 )
 
 
@@ -79,7 +89,9 @@ def written(variant, tmp_path_factory, cache_of_module, monkeypatch_of_module):
         command="airlight report --tiny",
         progress=lambda fraction, what: told.append((fraction, what)),
     )
-    return SimpleNamespace(folder=folder / "out" / "here", report=report, data=as_json(report), told=told)
+    return SimpleNamespace(
+        folder=folder / "out" / "here", report=report, data=as_json(report), told=told
+    )
 
 
 @pytest.mark.claim("report-schema", "refusals-stand-in-the-report")
@@ -95,17 +107,30 @@ def test_the_data_are_read_again_and_every_file_that_they_name_is_there(written)
     assert asked.scenes[0].endswith("my <fog>.xml")
     (scene,) = data["scenes"]
     assert (scene["name"], scene["size"]) == ("my <fog>", [20, 15])
-    checks = {f"{estimator} {layer}" for estimator in TINY.checks.margins for layer in ("airlight", "surface")}
+    checks = {
+        f"{estimator} {layer}"
+        for estimator in TINY.checks.margins
+        for layer in ("airlight", "surface")
+    }
     assert set(scene["agreement"]) == checks
     assert 0 < scene["multiple"]["medium"]["value"] < 1
-    assert [entry["label"] for entry in scene["methods"]] == [configuration.label for configuration in CHOSEN]
+    assert [entry["label"] for entry in scene["methods"]] == [
+        configuration.label for configuration in CHOSEN
+    ]
     taylor = scene["methods"][0]
     assert "tabulated" in taylor["reason"]
     assert taylor["files"] == {}
     assert taylor["times"] is taylor["error"] is None
-    named = [*scene["files"].values(), *(name for entry in scene["methods"] for name in entry["files"].values())]
+    named = [
+        *scene["files"].values(),
+        *(name for entry in scene["methods"] for name in entry["files"].values()),
+    ]
     assert len(named) == len(set(named)) == 3 + 2 * 3
-    there = {str(path.relative_to(written.folder)) for path in written.folder.rglob("*") if path.is_file()}
+    there = {
+        str(path.relative_to(written.folder))
+        for path in written.folder.rglob("*")
+        if path.is_file()
+    }
     assert there == {*named, "report.json", "report.html"}
     assert all((written.folder / name).stat().st_size > 0 for name in there)
 
@@ -152,7 +177,9 @@ def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
 
 
 @pytest.mark.claim("times-of-one-run")
-def test_a_new_method_takes_its_errors_alone_and_times_of_all_in_one_run(written, variant, tmp_path):
+def test_a_new_method_takes_its_errors_alone_and_times_of_all_in_one_run(
+    written, variant, tmp_path
+):
     """Times of a busy hour once stood beside a user's method of the minute."""
     new = Configuration("ray-march", None, (("steps", 7),))
     repeated = again(written, tmp_path, configurations=(*CHOSEN, new))
@@ -164,7 +191,11 @@ def test_a_new_method_takes_its_errors_alone_and_times_of_all_in_one_run(written
     timed = [row["times"] for row in after if row["times"]]
     assert len(timed) == len(CHOSEN)  # taylor refuses
     assert all(times["run"] == timed[0]["run"] for times in timed)
-    assert all(row["times"] != now["times"] for row, now in zip(before, after, strict=False) if row["times"])
+    assert all(
+        row["times"] != now["times"]
+        for row, now in zip(before, after, strict=False)
+        if row["times"]
+    )
     assert timed[0]["run"]["anchor"]["median_ms"] > 0
     # The first group is still there, whole, with its date.
     assert [row["times"] for row in again(written, tmp_path)["scenes"][0]["methods"]] == [
@@ -189,11 +220,17 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 
     # Half the time: what `fresh` tells one estimator it tells both.
     checks = replace(TINY.checks, margins={"single-scatter": 0.2}, samples={"single-scatter": 4})
-    monkeypatch.setattr("airlight.validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
-    monkeypatch.setattr("airlight.validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
+    monkeypatch.setattr(
+        "airlight.validation.estimates.quadrature.quadrature_image", counted(quadrature_image)
+    )
+    monkeypatch.setattr(
+        "airlight.validation.estimates.monte_carlo.single_scatter_batch",
+        counted(single_scatter_batch),
+    )
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+        "airlight.validation.study.scene.multiple_scattering_fraction",
+        lambda scene, **options: multiple,
     )
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
     assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1 + 1)
@@ -211,9 +248,12 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
     """In a cache of its own: what it finds again replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("airlight.validation.study.scene.agreements", lambda scene, margins, **options: {})
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+        "airlight.validation.study.scene.agreements", lambda scene, margins, **options: {}
+    )
+    monkeypatch.setattr(
+        "airlight.validation.study.scene.multiple_scattering_fraction",
+        lambda scene, **options: multiple,
     )
     path = tmp_path / "mine.xml"
     counts = []
@@ -222,11 +262,15 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
         measured = again(written, tmp_path, scenes=(str(path),), configurations=())
         counts.append((measured["cached"], measured["computed"]))
     assert counts == [(0, 3), (0, 3)]
-    assert measured["scenes"][0]["reference"]["mean"] != written.data["scenes"][0]["reference"]["mean"]
+    assert (
+        measured["scenes"][0]["reference"]["mean"] != written.data["scenes"][0]["reference"]["mean"]
+    )
 
 
 @pytest.mark.claim("report-kept")
-def test_an_engines_image_is_judged_at_its_size_by_the_reference_that_is_kept(written, variant, tmp_path):
+def test_an_engines_image_is_judged_at_its_size_by_the_reference_that_is_kept(
+    written, variant, tmp_path
+):
     from airlight.validation.engine.images import EngineImage
 
     path, (scene,) = tmp_path / "my <fog>.exr", written.data["scenes"]
@@ -241,7 +285,10 @@ def test_an_engines_image_is_judged_at_its_size_by_the_reference_that_is_kept(wr
     (row,) = judged["methods"]
     assert (row["kind"], row["label"], row["times"]) == ("image", "engine", None)
     assert row["error"]["relative_bias"] == pytest.approx(0.01, rel=1e-4)
-    assert any("The image engine of my <fog>, judged by its airlight" in claim["text"] for claim in data["claims"])
+    assert any(
+        "The image engine of my <fog>, judged by its airlight" in claim["text"]
+        for claim in data["claims"]
+    )
 
 
 # Methods of the user
@@ -282,7 +329,9 @@ def test_a_method_that_ends_its_process_is_told_at_once_and_is_a_row_with_the_re
         raise EndedError(f"method {name}: ended its process, killed by SIGABRT")
 
     monkeypatch.setattr("airlight.reports.report.measure.in_own_process", ends)
-    study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
+    study = replace(
+        TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),)
+    )
     (ended,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
     assert (ended.status, ended.times) == ("refused", None)
     assert ended.reason.endswith("ended its process, killed by SIGABRT")
@@ -295,7 +344,9 @@ def test_a_refusal_by_a_users_method_is_no_fault(written, variant, tmp_path, mon
         raise InputError("the medium has bounds")
 
     monkeypatch.setattr("airlight.reports.report.measure.in_own_process", refuses)
-    study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
+    study = replace(
+        TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),)
+    )
     (row,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
     assert (row.status, row.reason) == ("refused", "the medium has bounds")
     assert capsys.readouterr().err == ""
@@ -311,7 +362,9 @@ def test_the_device_of_shaders_is_part_of_the_machine(variant, tmp_path, monkeyp
 # Parts that belong to no scene
 
 
-def test_stability_and_growth_have_their_records_their_time_and_are_kept(written, variant, tmp_path, monkeypatch):
+def test_stability_and_growth_have_their_records_their_time_and_are_kept(
+    written, variant, tmp_path, monkeypatch
+):
     """Stubs measure: `tests/validation` has what they measure."""
     from airlight.reports.report import others
 
@@ -370,7 +423,8 @@ def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check
     monkeypatch.setattr("airlight.validation.study.scene.agreements", agreements)
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+        "airlight.validation.study.scene.multiple_scattering_fraction",
+        lambda scene, **options: multiple,
     )
     study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())
     data = as_json(write_report(tmp_path / "again", study, cluster=cluster))
@@ -383,7 +437,12 @@ def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check
 
 @pytest.mark.parametrize(
     ("scene", "folder"),
-    [("hall", "hall"), ("a/my <fog> #2.xml", "my-fog-2"), ("a/..xml", "scene"), ("random:7", "random-7")],
+    [
+        ("hall", "hall"),
+        ("a/my <fog> #2.xml", "my-fog-2"),
+        ("a/..xml", "scene"),
+        ("random:7", "random-7"),
+    ],
 )
 def test_a_scene_of_any_name_has_a_safe_folder(scene, folder):
     assert folder_of(scene) == folder
@@ -401,7 +460,16 @@ def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):
 
 def test_labels_that_would_share_a_file_get_numbers():
     # `x` has the picture x-error.png, which would be that of the label `x error` too.
-    stems = file_stems(["x", "X!", "x error", "reference", "\N{GREEK SMALL LETTER PHI}", "my.module:shafts (exact)"])
+    stems = file_stems(
+        [
+            "x",
+            "X!",
+            "x error",
+            "reference",
+            "\N{GREEK SMALL LETTER PHI}",
+            "my.module:shafts (exact)",
+        ]
+    )
     assert stems == ["x", "x-2", "x-error-2", "reference-2", "image", "my-module-shafts-exact"]
 
 
@@ -424,7 +492,11 @@ def content_names(folder):
 
 
 def content(folder):
-    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 def test_files_appear_when_the_block_ends(tmp_path):
@@ -441,14 +513,19 @@ def test_files_appear_when_the_block_ends(tmp_path):
 
 @pytest.mark.claim("files-whole-or-not-at-all")
 def test_two_reports_never_mix_in_one_folder(tmp_path):
-    """The second of two at once is refused; a later one drops the images of the first, and keeps a user's file."""
+    """The second of two at once is refused; a later one drops the images of the first,
+    and keeps a user's file.
+    """
     folder = write_report_files(tmp_path / "r")
     (folder / "mine.txt").write_text("mine")
     images = set(named_files(small_report()))
     there = set(content_names(folder))
     assert images < there
     with staged(folder) as hidden:
-        with pytest.raises(InputError, match=r"another run is writing into .*another folder"), staged(folder):
+        with (
+            pytest.raises(InputError, match=r"another run is writing into .*another folder"),
+            staged(folder),
+        ):
             pass
         (hidden / "report.json").write_text("{}")
         kept = min(images)
@@ -475,7 +552,9 @@ def test_an_exception_leaves_everything_as_it_was(tmp_path, stop):
 
 
 @pytest.mark.claim("files-whole-or-not-at-all")
-def test_a_full_disk_names_the_folder_that_the_user_knows_and_other_faults_are_as_they_are(tmp_path):
+def test_a_full_disk_names_the_folder_that_the_user_knows_and_other_faults_are_as_they_are(
+    tmp_path,
+):
     for number, name in ((errno.ENOSPC, str(tmp_path)), (errno.EACCES, "hidden.exr")):
         with pytest.raises(OSError, match=os.strerror(number)) as raised, staged(tmp_path):
             raise OSError(number, os.strerror(number), "hidden.exr")
@@ -499,7 +578,9 @@ def test_reference_without_light_that_is_finite_has_no_numbers_rather_than_nan(a
     from airlight.reference.quadrature.ray_values import ReferenceImage
 
     black = np.zeros_like(airlight)
-    found = reference_record(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    found = reference_record(
+        ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan"))
+    )
     json.dumps(asdict(found), allow_nan=False)
     assert found.relative_bound is None
     assert found.missed is None
@@ -512,4 +593,6 @@ def test_a_larger_effort_measures_more_verdicts_and_part_of_its_scenes_none(own_
     quick, default, full = (standard_study(name) for name in STUDIES)
     assert papers(quick) == ["formulas", "stencil"]  # no image
     assert set(papers(quick)) < set(papers(default)) < set(papers(full))
-    assert papers(replace(default, scenes=("open-fog",))) == papers(replace(quick, name="mine")) == []
+    assert (
+        papers(replace(default, scenes=("open-fog",))) == papers(replace(quick, name="mine")) == []
+    )

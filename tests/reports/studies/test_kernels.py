@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of kernels, formulas and slabs: their numbers, their files, what ends with the status 1."""
+"""Studies of kernels, formulas and slabs: their numbers, their files,
+what ends with the status 1.
+"""
 
 import csv
 import json
@@ -22,7 +24,10 @@ def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
     assert integrals.summary["max"] < 4e-6  # the README's figure for the kernel `exact`
     assert integrals.J.shape == (2004,)
     cases = read_cases(path)
-    columns = {name: getattr(cases, name) for name in ("phase", "g", "foot", "height", "x0", "x1", "sigma_t", "value")}
+    columns = {
+        name: getattr(cases, name)
+        for name in ("phase", "g", "foot", "height", "x0", "x1", "sigma_t", "value")
+    }
     again = airlight.study("integrals", columns)
     np.testing.assert_array_equal(again.J, integrals.J)
     np.testing.assert_array_equal(airlight.study("integrals", integrals.columns()).J, integrals.J)
@@ -33,7 +38,15 @@ def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
 
 def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant, tmp_path):
     foot, height = np.linspace(-1, 2, 5)[:, None], np.array([0.1, 0.7, 2.0])
-    rays = {"phase": "hg", "g": 0.4, "foot": foot, "height": height, "x0": 0.0, "x1": np.inf, "sigma_t": 0.3}
+    rays = {
+        "phase": "hg",
+        "g": 0.4,
+        "foot": foot,
+        "height": height,
+        "x0": 0.0,
+        "x1": np.inf,
+        "sigma_t": 0.3,
+    }
     integrals = airlight.study("integrals", rays, "quadrature-32", precision="double", certify=True)
     assert integrals.J.shape == integrals.value.shape == integrals.error.shape == (5, 3)
     assert np.abs(integrals.error).max() < 1e-4
@@ -54,7 +67,9 @@ def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_
     from airlight.validation.kernels.case_files import integrate_cases
 
     rays, written = tmp_path / "rays.csv", tmp_path / "results.csv"
-    rays.write_text("phase,t,h,x0,x1,sigma_t\nhg-draine:12,1,0.5,0,3,0.2\nhg-draine:12,-1,0.25,0.5,inf,0.1\n")
+    rays.write_text(
+        "phase,t,h,x0,x1,sigma_t\nhg-draine:12,1,0.5,0,3,0.2\nhg-draine:12,-1,0.25,0.5,inf,0.1\n"
+    )
     assert cli.run(["study", "integrals", str(rays), "-o", str(written)]) == 0
     assert "wrote" in capfd.readouterr().out
     with written.open() as file:
@@ -77,7 +92,12 @@ def test_kernels_are_named_by_an_option(variant, tmp_path, monkeypatch):
 
     monkeypatch.setattr("airlight.validation.kernels.benchmark.bench_kernels", bench_kernels)
     written = tmp_path / "kernels.json"
-    assert cli.run(["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "-o", str(written)]) == 0
+    assert (
+        cli.run(
+            ["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "-o", str(written)]
+        )
+        == 0
+    )
     assert json.loads(written.read_text())["kernels"] == {"costs": [], "levels": []}
     assert cli.run(["study", "kernels"]) == 0
     assert asked == [["exact", "taylor-8"], None]
@@ -98,11 +118,28 @@ def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys)
 
 
 def test_slab_by_command_and_from_python(tmp_path):
-    slab = ["study", "slab", "2", "30", "--phase", "hg:0.75", "--albedo", "0.9", "--orders", "1", "--photons", "50"]
+    slab = [
+        "study",
+        "slab",
+        "2",
+        "30",
+        "--phase",
+        "hg:0.75",
+        "--albedo",
+        "0.9",
+        "--orders",
+        "1",
+        "--photons",
+        "50",
+    ]
     assert cli.run([*slab, "-o", str(tmp_path / "slab.json")]) == 0
     data = json.loads((tmp_path / "slab.json").read_text())
     assert (data["tau"], data["sun"], data["albedo"], data["phase"]) == (2, 30, 0.9, "hg:0.75")
-    assert [row["orders"] for row in data["orders"]] == [row["orders"] for row in data["photons"]["orders"]] == ["1"]
+    assert (
+        [row["orders"] for row in data["orders"]]
+        == [row["orders"] for row in data["photons"]["orders"]]
+        == ["1"]
+    )
     assert data["error"]["orders"][0]["reflectance"] < 1e-6
     light = airlight.study("slab", 2.0, 30.0, phase="hg:0.75", albedo=0.9, orders=[1], photons=50)
     assert light.to_dict() == data

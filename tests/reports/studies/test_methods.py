@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of methods and of their noise: what they measure, by command and from Python, and their exit status."""
+"""Studies of methods and of their noise: what they measure, by command and from
+Python, and their exit status.
+"""
 
 import json
 import math
@@ -26,7 +28,9 @@ def printed(capfd, *arguments, status=0):
 
 
 def test_methods_are_measured_by_the_command(variant, capfd):
-    rows = printed(capfd, "methods", "open-fog", "--method", "unshadowed", "--size", "16x12")["rows"]
+    rows = printed(capfd, "methods", "open-fog", "--method", "unshadowed", "--size", "16x12")[
+        "rows"
+    ]
     assert {(row["scene"], row["method"]) for row in rows} == {("open-fog", "unshadowed")}
     assert all(row["times"]["frame"]["median_ms"] > 0 for row in rows)
 
@@ -44,7 +48,9 @@ def test_python_gives_functions_and_configurations_and_gets_rows(variant):
     assert taylor.label == "unshadowed (taylor)"
     exact = airlight.reference("open-fog", size=TINY).airlight
     # Twice as bright: the error is the reference.
-    assert own.error.relative_rmse == pytest.approx(np.sqrt(np.mean(exact**2)) / exact.mean(), rel=1e-5)
+    assert own.error.relative_rmse == pytest.approx(
+        np.sqrt(np.mean(exact**2)) / exact.mean(), rel=1e-5
+    )
     assert own.error.relative_bias == pytest.approx(1.0, rel=1e-5)
     for row in table:
         assert row.scene == "open-fog"
@@ -65,17 +71,39 @@ def test_python_gives_functions_and_configurations_and_gets_rows(variant):
 @pytest.mark.claim("error-by-cause", tolerance="1e-5 of the largest error: rounding")
 def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
     """The parts add up to the whole; parameters are those that are set."""
-    arguments = ["decomposition", "open-fog", "--method", "froxel-fog", "--set", "slices=9", "--set", "width=8"]
-    (scene,) = printed(capfd, *arguments, "--size", "16x12", "-o", str(tmp_path / "parts.png"))["scenes"]
+    arguments = [
+        "decomposition",
+        "open-fog",
+        "--method",
+        "froxel-fog",
+        "--set",
+        "slices=9",
+        "--set",
+        "width=8",
+    ]
+    (scene,) = printed(capfd, *arguments, "--size", "16x12", "-o", str(tmp_path / "parts.png"))[
+        "scenes"
+    ]
     (entry,) = scene["methods"]
     assert (scene["size"], entry["parameters"]) == ([16, 12], {"slices": 9, "width": 8})
     assert sum(part["fraction"] for part in entry["parts"]) == pytest.approx(1, abs=1e-9)
-    assert sum(part["relative_bias"] for part in entry["parts"]) == pytest.approx(entry["whole"]["relative_bias"], 1e-5)
+    assert sum(part["relative_bias"] for part in entry["parts"]) == pytest.approx(
+        entry["whole"]["relative_bias"], 1e-5
+    )
     assert (tmp_path / "parts.png").stat().st_size > 10_000
 
 
 def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch, tmp_path):
-    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--size", "80x60"]
+    arguments = [
+        "scaling",
+        "sphere-spot",
+        "--kinds",
+        "size",
+        "--method",
+        "unshadowed",
+        "--size",
+        "80x60",
+    ]
     arguments += ["-o", str(tmp_path / "growth.png")]
     for jump, status in ((False, 0), (True, 1)):
         found = growth_record(cliff=jump) | {"scene": "sphere-spot", "run": None}
@@ -99,7 +127,11 @@ speckled.noisy = True
 def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     runs = 24
     study = airlight.study(
-        "noise", "open-fog", runs=runs, size=TINY, method=[airlight.configuration("unshadowed", "exact"), speckled]
+        "noise",
+        "open-fog",
+        runs=runs,
+        size=TINY,
+        method=[airlight.configuration("unshadowed", "exact"), speckled],
     )
     still, noisy = (row.noise for row in study)
     reference = airlight.reference("open-fog", size=TINY).airlight.astype(np.float64)
@@ -107,7 +139,8 @@ def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     assert still.variance.value == 0
     assert still.relative_rmse < 1e-5  # float32 beside the light
     assert math.isnan(still.low_fraction)
-    # A number even in [0, 2] has the variance 1/3. All channels share it: values are a third as many.
+    # A number even in [0, 2] has the variance 1/3. All channels share it:
+    # values are a third as many.
     variance = np.mean(reference**2) / reference.mean() ** 2 / 3
     assert noisy.runs == runs
     assert abs(noisy.variance.value - variance) < 4 * noisy.variance.error
@@ -116,7 +149,9 @@ def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     assert noisy.efficiency == pytest.approx(1 / (noisy.variance.value * noisy.seconds))
     assert study.to_dict()["rows"][0]["noise"]["low_fraction"] is None
     assert study.save(tmp_path / "noise.png").stat().st_size > 1000
-    brighter = airlight.study("noise", "open-fog", runs=runs, size=TINY, method=speckled, settings="bias=0.5")[0].noise
+    brighter = airlight.study(
+        "noise", "open-fog", runs=runs, size=TINY, method=speckled, settings="bias=0.5"
+    )[0].noise
     assert abs(brighter.bias.value - 0.5) < 4 * brighter.bias.error
     # The noise is that of the same random numbers, once and a half as large.
     assert math.sqrt(brighter.variance.value / noisy.variance.value) == pytest.approx(1.5, rel=1e-5)

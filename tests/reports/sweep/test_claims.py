@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes are the sample of a sweep, not cells; its claims are fractions of them with intervals; faults, refusals."""
+"""Scenes are the sample of a sweep, not cells; its claims are fractions of them with
+intervals; faults, refusals.
+"""
 
 import numpy as np
 import pyarrow as pa
@@ -29,7 +31,10 @@ def test_share_of_the_scenes_and_its_interval(sweep_of):
     assert made.text == "ray-march: within 1e-3 in 99.2 % of 1000 scenes, 98.4 to 99.7 %."
 
 
-_RIGHT, _NO_REFERENCE = {"relative_rmse": 1e-5}, {"status": "hung", "reason": "reference of random:1: stopped"}
+_RIGHT, _NO_REFERENCE = (
+    {"relative_rmse": 1e-5},
+    {"status": "hung", "reason": "reference of random:1: stopped"},
+)
 #: Scenes as changes of a row, and what of them is tried, within, undecided, refused and untold.
 TRIES = {
     "faults miss and refusals are no tries": (
@@ -47,7 +52,10 @@ TRIES = {
         (2, 1, 0, 0, 1),
     ),
     "what the reference cannot tell is undecided": (
-        [*[_RIGHT] * 10, *({"relative_rmse": error, "reference_error": 2e-4} for error in (9e-4, 1.1e-3, 5e-3))],
+        [
+            *[_RIGHT] * 10,
+            *({"relative_rmse": error, "reference_error": 2e-4} for error in (9e-4, 1.1e-3, 5e-3)),
+        ],
         (13, 10, 2, 0, 0),
     ),
 }
@@ -58,7 +66,9 @@ TRIES = {
 def test_what_is_tried_and_within(sweep_of, case):
     """Undecided scenes widen the interval on one side."""
     scenes, counted = TRIES[case]
-    (sample,) = samples(sweep_of([row(f"random:{n}", **changes) for n, changes in enumerate(scenes)]))
+    (sample,) = samples(
+        sweep_of([row(f"random:{n}", **changes) for n, changes in enumerate(scenes)])
+    )
     made = claim(sample, 1e-3)
     assert (made.tries, made.within, made.undecided, made.refused, made.untold) == counted
     tries, within, undecided, *_ = counted
@@ -81,7 +91,9 @@ def test_injected_property_is_found_and_no_other(sweep_of):
     assert len(found) == 5 * 5
     for sample in made:
         chosen = strongest(found, sweep, sample)
-        assert [each.property for each in chosen] == (["optical_depth"] if sample.method == "ray-march" else [])
+        assert [each.property for each in chosen] == (
+            ["optical_depth"] if sample.method == "ray-march" else []
+        )
     march = next(sample for sample in made if sample.method == "ray-march")
     (depth,) = strongest(found, sweep, march)
     assert 0.9 < depth.low < depth.r < depth.high
@@ -110,15 +122,21 @@ def test_of_properties_that_say_the_same_the_strongest_is_named(sweep_of):
     found = correlations(sweep, [sample])
     assert {each.property for each in found} == {"lights", "silhouettes", "nearest_light"}
     chosen = strongest(found, sweep, sample)
-    assert {each.property: each.r > 0 for each in chosen} == {"silhouettes": True, "nearest_light": False}
+    assert {each.property: each.r > 0 for each in chosen} == {
+        "silhouettes": True,
+        "nearest_light": False,
+    }
 
 
 @pytest.mark.claim("sweep-properties")
 def test_intervals_hold_together(sweep_of):
-    """Of 100 properties of noise none is sure in most sweeps; each by itself at 95 % would give five."""
+    """Of 100 properties of noise none is sure in most sweeps; each by itself
+    at 95 % would give five.
+    """
     rng = np.random.default_rng(4)
     noise = [
-        {f"property_p{k}": value for k, value in enumerate(rng.normal(size=100))} | {"relative_rmse": rng.lognormal()}
+        {f"property_p{k}": value for k, value in enumerate(rng.normal(size=100))}
+        | {"relative_rmse": rng.lognormal()}
         for _ in range(60)
     ]
     sweep = sweep_of([row(f"random:{n}", **values) for n, values in enumerate(noise)])
@@ -174,7 +192,13 @@ def test_parquet_is_read_as_it_was_written(tmp_path):
         errors = [wanted["error.relative_rmse"] or np.nan]
         np.testing.assert_array_equal(sweep["error.relative_rmse"][place : place + 1], errors)
     assert not by_key
-    assert sweep.properties == ("light_distance", "lights", "optical_depth", "silhouettes", "triangles")
+    assert sweep.properties == (
+        "light_distance",
+        "lights",
+        "optical_depth",
+        "silhouettes",
+        "triangles",
+    )
     assert set(sweep["cost.alone"][sweep["status"] == "done"]) == {1.0}
 
 
@@ -190,7 +214,9 @@ def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
 
 @pytest.mark.claim("sweep-last-rows")
 def test_cells_that_were_computed_again_count_once(sweep_of):
-    """A fault that is repaired is gone; a cell that was computed for its error and again for its time has both."""
+    """A fault that is repaired is gone; a cell that was computed for its error and
+    again for its time has both.
+    """
     old, new = (
         {"source": "old", "started": "2026-11-23T08:00:00Z"},
         {"source": "new", "started": "2026-11-23T09:00:00Z"},
@@ -219,7 +245,8 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
         (lambda path: write_rows(path, []), "has no rows"),
         (
             lambda path: pq.write_table(
-                pq.read_table(write_rows(path, [row()])).drop(["reference.error"]), path.with_name(FILE)
+                pq.read_table(write_rows(path, [row()])).drop(["reference.error"]),
+                path.with_name(FILE),
             ),
             "has no column 'reference.error'",
         ),
@@ -258,9 +285,13 @@ def test_named_scenes_are_no_sample_where_scenes_were_drawn(sweep_of):
 
 @pytest.mark.claim("sweep-times-alone")
 def test_times_of_several_hosts_are_not_compared(sweep_of):
-    several = [row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2) for n in range(5)]
+    several = [
+        row(f"random:{n}", host="there" if n > 1 else "here", threads=8 if n == 4 else 2)
+        for n in range(5)
+    ]
     (sample,) = samples(sweep_of(several))
-    # Two rows each of both hosts with two threads: the first of them in the sweep, and never a mixture.
+    # Two rows each of both hosts with two threads: the first of them in the
+    # sweep, and never a mixture.
     assert list(np.isfinite(sample.times)) == [True, True, False, False, False]
 
 

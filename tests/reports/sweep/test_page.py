@@ -60,22 +60,32 @@ def test_page_keeps_the_pictures_of_the_worst(said, charts, monkeypatch):
         [row("hall")],
         [row(f"random:{n}", status="refused", reason="no") for n in range(30)],
         [row(relative_rmse=None, rmse=None, nonfinite=19200)],
-        [row(f"random:{n}", property_optical_depth=float(n), relative_rmse=0.0, rmse=0.0) for n in range(30)],
+        [
+            row(f"random:{n}", property_optical_depth=float(n), relative_rmse=0.0, rmse=0.0)
+            for n in range(30)
+        ],
     ],
     ids=["one", "all-refused", "no-number", "all-exact"],
 )
 def test_sweeps_at_the_edges_have_their_page(tmp_path, several):
     said = said_of(tmp_path, several)
-    text = Page(render_sweep(said, {name: svg_text(figure, name) for name, figure in drawn_figures(said)})).text
+    text = Page(
+        render_sweep(said, {name: svg_text(figure, name) for name, figure in drawn_figures(said)})
+    ).text
     assert "None" not in text
     assert "nan" not in re.findall(r"\b\w+\b", text)
     assert "inf" not in re.findall(r"\b\w+\b", text)
-    assert json.loads(json.dumps(plain(said), allow_nan=False))["rows"] == said.scenes == len(several)
+    assert (
+        json.loads(json.dumps(plain(said), allow_nan=False))["rows"] == said.scenes == len(several)
+    )
 
 
 def test_names_and_reasons_are_words_and_never_html(tmp_path):
     evil = "</script><script>alert('1')</script> & \"q\" $x^2$ {{ 7 * 7 }}"
-    several = [row(f"random:{n}", method=evil, property_depth=float(n), relative_rmse=0.1 * n) for n in range(1, 15)]
+    several = [
+        row(f"random:{n}", method=evil, property_depth=float(n), relative_rmse=0.1 * n)
+        for n in range(1, 15)
+    ]
     several.append(row("random:15", method="min-max", status="refused", reason=evil, command=evil))
     made = said_of(tmp_path, several)
     figures = {name: svg_text(figure, name) for name, figure in islice(drawn_figures(made), 1)}
@@ -93,19 +103,30 @@ def test_all_is_written_from_the_parquet(tmp_path):
     write_rows(source / FILE, faulty_rows())
     _, page = write_sweep(source, tmp_path / "out")
     assert page == tmp_path / "out" / "sweep.html"
-    written = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")}
-    figures = {f"figures/{name}.{suffix}" for name in ("sweep-errors", "sweep-medians") for suffix in ("pdf", "svg")}
+    written = {
+        path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")
+    }
+    figures = {
+        f"figures/{name}.{suffix}"
+        for name in ("sweep-errors", "sweep-medians")
+        for suffix in ("pdf", "svg")
+    }
     assert written == {"sweep.html", "sweep.json", *figures}
     assert [path.name for path in source.iterdir()] == [FILE]
 
 
-def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("airlight.reports.sweep.page.drawn_figures", lambda said: iter(()))  # they take long
+def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(
+    tmp_path, monkeypatch, capsys
+):
+    # they take long
+    monkeypatch.setattr("airlight.reports.sweep.page.drawn_figures", lambda said: iter(()))
     write_rows(tmp_path / FILE, rows(30))
     assert run(["sweep", "--from", str(tmp_path)]) == 0
     assert METHODS[0][0] in capsys.readouterr().out
     assert {path.name for path in tmp_path.iterdir()} == {FILE, "sweep.html", "sweep.json"}
-    assert run(["sweep", "--from", str(tmp_path / FILE), "--json", "-o", str(tmp_path / "said")]) == 0
+    assert (
+        run(["sweep", "--from", str(tmp_path / FILE), "--json", "-o", str(tmp_path / "said")]) == 0
+    )
     data = json.loads(capsys.readouterr().out)
     assert len(data["claims"]) == 3 * len(METHODS)
     assert data == json.loads((tmp_path / "said" / "sweep.json").read_text())

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Costs of kernels and of growing work: each number stands under its heading, and what has none says why."""
+"""Costs of kernels and of growing work: each number stands under its heading,
+and what has none says why.
+"""
 
 import csv as comma_separated
 import io
@@ -13,7 +15,14 @@ from airlight.reports.tables.costs import (
     stability_summary,
 )
 from airlight.reports.tables.drawing import csv, markdown, text
-from airlight.validation.kernels.records import ErrorLevel, KernelCost, KernelErrors, Rays, RayTime, Stability
+from airlight.validation.kernels.records import (
+    ErrorLevel,
+    KernelCost,
+    KernelErrors,
+    Rays,
+    RayTime,
+    Stability,
+)
 from airlight.validation.timing import Scaling
 from tests.helpers.reports import growth_record, record_of
 
@@ -27,7 +36,9 @@ def cost(kernel, phase="isotropic", **changes):
     made = {"kernel": kernel, "family": kernel, "size": None, "phase": phase, "g": 0.7}
     times = {"device": RayTime(median=1.25, low=1.1, high=1.5, repetitions=9)}
     times |= {"wall": RayTime(median=2.5, low=2.4, high=2.75, repetitions=9)}
-    return KernelCost(**made | times | {"rays": 4096, "median": 1e-7, "p99": 3e-6, "max": 4e-5} | changes)
+    return KernelCost(
+        **made | times | {"rays": 4096, "median": 1e-7, "p99": 3e-6, "max": 4e-5} | changes
+    )
 
 
 def test_kernels_are_tabled_by_phase_function_with_the_cheapest_at_each_error():
@@ -74,16 +85,30 @@ def test_a_kernel_has_its_time_with_quartiles_on_the_device_and_by_the_clock():
 
 def errors(largest, **changes):
     counts = {"rays": 90, "refused": 10, "nan": 1, "infinite": 2, "negative": 4, "worst": None}
-    return KernelErrors(**counts | {"median": 1e-8, "p99": 1e-6, "max": largest, "mean": 1e-7} | changes)
+    return KernelErrors(
+        **counts | {"median": 1e-8, "p99": 1e-6, "max": largest, "mean": 1e-7} | changes
+    )
 
 
 def test_the_robustness_of_a_kernel_has_a_row_for_each_set_of_rays():
     groups = {"all": errors(3e-5), "near": errors(7.0)}
-    sets = [Rays(name=name, columns="", single=groups, double={"all": errors(2e-12)}) for name in ("wide", "edge")]
-    table = stability_summary([Stability(kernel="exact", exact=True, refused={}, sets=tuple(sets), broken=())])
+    sets = [
+        Rays(name=name, columns="", single=groups, double={"all": errors(2e-12)})
+        for name in ("wide", "edge")
+    ]
+    table = stability_summary(
+        [Stability(kernel="exact", exact=True, refused={}, sets=tuple(sets), broken=())]
+    )
     rows = cells(table)
     assert [(row["kernel"], row["set"]) for row in rows] == [("exact", "wide"), ("exact", "edge")]
-    wanted = {"rays": "90", "refused": "10", "median": "1e-08", "p99": "1e-06", "max": "3e-05", "double": "2e-12"}
+    wanted = {
+        "rays": "90",
+        "refused": "10",
+        "median": "1e-08",
+        "p99": "1e-06",
+        "max": "3e-05",
+        "double": "2e-12",
+    }
     assert {name: rows[0][name] for name in wanted} == wanted
     assert rows[0]["odd"] == "7"  # not a number, infinite or negative
 
@@ -106,7 +131,11 @@ def test_growing_work_has_the_costs_of_each_step_and_how_they_grow():
     assert [row["cliff"] for row in cells(exponents)] == ["frame", "no"]
     row = cells(exponents)[0]
     assert (row["kind"], row["label"]) == ("triangles", "shadow-planes (exact)")
-    assert [row[name] for name in ("frame", "frame_steepest", "objects_moved")] == ["0.47", "1.93", "0.47"]
+    assert [row[name] for name in ("frame", "frame_steepest", "objects_moved")] == [
+        "0.47",
+        "1.93",
+        "0.47",
+    ]
 
 
 def test_a_jump_is_a_sentence_with_its_power_and_where_it_is():

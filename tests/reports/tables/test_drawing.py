@@ -7,7 +7,17 @@ from dataclasses import replace
 import pytest
 
 from airlight.reports.tables.drawing import csv, html, latex, markdown, text
-from airlight.reports.tables.table import Column, Measured, Name, Row, Table, numbers, table, with_spread, words
+from airlight.reports.tables.table import (
+    Column,
+    Measured,
+    Name,
+    Row,
+    Table,
+    numbers,
+    table,
+    with_spread,
+    words,
+)
 
 
 @pytest.mark.claim("latex-tables")
@@ -24,8 +34,16 @@ def _wide() -> Table:
         *numbers(other="light moved", how={"unit": "ms", "minor": True}),
         *numbers(*(f"error {n}" for n in range(5))),
     )
-    values = {"name": "shadow-planes-2006 (exact, order=paper)", "time": Measured(1.2345, 1.1, 1.3), "other": 3.21}
-    return Table("A title that is long " * 6, columns, (Row(values | {f"error {n}": 1e-5 / 3 for n in range(5)}),))
+    values = {
+        "name": "shadow-planes-2006 (exact, order=paper)",
+        "time": Measured(1.2345, 1.1, 1.3),
+        "other": 3.21,
+    }
+    return Table(
+        "A title that is long " * 6,
+        columns,
+        (Row(values | {f"error {n}": 1e-5 / 3 for n in range(5)}),),
+    )
 
 
 @pytest.mark.claim("tables-at-80-columns")
@@ -47,17 +65,25 @@ def test_a_narrow_terminal_shows_whole_numbers_and_says_what_it_leaves_out(width
 @pytest.mark.claim("latex-tables")
 def test_five_ways_carry_the_same_cells_and_escape_what_means_something_to_them():
     columns = (Column("name", "name", words=True), Column("time", "time", "ms", spread="quartiles"))
-    rows = (Row({"name": "<b> a|b & c_d 50 %", "time": Measured(12.345, 12.0, 13.0)}), Row({"name": "b"}, "no <light>"))
+    rows = (
+        Row({"name": "<b> a|b & c_d 50 %", "time": Measured(12.345, 12.0, 13.0)}),
+        Row({"name": "b"}, "no <light>"),
+    )
     drawn = Table("t", columns, rows)
     assert " <b> a|b & c_d 50 %      12.3      12..13\n\nb: no <light>\n" in text(drawn)
     assert r"| \<b> a\|b \& c\_d 50 % | 12.3 | 12..13 |" in markdown(drawn)
     assert markdown(drawn).endswith("- b: no \\<light>\n")
-    assert '">&lt;b&gt; a|b &amp; c_d 50 %</th><td>12.3 <span class="spread">12 … 13</span></td></tr>' in html(drawn)
+    assert (
+        '">&lt;b&gt; a|b &amp; c_d 50 %</th><td>12.3 <span class="spread">12 … 13</span></td></tr>'
+        in html(drawn)
+    )
     assert "no &lt;light&gt;</td>" in html(drawn)
     cells = r"\textless{}b\textgreater{} a|b \& c\_d 50 \% & $\num{12.35}_{-\num{0.35}}^{+\num{0.65}}$ \\"
     refusal = r"b & \multicolumn{1}{l}{no \textless{}light\textgreater{}} \\"
     assert latex([drawn]).splitlines()[-4:-2] == [cells, refusal]
-    wanted = "name,time,time_low,time_high,reason\n<b> a|b & c_d 50 %,12.345,12,13,\nb,,,,no <light>\n"
+    wanted = (
+        "name,time,time_low,time_high,reason\n<b> a|b & c_d 50 %,12.345,12,13,\nb,,,,no <light>\n"
+    )
     assert csv(drawn).replace("\r", "") == wanted
 
 
@@ -88,7 +114,10 @@ def test_names_that_one_types_are_code_with_the_address_of_their_page():
     drawn = table("", (*words("name"), *numbers("cost")), rows)
     assert markdown(drawn).splitlines()[2:] == ["| [`a\\|b_c`](methods.md#a) | 1 |", "| `d` | 2 |"]
     assert '<a href="methods.md#a"><code>a|b_c</code></a>' in html(drawn)
-    assert latex([drawn]).splitlines()[5:7] == [r"\texttt{a|b\_c} & \num{1.00} \\", r"\texttt{d} & \num{2.00} \\"]
+    assert latex([drawn]).splitlines()[5:7] == [
+        r"\texttt{a|b\_c} & \num{1.00} \\",
+        r"\texttt{d} & \num{2.00} \\",
+    ]
     assert csv(drawn) == "name,cost\na|b_c,1\nd,2\n"
 
 
@@ -100,7 +129,13 @@ def test_tables_with_the_same_columns_are_one_tabular_with_a_line_of_units_where
         for title, value in (("hall", 1.5), ("fence", float("-inf")))
     ]
     lines = latex(tables, comment=["by hand"]).splitlines()
-    assert lines[1:6] == ["% by hand", r"\begin{tabular}{lr}", r"\toprule", r"name & time \\", r" & [ms] \\"]
+    assert lines[1:6] == [
+        "% by hand",
+        r"\begin{tabular}{lr}",
+        r"\toprule",
+        r"name & time \\",
+        r" & [ms] \\",
+    ]
     assert lines[6:-2] == [
         r"\midrule",
         r"\multicolumn{2}{l}{\textit{hall}, to \num{1e-3}} \\",

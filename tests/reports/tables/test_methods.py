@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times stand under their own headings, what is not finite never wins; what tables decide of references and growth."""
+"""Times stand under their own headings, what is not finite never wins; what tables decide
+of references and growth.
+"""
 
 import re
 from dataclasses import replace
@@ -10,7 +12,14 @@ from airlight.reports.data.records import Method, Scene
 from airlight.reports.tables.agreement import trust_table, verdict
 from airlight.reports.tables.costs import cliffs, scaling_tables
 from airlight.reports.tables.drawing import csv, html, latex, markdown, text
-from airlight.reports.tables.methods import COLUMNS, TIMES, fastest_table, method_row, methods_table, times_words
+from airlight.reports.tables.methods import (
+    COLUMNS,
+    TIMES,
+    fastest_table,
+    method_row,
+    methods_table,
+    times_words,
+)
 from airlight.reports.tables.table import Verdict
 from airlight.validation.statistics.records import Agreement
 from airlight.validation.timing import Scaling
@@ -25,8 +34,13 @@ def timing(median):
 
 
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
-    times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame), "run": RUN}
-    return record_of(made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, Method)
+    times = {name: timing(median) for name, median in MEDIANS.items()} | {
+        "frame": timing(frame),
+        "run": RUN,
+    }
+    return record_of(
+        made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, Method
+    )
 
 
 @pytest.mark.parametrize("name", TIMES)
@@ -36,9 +50,12 @@ def test_each_time_stands_under_its_own_heading(name):
     median = f"{MEDIANS[name]:g}"
     lines = text(table).splitlines()
     heading = next(line for line in lines if "method" in line)
-    end = re.search(rf"  {re.escape(COLUMNS[name].title)}(?=  |$)", heading).end()  # numbers end where headings end
+    # numbers end where headings end
+    end = re.search(rf"  {re.escape(COLUMNS[name].title)}(?=  |$)", heading).end()
     assert next(line for line in lines if line.startswith(" a "))[:end].split()[-1] == median
-    headings, _, cells = ([cell.strip() for cell in row.split("|")] for row in markdown(table).splitlines()[2:5])
+    headings, _, cells = (
+        [cell.strip() for cell in row.split("|")] for row in markdown(table).splitlines()[2:5]
+    )
     assert cells[headings.index(COLUMNS[name].title)] == median
     place = 1 + TIMES.index(name)
     assert re.findall(r"<t[dh][^>]*>([\d.]+|a)", html(table).split("<tbody>")[1])[place] == median
@@ -67,26 +84,41 @@ def test_a_table_says_of_which_runs_its_times_are():
     later = RUN | {"started": "2026-11-22 07:00:00 +0000", "steady": False, "between": 1.7}
     ours, engine = entry("a"), entry("engine", kind="image", times={"frame": timing(0.1)})
     other = entry("b", times={"frame": timing(3.0), "run": later})
-    assert times_words([ours, entry("c")]) == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}; " + (
-        "the machine stayed as it was (the anchor, camera rays alone: medians within a factor of 1.01 over the run, "
+    assert times_words(
+        [ours, entry("c")]
+    ) == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}; " + (
+        "the machine stayed as it was (the anchor, camera rays alone: medians within a factor of "
+        "1.01 over the run, "
         "quartiles of 1.02 in a round)."
     )
     mixed = times_words([ours, other, engine])
     assert f"Times of a: measured in turns in one run of 5 rounds, {RUN['started']};" in mixed
     assert (
-        "Times of b: measured in turns in one run of 5 rounds, 2026-11-22 07:00:00 +0000; the machine CHANGED" in mixed
+        "Times of b: measured in turns in one run of 5 rounds, 2026-11-22 07:00:00 +0000; the "
+        "machine CHANGED" in mixed
     )
     assert mixed.endswith("is of another run, on another machine or by other rules.")
     unknown = entry("d", times={"frame": timing(3.0), "run": RUN | {"steady": None}})
-    assert times_words([unknown]) == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}."
+    assert (
+        times_words([unknown])
+        == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}."
+    )
     assert method_row(engine).remarks[-1] == "timed elsewhere"
     assert "timed elsewhere" not in method_row(ours).remarks
 
 
 @pytest.mark.claim("claims-follow")
 def test_the_fastest_method_within_each_error_has_a_cell():
-    fast, good, slow = entry("fast", rmse=0.02, frame=1.0), entry("good", rmse=0.004), entry("slow", rmse=1e-4, frame=8)
-    assert fastest_of(fast, good, slow) == ("fog", "good: 2 ms, 500 frames/s", "slow: 8 ms, 125 frames/s")
+    fast, good, slow = (
+        entry("fast", rmse=0.02, frame=1.0),
+        entry("good", rmse=0.004),
+        entry("slow", rmse=1e-4, frame=8),
+    )
+    assert fastest_of(fast, good, slow) == (
+        "fog",
+        "good: 2 ms, 500 frames/s",
+        "slow: 8 ms, 125 frames/s",
+    )
     assert fastest_of(fast, good) == ("fog", "good: 2 ms, 500 frames/s", "none")
     assert fastest_of() == ("fog", "none", "none")
 
@@ -97,14 +129,19 @@ def test_the_fastest_method_within_each_error_has_a_cell():
     [
         entry("no error", rmse=None, frame=0.1),  # a black reference has no relative error
         entry("refused", reason="no series", times=None, error=None),
-        entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
+        # its RMSE leaves out the very pixels that are wrong
+        entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),
         entry("image", kind="image", rmse=1e-5, times=None),
-        entry("engine", kind="image", rmse=1e-5, times={"frame": timing(0.1)}),  # of another run than the others
+        # of another run than the others
+        entry("engine", kind="image", rmse=1e-5, times={"frame": timing(0.1)}),
     ],
     ids=lambda never: never.label,
 )
 def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
-    assert fastest_of(never, entry("best", rmse=0.0009)) == ("fog", *["best: 2 ms, 500 frames/s"] * 2)
+    assert fastest_of(never, entry("best", rmse=0.0009)) == (
+        "fog",
+        *["best: 2 ms, 500 frames/s"] * 2,
+    )
 
 
 @pytest.mark.parametrize(
@@ -123,9 +160,14 @@ def test_a_reference_is_confirmed_refused_or_not_decided(equivalent, interval, f
 
 
 def test_an_estimator_that_did_not_check_a_scene_has_no_cells_there():
-    checks = {"volpath airlight": agreement(), "volpath surface": agreement(layer="surface", detectable=0.01)}
+    checks = {
+        "volpath airlight": agreement(),
+        "volpath surface": agreement(layer="surface", detectable=0.01),
+    }
     alone = {"single-scatter airlight": agreement(estimator="single-scatter", margin=0.05)}
-    both, one = (record_of(scene("b", [], agreement=each), Scene) for each in (checks | alone, checks))
+    both, one = (
+        record_of(scene("b", [], agreement=each), Scene) for each in (checks | alone, checks)
+    )
     rows = [row.values for row in trust_table([both, one]).rows]
     assert rows[0]["single-scatter agrees"] == Verdict(True, "±5 %")
     assert "single-scatter" not in rows[1]
@@ -137,6 +179,8 @@ def test_an_estimator_that_did_not_check_a_scene_has_no_cells_there():
 def test_jumps_are_found():
     calm, jump = (record_of(growth_record(cliff=cliff), Scaling) for cliff in (False, True))
     assert len(cliffs([jump, calm])) == 1
-    costs, exponents = scaling_tables([record_of(growth_record(works=(), refused="method x: no"), Scaling)])
+    costs, exponents = scaling_tables(
+        [record_of(growth_record(works=(), refused="method x: no"), Scaling)]
+    )
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()

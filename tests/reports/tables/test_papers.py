@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims of papers: a table of verdicts for each paper, its numbers without a verdict apart, and their counts."""
+"""Claims of papers: a table of verdicts for each paper, its numbers without a verdict
+apart, and their counts.
+"""
 
 from airlight.reports.tables.papers import count_words, paper_tables
 from airlight.reports.tables.table import Interval
@@ -11,9 +13,19 @@ def claim(item, verdict=None, paper="biri", **changes):
 
 
 ROWS = [
-    claim("eq. 1", "reproduced", measured=1.0, published=1.0, low=0.9, high=1.1, interval="quartiles"),
+    claim(
+        "eq. 1", "reproduced", measured=1.0, published=1.0, low=0.9, high=1.1, interval="quartiles"
+    ),
     claim("fig. 2", "impossible", why="no figure"),
-    claim("table 3", published=60.0, measured=41.0, low=41.0, high=41.0, interval="quartiles", unit="frames/s"),
+    claim(
+        "table 3",
+        published=60.0,
+        measured=41.0,
+        low=41.0,
+        high=41.0,
+        interval="quartiles",
+        unit="frames/s",
+    ),
     claim("eq. 4", "not reproduced", paper="ali"),
     claim("fig. 5", paper="unheard of"),
 ]
@@ -31,7 +43,10 @@ def test_each_paper_has_its_verdicts_and_then_its_numbers_beside_ours():
     assert tables[2].title == f"{tables[0].title}: numbers beside ours"
     assert tables[3].title == "unheard of: numbers beside ours"
     assert "verdict" not in {column.key for column in tables[2].columns}
-    assert [table.title for table in paper_tables(ROWS, plain=False)] == [tables[0].title, tables[1].title]
+    assert [table.title for table in paper_tables(ROWS, plain=False)] == [
+        tables[0].title,
+        tables[1].title,
+    ]
 
 
 def test_a_figure_has_the_interval_that_was_measured_and_none_where_both_ends_are_one():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A result shows the same on a terminal, in a notebook and as JSON; no JSON has a number that is not finite."""
+"""A result shows the same on a terminal, in a notebook and as JSON; no JSON has a
+number that is not finite.
+"""
 
 import io
 import json
@@ -31,7 +33,9 @@ def test_a_result_has_its_claims_tables_and_lines_wherever_it_is_shown():
 
 
 @pytest.mark.claim("exit-status")
-@pytest.mark.parametrize(("good", "faults", "status"), [(True, (), 0), (False, (), 1), (True, ("no light",), 1)])
+@pytest.mark.parametrize(
+    ("good", "faults", "status"), [(True, (), 0), (False, (), 1), (True, ("no light",), 1)]
+)
 def test_the_status_is_one_where_a_check_failed_or_something_is_at_fault(good, faults, status):
     said = Said(name="s", good=good, faults=faults)
     assert (said.passed, said.status) == (status == 0, status)
@@ -43,7 +47,10 @@ def test_a_number_that_is_not_finite_is_refused_rather_than_printed_as_no_json(v
         print_json({"value": value})
     assert capsys.readouterr().out == ""
     print_json({"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"})
-    assert json.loads(capsys.readouterr().out) == {"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"}
+    assert json.loads(capsys.readouterr().out) == {
+        "value": None,
+        "name": "\N{GREEK SMALL LETTER SIGMA}",
+    }
 
 
 def test_json_on_an_output_of_ascii_has_every_letter_in_ascii(monkeypatch):
@@ -52,7 +59,9 @@ def test_json_on_an_output_of_ascii_has_every_letter_in_ascii(monkeypatch):
         monkeypatch.setattr(sys, "stdout", output)
         print_json({"name": "\N{GREEK SMALL LETTER SIGMA}"})
         output.flush()
-        assert json.loads(written.getvalue().decode("ascii")) == {"name": "\N{GREEK SMALL LETTER SIGMA}"}
+        assert json.loads(written.getvalue().decode("ascii")) == {
+            "name": "\N{GREEK SMALL LETTER SIGMA}"
+        }
 
 
 @pytest.mark.parametrize(("width", "shown"), [(6, 240), (100, 300), (240, 240), (320, 320)])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A live scene shows what one made again shows, bit by bit, and makes no more than it must; its pictures and errors."""
+"""A live scene shows what one made again shows, bit by bit, and makes no more than it must;
+its pictures and errors.
+"""
 
 import drjit as dr
 import mitsuba as mi
@@ -19,10 +21,18 @@ from airlight.validation.study.configuration import configuration, prepared
 pytestmark = pytest.mark.usefixtures("variant")
 
 SIZE = (32, 24)
-CAMERA = {"camera.origin": (0.6, -0.3, 0.4), "camera.target": (0.2, 0.1, 4.0), "camera.up": (0.0, 1.0, 0.0)}
+CAMERA = {
+    "camera.origin": (0.6, -0.3, 0.4),
+    "camera.target": (0.2, 0.1, 4.0),
+    "camera.up": (0.0, 1.0, 0.0),
+}
 LIGHT = {"light.position": (0.41, 0.3, 4.2), "light.intensity": (31.0, 43.0, 57.0)}
 MEDIUM = {"medium.sigma_t": (0.41,), "medium.albedo": (0.7, 0.6, 0.5)}
-FAR = {"camera.origin": (-4.1, -8.3, 1.5), "camera.target": (1.0, 2.7, 2.2), "camera.up": (0.0, 0.0, 1.0)}
+FAR = {
+    "camera.origin": (-4.1, -8.3, 1.5),
+    "camera.target": (1.0, 2.7, 2.2),
+    "camera.up": (0.0, 0.0, 1.0),
+}
 LAMP = {"light.position": (5.4, 1.7, 4.1), "medium.g": (0.21,)}
 
 
@@ -79,9 +89,13 @@ def test_camera_light_and_medium_record_nothing():
     shown(scene)
     before = recordings(scene)
     for fraction in (1.1, 1.2, 1.3):
-        scene.change({"camera.origin": tuple(fraction * value for value in CAMERA["camera.origin"])})
+        scene.change(
+            {"camera.origin": tuple(fraction * value for value in CAMERA["camera.origin"])}
+        )
         shown(scene)
-        scene.change({"light.position": tuple(fraction * value for value in LIGHT["light.position"])})
+        scene.change(
+            {"light.position": tuple(fraction * value for value in LIGHT["light.position"])}
+        )
         shown(scene)
         scene.change({"medium.sigma_t": (0.41 * fraction,)})
         shown(scene)
@@ -113,7 +127,10 @@ def test_a_parameter_records_the_methods_stages_and_not_the_surface():
 WIDTH, HEIGHT = 50, 37
 
 
-@pytest.mark.claim("view-error", tolerance="none for all pixels; 190 of 200 intervals of 95 % for a part, less 4 sigma")
+@pytest.mark.claim(
+    "view-error",
+    tolerance="none for all pixels; 190 of 200 intervals of 95 % for a part, less 4 sigma",
+)
 def test_error_of_a_part_covers_that_of_the_whole():
     random = np.random.default_rng(7)
     reference = 1 + random.random((HEIGHT, WIDTH, 3))
@@ -137,9 +154,13 @@ def test_error_of_a_part_covers_that_of_the_whole():
     np.testing.assert_array_equal(known.filled(known.airlight), reference)
 
 
-def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_finite_is_magenta(variant):
+def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_finite_is_magenta(
+    variant,
+):
     random = np.random.default_rng(3)
-    airlight, surface = (10 ** random.uniform(-5, 1, (12, 16, 3)).astype(np.float32) for _ in range(2))
+    airlight, surface = (
+        10 ** random.uniform(-5, 1, (12, 16, 3)).astype(np.float32) for _ in range(2)
+    )
     airlight[0, 0] = 0
     surface[3, 4, 1] = np.nan
     order = random.permutation(12 * 16).astype(np.uint32)
@@ -150,7 +171,9 @@ def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_fini
     dr.eval(layers)
     picture = Pictures().of_frame(mi.UInt32(order), **layers, layer="total", factor=1.7)
     picture = np.frombuffer(picture, np.uint8).reshape(12, 16, 4)
-    radiance = sum(weight * layer for weight, layer in zip(LAYERS["total"], (airlight, surface), strict=True))
+    radiance = sum(
+        weight * layer for weight, layer in zip(LAYERS["total"], (airlight, surface), strict=True)
+    )
     expected = tone_mapped(radiance.astype(np.float64), 1.7)
     assert picture[3, 4, :3].tolist() == list(NOT_FINITE)
     finite = np.isfinite(radiance).all(axis=-1)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server of the view: nothing for who does not know the token, over HTTP and over the socket."""
+"""The server of the view: nothing for who does not know the token, over
+HTTP and over the socket.
+"""
 
 import errno
 import json
@@ -68,9 +70,20 @@ def test_who_knows_the_token_gets_the_page(server):
 @pytest.mark.claim("view-token")
 def test_who_does_not_gets_nothing(server):
     base, token = server.address.rstrip("/").rsplit("/", 1)
-    wrong = ("/", "/view.js", "/socket", "//view.css", "/wrong/", "/%2e/{token}/", "/{short}/", "/{long}/view.js")
+    wrong = (
+        "/",
+        "/view.js",
+        "/socket",
+        "//view.css",
+        "/wrong/",
+        "/%2e/{token}/",
+        "/{short}/",
+        "/{long}/view.js",
+    )
     for path in (*wrong, "/{token}", "/{token}/server.py", "/{token}/../server.py"):
-        status, _, body = fetched(base + path.format(token=token, short=token[:-1], long=token + "x"))
+        status, _, body = fetched(
+            base + path.format(token=token, short=token[:-1], long=token + "x")
+        )
         assert (status, body) == (404, b"not found\n"), path
 
 
@@ -81,7 +94,8 @@ def test_the_socket_wants_the_token_too(server, heard):
         with pytest.raises(websockets.InvalidStatus) as raised:
             websockets.connect(wrong, proxy=None)
         assert raised.value.response.status_code == 404
-    with pytest.raises(websockets.InvalidStatus) as raised:  # a page of another site that has learnt the token
+    # a page of another site that has learnt the token
+    with pytest.raises(websockets.InvalidStatus) as raised:
         websockets.connect(address + "socket", proxy=None, origin="http://elsewhere.example")
     assert raised.value.response.status_code == 403
     assert heard == []

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The view shows what the page asks for, mistakes are one line, and the command on the page makes the same image.
+"""The view shows what the page asks for, mistakes are one line, and the command on the
+page makes the same image.
 
 The reference is computed by a stand-in in this process, and at once; one slow test has the process.
 """
@@ -58,7 +59,9 @@ class Page:
     def show(self, picture, **values):
         json.dumps(values, allow_nan=False)
         kept = self.frames if values["kind"] == "frame" else self.others
-        kept.append(values | {"picture": np.frombuffer(picture, np.uint8).reshape(SIZE[1], SIZE[0], 4)})
+        kept.append(
+            values | {"picture": np.frombuffer(picture, np.uint8).reshape(SIZE[1], SIZE[0], 4)}
+        )
         if values["kind"] == "frame":
             self.session.told(self, {"kind": "drawn", "frame": values["frame"]})
 
@@ -100,13 +103,25 @@ def ask(session, page, **message):
 def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch):
     session, page = view()
     ask(session, page, kind="change", changes=AIM)
-    ask(session, page, kind="change", changes={"light.position": [0.4, 0.3, 4.2], "medium.sigma_t": [0.29]})
+    ask(
+        session,
+        page,
+        kind="change",
+        changes={"light.position": [0.4, 0.3, 4.2], "medium.sigma_t": [0.29]},
+    )
     ask(session, page, kind="choose", method="ray-march")
     ask(session, page, kind="choose", parameter="steps", value="23")
     ask(session, page, kind="choose", parameter="sum", value="transitions")
     ask(session, page, kind="choose", kernel="quadrature-12")
-    ask(session, page, kind="change", changes={"camera.fov": [41.3], "medium.albedo": [0.7, 0.6, 0.5]})
-    commands = {name: shlex.split(command)[1:] for name, command in page.last("state")["commands"].items()}
+    ask(
+        session,
+        page,
+        kind="change",
+        changes={"camera.fov": [41.3], "medium.albedo": [0.7, 0.6, 0.5]},
+    )
+    commands = {
+        name: shlex.split(command)[1:] for name, command in page.last("state")["commands"].items()
+    }
     assert cli.run([*commands["render"], "-o", str(tmp_path / "same.exr")]) == 0
     written = read_exr(tmp_path / "same.exr").layers
     frame = session.live.on_host(session.live.frame())
@@ -114,7 +129,10 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
     np.testing.assert_array_equal(written["surface"], frame.surface.astype(np.float32))
     assert np.abs(page.frames[0]["picture"].astype(int) - page.frames[-1]["picture"]).max() > 0
     started = []
-    monkeypatch.setattr("airlight.reports.view.session.Session", lambda state, variant: started.append(state) or 1 / 0)
+    monkeypatch.setattr(
+        "airlight.reports.view.session.Session",
+        lambda state, variant: started.append(state) or 1 / 0,
+    )
     with pytest.raises(ZeroDivisionError):
         cli.run(commands["view"])
     assert started == [session._state()]
@@ -122,15 +140,24 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
     turns(session, lambda: session.reference.done and session._reference_of is not None)
     # float32 in the file
     np.testing.assert_allclose(
-        session.reference.known.airlight, read_exr(tmp_path / "reference.exr").layers["airlight"], rtol=1e-6
+        session.reference.known.airlight,
+        read_exr(tmp_path / "reference.exr").layers["airlight"],
+        rtol=1e-6,
     )
 
 
 @pytest.mark.claim("view-error", tolerance="1e-5 relative: EXR rounds to float32")
-def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(view, tmp_path, capfd):
+def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(
+    view, tmp_path, capfd
+):
     session, page = view("sphere-spot", "ray-march", steps=7)
     ask(session, page, kind="show", other="reference")
-    turns(session, lambda: page.others and any(said.get("done") for said in page.said if said["kind"] == "error"))
+    turns(
+        session,
+        lambda: (
+            page.others and any(said.get("done") for said in page.said if said["kind"] == "error")
+        ),
+    )
     error = page.last("error")["error"]
     assert error["known"] == error["pixels"] == SIZE[0] * SIZE[1]
     assert 0 < error["bound"] < 1e-6
@@ -145,7 +172,9 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(vi
     assert error["relative_bias"] == pytest.approx(compared["relative_bias"], rel=1e-4)
     # Another method has the same reference; another scene has not.
     ask(session, page, kind="choose", parameter="steps", value=21)
-    turns(session, lambda: page.last("error")["error"]["relative_rmse"] < 0.5 * error["relative_rmse"])
+    turns(
+        session, lambda: page.last("error")["error"]["relative_rmse"] < 0.5 * error["relative_rmse"]
+    )
     assert session.reference.starts == 1
     ask(session, page, kind="change", changes={"medium.sigma_t": [0.5]})
     turns(session, lambda: session.reference.starts == 2)
@@ -153,9 +182,13 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(vi
 
 def test_the_mean_of_noisy_frames_comes_nearer_to_the_reference_until_something_changes(view):
     session, page = view("open-fog", "equi-angular")
-    turns(session, lambda: any(said.get("frames", 0) >= 32 for said in page.said if said["kind"] == "error"))
+    turns(
+        session,
+        lambda: any(said.get("frames", 0) >= 32 for said in page.said if said["kind"] == "error"),
+    )
     said = page.last("error")
-    # Without a bias the error falls with the root of the frames: 5.7 times, of few bright pixels less evenly.
+    # Without a bias the error falls with the root of the frames: 5.7 times, of few
+    # bright pixels less evenly.
     assert said["mean"] < 0.4 * said["error"]["relative_rmse"]
     session.told(page, {"kind": "choose", "parameter": "samples", "value": 2})
     session.turn()
@@ -167,7 +200,9 @@ def test_the_mean_of_noisy_frames_comes_nearer_to_the_reference_until_something_
 @pytest.mark.claim("view-error")
 @pytest.mark.parametrize("method", ["ray-march", "ray-march+history"])
 def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monkeypatch, method):
-    """A history has the light of earlier frames: while a light moves it is further off than the same method at rest."""
+    """A history has the light of earlier frames: while a light moves it is further off than
+    the same method at rest.
+    """
     monkeypatch.setattr("airlight.reports.view.session._STILL", 1e9)
     session, page = view("open-fog", method, steps=64)
     for n in range(6):
@@ -179,7 +214,10 @@ def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monk
     turns(
         session,
         lambda: (
-            session._reference_of is not None and session.reference.done and session._wanted == 0 and not session._news
+            session._reference_of is not None
+            and session.reference.done
+            and session._wanted == 0
+            and not session._news
         ),
         60,
     )
@@ -223,20 +261,33 @@ def test_no_message_ends_the_view(view):
 
 @pytest.mark.claim("view-token")
 def test_a_page_chooses_no_code_to_run(view, tmp_path, monkeypatch):
-    """Who knows the token may choose what is built in and what the user named, and not import a file."""
+    """Who knows the token may choose what is built in and what the user
+    named, and not import a file.
+    """
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "evil.py").write_text("open('ran', 'w')\ndef fog(view, *, kernel=None):\n    return 1.0\n")
+    (tmp_path / "evil.py").write_text(
+        "open('ran', 'w')\ndef fog(view, *, kernel=None):\n    return 1.0\n"
+    )
     monkeypatch.syspath_prepend(str(tmp_path))
     session, page = view("open-fog", "unshadowed")
-    for choice in ({"method": "evil:fog"}, {"method": str(tmp_path / "evil.py:fog")}, {"kernel": "evil:fog"}):
+    for choice in (
+        {"method": "evil:fog"},
+        {"method": str(tmp_path / "evil.py:fog")},
+        {"kernel": "evil:fog"},
+    ):
         session.told(page, {"kind": "choose"} | choice)
         page.said.clear()
-        turns(session, lambda: any(said["kind"] == "mistake" and said["message"] for said in page.said))
+        turns(
+            session,
+            lambda: any(said["kind"] == "mistake" and said["message"] for said in page.said),
+        )
         assert not (tmp_path / "ran").exists()
     assert session._state().chosen == configuration("unshadowed")
 
 
-def test_a_shader_is_read_again_when_its_file_changes_and_a_mistake_leaves_the_picture(view, tmp_path):
+def test_a_shader_is_read_again_when_its_file_changes_and_a_mistake_leaves_the_picture(
+    view, tmp_path
+):
     need_opengl()
     shader = tmp_path / "fog.glsl"
     text = "#pragma airlight set GAIN 2.0\nvec3 airlight(Ray ray) { return vec3(GAIN * 0.1 * BRIGHT); }\n"
@@ -247,11 +298,21 @@ def test_a_shader_is_read_again_when_its_file_changes_and_a_mistake_leaves_the_p
         page.said.clear()
         drawn = len(page.frames)
         shader.write_text(text.replace("BRIGHT", bright))
-        turns(session, lambda: any(said["kind"] == "mistake" for said in page.said) and len(page.frames) > drawn, 60)
-        return page.last("mistake")["message"], session.live.on_host(session._shown).airlight[0, 0, 0]
+        turns(
+            session,
+            lambda: (
+                any(said["kind"] == "mistake" for said in page.said) and len(page.frames) > drawn
+            ),
+            60,
+        )
+        return page.last("mistake")["message"], session.live.on_host(session._shown).airlight[
+            0, 0, 0
+        ]
 
     assert write("nowhere") == (
-        f"method {shader}: fog.glsl, line 2: `nowhere' undeclared: {text.splitlines()[1]}".replace("BRIGHT", "nowhere"),
+        f"method {shader}: fog.glsl, line 2: `nowhere' undeclared: {text.splitlines()[1]}".replace(
+            "BRIGHT", "nowhere"
+        ),
         pytest.approx(0.3),
     )
     assert write("2.0") == ("", pytest.approx(0.6))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: images are compared layer by layer, those of clouds order by order, with failures by name."""
+"""Claim: images are compared layer by layer, those of clouds order by
+order, with failures by name.
+"""
 
 import json
 
@@ -39,7 +41,9 @@ def pair():
 
 def test_metrics_and_statistics_of_a_layer(pair):
     comparison = compare_images(*pair, margin=0.02)
-    assert comparison.metrics == error_metrics(pair[0].layers["airlight"], pair[1].layers["airlight"])
+    assert comparison.metrics == error_metrics(
+        pair[0].layers["airlight"], pair[1].layers["airlight"]
+    )
     assert comparison.statistics.tested == 9 * 12 * 3
     # The mean z of 324 values has the error 0.056; four of them.
     assert abs(comparison.statistics.z_mean) < 0.23
@@ -58,32 +62,49 @@ def test_failures_name_what_is_wrong(pair):
         "2 pixels are negative in the test image, the first in column 1, row 2",
         "the relative bias is not shown to be within +-0.01",
     )
-    assert comparison.metrics.relative_bias == pytest.approx(comparison.statistics.relative_bias, rel=1e-12)
+    assert comparison.metrics.relative_bias == pytest.approx(
+        comparison.statistics.relative_bias, rel=1e-12
+    )
     assert "NOT inside" in comparison.summary()
 
 
 def bounded(values, bound, kind="proven", **layers):
-    return Image({"airlight": values, "airlight_bound": bound, **layers}, attributes={"airlight:bound": kind})
+    return Image(
+        {"airlight": values, "airlight_bound": bound, **layers}, attributes={"airlight:bound": kind}
+    )
 
 
 def test_stated_errors_of_both_files_count_in_the_verdict_on_a_margin():
-    """By hand: a mean of 2 known to 0.02 and one of 2.02 known to 0.01; the bias of 1 % may be off by 0.01 + 0.0101."""
+    """By hand: a mean of 2 known to 0.02 and one of 2.02 known to 0.01; the bias of 1 % may
+    be off by 0.01 + 0.0101.
+    """
     reference, test = (np.full(SHAPE, value) for value in (2.0, 2.02))
-    files = bounded(reference, np.full(SHAPE, 0.02)), bounded(test, np.full(SHAPE, 0.01), "estimated")
+    files = (
+        bounded(reference, np.full(SHAPE, 0.02)),
+        bounded(test, np.full(SHAPE, 0.01), "estimated"),
+    )
     stated = compare_images(*files).stated
-    assert (stated.reference.kind, stated.test.kind, stated.kind) == ("proven", "estimated", "estimated")
+    assert (stated.reference.kind, stated.test.kind, stated.kind) == (
+        "proven",
+        "estimated",
+        "estimated",
+    )
     assert (stated.reference.value, stated.reference.error) == pytest.approx((2.0, 0.02))
     assert stated.bias_error == pytest.approx((0.01 + 0.02 * 1.01) / 1.98)
-    # The bias alone is within 2 %; with its error of 1.5 % it is within 2.6 % and not shown to be within 2.5 %.
+    # The bias alone is within 2 %; with its error of 1.5 % it is within 2.6 % and not
+    # shown to be within 2.5 %.
     assert compare_images(*files, margin=0.026).failures == ()
     words = "the relative bias is not shown to be within +-0.025"
     assert compare_images(*files, margin=0.025).failures == (words,)
-    # With noise of 0.1 % a pixel, 0.006 % of the image, the same bound counts on both sides of the interval.
+    # With noise of 0.1 % a pixel, 0.006 % of the image, the same bound counts on
+    # both sides of the interval.
     noisy = bounded(test, np.full(SHAPE, 0.01), "estimated", airlight_se=0.001 * test)
     assert compare_images(files[0], noisy, margin=0.027).failures == ()
     assert compare_images(files[0], noisy, margin=0.025).failures == (words,)
     assert (
-        compare_images(Image({"airlight": reference}), Image({"airlight": test, "airlight_se": 0.001 * test})).stated
+        compare_images(
+            Image({"airlight": reference}), Image({"airlight": test, "airlight_se": 0.001 * test})
+        ).stated
         is None
     )
 
@@ -93,7 +114,10 @@ def test_a_bound_that_says_nothing_decides_nothing(odd):
     """It is no number, negative, or larger than the reference."""
     values = np.full(SHAPE, 2.0)
     reference = bounded(values, np.full(SHAPE, odd))
-    for test in (Image({"airlight": values}), Image({"airlight": values, "airlight_se": 0.01 * values})):
+    for test in (
+        Image({"airlight": values}),
+        Image({"airlight": values, "airlight_se": 0.01 * values}),
+    ):
         compared = compare_images(reference, test, margin=0.5)
         assert compared.stated.bias_error is None
         assert len(compared.failures) == 1
@@ -116,7 +140,9 @@ def test_a_mask_from_a_file(pair, tmp_path):
     mask[3:5, :, 1] = 1
     for name, image in zip("abm", (*pair, Image({"total": mask}))):
         write_exr(tmp_path / f"{name}.exr", image)
-    comparison = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=read_mask(tmp_path / "m.exr"))
+    comparison = compare_files(
+        tmp_path / "a.exr", tmp_path / "b.exr", mask=read_mask(tmp_path / "m.exr")
+    )
     assert (comparison.metrics.pixels, comparison.masked) == (24, 84)
     total = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", layer="total")
     assert (total.statistics, total.metrics.pixels) == (None, 108)
@@ -150,10 +176,12 @@ def written(path, layers):
 
 def test_layers_that_both_have_are_compared_in_their_order(tmp_path):
     reference = written(
-        tmp_path / "a.exr", {"airlight": 2.0, "airlight_31_inf": 1.0, "airlight_3_4": 0.5, "airlight_1": 0.3}
+        tmp_path / "a.exr",
+        {"airlight": 2.0, "airlight_31_inf": 1.0, "airlight_3_4": 0.5, "airlight_1": 0.3},
     )
     mine = written(
-        tmp_path / "b.exr", {"airlight": 2.0, "airlight_31_inf": 1.5, "airlight_3_4": 0.4, "airlight_2": 9.0}
+        tmp_path / "b.exr",
+        {"airlight": 2.0, "airlight_31_inf": 1.5, "airlight_3_4": 0.4, "airlight_2": 9.0},
     )
     compared = compare_files(reference, mine)
     assert [each.layer for each in compared.orders] == ["airlight_3_4", "airlight_31_inf"]

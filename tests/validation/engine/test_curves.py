@@ -23,16 +23,24 @@ from airlight.validation.fog_model.view import EDGES
 
 def test_pq_has_the_values_of_its_standard():
     """SMPTE ST 2084: 10 000 cd/m^2 is 1, 100 cd/m^2 is 0.508, black is 7e-7."""
-    np.testing.assert_allclose(to_pq(np.array([0.0, 1.0, 100.0, 200.0]), 100.0), [0.0, 0.508078, 1.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(
+        to_pq(np.array([0.0, 1.0, 100.0, 200.0]), 100.0), [0.0, 0.508078, 1.0, 1.0], atol=1e-6
+    )
 
 
 def test_primaries_keep_white_and_are_those_of_their_standards():
-    """ITU-R BT.2087 has the matrix of Rec. 2020; the ACES documents have that of ACEScg, by Bradford's adaptation."""
+    """ITU-R BT.2087 has the matrix of Rec. 2020; the ACES documents have that of ACEScg,
+    by Bradford's adaptation.
+    """
     for matrix in PRIMARIES.values():
         np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-12)
     expected = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]]
     np.testing.assert_allclose(PRIMARIES["Rec. 2020"], expected, atol=6e-5)
-    expected = [[0.61310, 0.33952, 0.04738], [0.07019, 0.91635, 0.01345], [0.02062, 0.10957, 0.86981]]
+    expected = [
+        [0.61310, 0.33952, 0.04738],
+        [0.07019, 0.91635, 0.01345],
+        [0.02062, 0.10957, 0.86981],
+    ]
     np.testing.assert_allclose(PRIMARIES["ACEScg (AP1)"], expected, atol=1e-4)
     # SMPTE EG 432-1 has the same white; ACES 2065-1 has that of the ACES documents.
     expected = [[0.8225, 0.1775, 0.0], [0.0332, 0.9668, 0.0], [0.0171, 0.0724, 0.9105]]
@@ -46,7 +54,9 @@ def test_decoding_undoes_the_srgb_curve():
     np.testing.assert_allclose(from_srgb(to_srgb(values)), values, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("edge", "middle"), [("linear", 0.5), ("square", 0.25), ("smoothstep", 0.5)])
+@pytest.mark.parametrize(
+    ("edge", "middle"), [("linear", 0.5), ("square", 0.25), ("smoothstep", 0.5)]
+)
 def test_edges_of_spots_go_from_dark_to_full(edge, middle):
     np.testing.assert_allclose(EDGES[edge](np.array([0.0, 0.5, 1.0])), [0, middle, 1])
 
@@ -56,18 +66,26 @@ def test_tone_curves_are_their_formulas_by_hand():
     np.testing.assert_allclose(reinhard(x), [-1.0, 0.0, 1 / 3, 0.5])
     np.testing.assert_allclose(exponential(x), [0.0, 0.0, 1 - 1 / np.sqrt(np.e), 1 - 1 / np.e])
     # 0.5 (1.255 + 0.03)/(0.5 (1.215 + 0.59) + 0.14) = 0.6425/1.0425, and 2.54/3.16 at 1.
-    np.testing.assert_allclose(filmic(np.append(x, 1e6)), [0.0, 0.0, 0.6425 / 1.0425, 2.54 / 3.16, 1.0])
+    np.testing.assert_allclose(
+        filmic(np.append(x, 1e6)), [0.0, 0.0, 0.6425 / 1.0425, 2.54 / 3.16, 1.0]
+    )
     np.testing.assert_allclose(gamma(x, 2.0), [0.0, 0.0, np.sqrt(0.5), 1.0])
     # A quarter is 0.5371 of sRGB's curve, 136.96 of 255.
-    np.testing.assert_allclose(255 * srgb_in_8_bits(np.array([-1.0, 0.25, 1.0, 9.0])), [0, 137, 255, 255])
+    np.testing.assert_allclose(
+        255 * srgb_in_8_bits(np.array([-1.0, 0.25, 1.0, 9.0])), [0, 137, 255, 255]
+    )
     for name, curve in (("x/(1 + x)", reinhard), ("a filmic (ACES)", filmic)):
-        (encoded,) = (each for words, each in TONE_CURVES.items() if name in words and "then" in words)
+        (encoded,) = (
+            each for words, each in TONE_CURVES.items() if name in words and "then" in words
+        )
         np.testing.assert_allclose(encoded(x), to_srgb(curve(x)))
 
 
 @pytest.mark.parametrize(("curve", "grey"), [(blender_filmic, 0.5), (agx, 0.461)])
 def test_blenders_view_transforms_rise_over_their_stops_and_keep_greys(curve, grey):
-    """They have ten stops below middle grey and 6.5 above it; Blender writes it as 0.50 by Filmic and 0.46 by AgX."""
+    """They have ten stops below middle grey and 6.5 above it; Blender writes it as 0.50
+    by Filmic and 0.46 by AgX.
+    """
     np.testing.assert_allclose(curve(np.full((1, 3), 0.18)), grey, atol=5e-4)
     stops = np.linspace(-12.0, 8.0, 400)
     greys = curve(0.18 * 2.0 ** stops[:, None] * np.ones(3))

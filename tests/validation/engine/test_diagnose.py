@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Diagnoses name the fault that is injected, alone, with another, or none; also one in a renderer in NumPy."""
+"""Diagnoses name the fault that is injected, alone, with another, or none; also
+one in a renderer in NumPy.
+"""
 
 import importlib
 import itertools
@@ -66,9 +68,15 @@ def test_an_injected_fault_comes_first(reference, injected):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
-def test_an_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
-    """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
+@pytest.mark.parametrize(
+    "words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"]
+)
+def test_an_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(
+    reference, words
+):
+    """The images of the test above have no noise, and it says that their pixels are
+    centres: an engine says neither.
+    """
     (injected,) = (each for each in INJECTED if each.words == words)
     noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
     assert diagnosed(injected.image(reference) * noise, pixel=None).first == injected.name
@@ -113,10 +121,14 @@ def test_pixels_that_share_their_errors_count_as_fewer(reference):
 
     def explanation(errors):
         errors = np.repeat(errors.reshape(-1, 1), 3, axis=1)
-        return Explanation((), (), Guess(scene_fog(reference)), errors, lit, float(np.abs(errors).mean()))
+        return Explanation(
+            (), (), Guess(scene_fog(reference)), errors, lit, float(np.abs(errors).mean())
+        )
 
     white = explanation(0.02 * generator.standard_normal((height, width)))
-    shared = explanation(np.kron(0.02 * generator.standard_normal((height // 4, width // 4)), np.ones((4, 4))))
+    shared = explanation(
+        np.kron(0.02 * generator.standard_normal((height // 4, width // 4)), np.ones((4, 4)))
+    )
     assert blocks.is_noise(white)
     assert not blocks.is_noise(shared)
     assert blocks.area(white.errors, lit) == pytest.approx(1, abs=0.3)
@@ -127,7 +139,9 @@ def test_pixels_that_share_their_errors_count_as_fewer(reference):
 @pytest.mark.parametrize("noise", [0.01, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_no_fault_is_named_for_a_right_image(reference, noise):
     generator = np.random.default_rng(3)
-    diagnosis = diagnosed(total(reference) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
+    diagnosis = diagnosed(
+        total(reference) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1)))
+    )
     assert diagnosis.first == "right"
     assert diagnosis.explained
 
@@ -135,11 +149,15 @@ def test_no_fault_is_named_for_a_right_image(reference, noise):
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-injected")
 def test_an_explanation_that_ends_where_a_simpler_one_is_is_that_one(variant):
-    """Height fog with a scale height of kilometres is an extinction, though its number fits errors of an engine."""
+    """Height fog with a scale height of kilometres is an extinction, though its number
+    fits errors of an engine.
+    """
     loaded = load_scene("open-fog", SIZE)
     own = read_reference(loaded.scene)
     height = np.linspace(-1, 1, SIZE[1])[:, None, None]
-    image = total(replace(own, medium=replace(own.medium, sigma_t=1.332 * own.medium.sigma_t))) * (1 + 0.003 * height)
+    image = total(replace(own, medium=replace(own.medium, sigma_t=1.332 * own.medium.sigma_t))) * (
+        1 + 0.003 * height
+    )
     diagnosis = diagnose_image(Image({"total": image}), loaded, layer="total", pixel="centre")
     assert diagnosis.first == "extinction"
     assert diagnosis.ranked[0].parameters[0] == pytest.approx(1.332, rel=0.01)
@@ -160,7 +178,8 @@ def holed(image):
 
 @pytest.mark.claim("diagnosis-right")
 @pytest.mark.parametrize(
-    ("change", "words"), [(marked_image, "10 of 768 pixels"), (holed, "pixels, in columns 20 to 20 and rows 5 to 7")]
+    ("change", "words"),
+    [(marked_image, "10 of 768 pixels"), (holed, "pixels, in columns 20 to 20 and rows 5 to 7")],
 )
 def test_few_wrong_pixels_are_said_and_never_nothing(reference, change, words):
     """The comparison calls the image wrong: the diagnosis may not say that nothing is."""
@@ -187,10 +206,15 @@ def test_the_diagnosis_remembers_what_the_reader_of_the_file_said(reference):
 
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-two")
-@pytest.mark.parametrize("curve", [to_srgb, lambda x: to_srgb(x / (1 + x))], ids=["sRGB", "x/(1+x), sRGB"])
+@pytest.mark.parametrize(
+    "curve", [to_srgb, lambda x: to_srgb(x / (1 + x))], ids=["sRGB", "x/(1+x), sRGB"]
+)
 def test_an_exposure_before_a_curve_is_named_with_it(reference, curve):
     diagnosis = diagnosed(curve(40 * total(reference)))
-    assert diagnosis.ranked[0].together == ("factor", "transfer" if curve is to_srgb else "tone-map")
+    assert diagnosis.ranked[0].together == (
+        "factor",
+        "transfer" if curve is to_srgb else "tone-map",
+    )
     assert diagnosis.ranked[0].parameters[0] == pytest.approx(40, rel=0.01)
     assert diagnosis.explained
 
@@ -198,7 +222,9 @@ def test_an_exposure_before_a_curve_is_named_with_it(reference, curve):
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-two")
 def test_two_faults_of_different_kinds_are_both_named(reference):
-    denser = replace(reference, medium=replace(reference.medium, sigma_t=1.6 * reference.medium.sigma_t))
+    denser = replace(
+        reference, medium=replace(reference.medium, sigma_t=1.6 * reference.medium.sigma_t)
+    )
     both = diagnosed(0.7 * total(denser))
     assert {row.name for row in both.ranked[:2]} == {"extinction", "factor"}
     assert both.ranked[0].together == ("extinction", "factor")
@@ -217,7 +243,9 @@ LARGER = (64, 48)
 
 @pytest.fixture(scope="module")
 def scenes(variant, tmp_path_factory):
-    """By what is right, the scene that the renderer shows, and its light, which all images share."""
+    """By what is right, the scene that the renderer shows, and its
+    light, which all images share.
+    """
 
     def scene(engine):
         path = tmp_path_factory.mktemp("engine") / "scene.xml"
@@ -229,10 +257,14 @@ def scenes(variant, tmp_path_factory):
 
 
 def usual_seed(noise, number):
-    """Return a seed whose noise the diagnosis takes for noise; of one draw in thirty it says that more is left."""
+    """Return a seed whose noise the diagnosis takes for noise; of one draw in thirty
+    it says that more is left.
+    """
     for seed in itertools.count(number, len(numpy_faults.CASES)):
         errors = np.repeat(numpy_faults.relative_noise(noise, seed), 3, axis=2)
-        alone = SimpleNamespace(errors=errors.reshape(-1, 3), lit=np.ones((errors[..., 0].size, 3), bool))
+        alone = SimpleNamespace(
+            errors=errors.reshape(-1, 3), lit=np.ones((errors[..., 0].size, 3), bool)
+        )
         if all_blocks(*errors.shape[:2]).is_noise(alone):
             return seed
 
@@ -240,7 +272,9 @@ def usual_seed(noise, number):
 def named(scenes, number, noise=0.01):
     engine, injected, _, given = numpy_faults.CASES[number]
     loaded, light = scenes[engine]
-    image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=usual_seed(noise, number))
+    image = numpy_faults.rendered(
+        replace(engine, **given), area=False, noise=noise, seed=usual_seed(noise, number)
+    )
     return injected, diagnose_image(Image({"total": image}), loaded, light=light)
 
 
@@ -265,13 +299,19 @@ def test_the_fog_alone_is_too_bright(scenes):
 
 @pytest.mark.claim("diagnosis-injected")
 def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
-    """Of 19 200 pixels 240 are at the largest value; 352 are looked at, and chance had two of the 240 among them."""
+    """Of 19 200 pixels 240 are at the largest value; 352 are looked at, and chance had
+    two of the 240 among them.
+    """
     scene = load_scene("open-fog", (160, 120)).scene
     values = np.random.default_rng(3).random((120, 160, 3))
-    whole, _ = seen_image(Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene)
+    whole, _ = seen_image(
+        Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene
+    )
     assert not len(whole.cut_off)
     values[40:50, 70:94] = 1.0
-    seen, _ = seen_image(Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene)
+    seen, _ = seen_image(
+        Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene
+    )
     pixels, before = (replace(each, area=True).view().pixels for each in (seen, whole))
     added = np.setdiff1d(pixels, before)
     assert len(seen.cut_off) == 240
@@ -281,11 +321,15 @@ def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
 
 
 def test_a_place_is_found_where_pixels_are_lit_or_dark():
-    """Each pixel is wrong by all of its light while the light is further from its place than the shadow is wide."""
+    """Each pixel is wrong by all of its light while the light is further from its place
+    than the shadow is wide.
+    """
     true, widths = np.array([0.05, -0.07, 0.05]), np.linspace(0.004, 0.3, 100)
 
     def errors(place):
-        return np.repeat((widths < np.linalg.norm(np.array(place) - true))[:, None], 3, axis=1).astype(float)
+        return np.repeat(
+            (widths < np.linalg.norm(np.array(place) - true))[:, None], 3, axis=1
+        ).astype(float)
 
     place_of = Fault("place", "", lambda predictor, guess, p: p, PLACE)
     search = _Search(SimpleNamespace(fog=None, errors=errors), (place_of,))

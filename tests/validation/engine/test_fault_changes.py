@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: each fault of the medium, the lights and the values makes of a guess what its words say."""
+"""Claim: each fault of the medium, the lights and the values makes of a
+guess what its words say.
+"""
 
 import math
 from dataclasses import replace
@@ -59,7 +61,8 @@ def test_optics_by_hand(words, values, sigma_t, albedo):
     fog = changed(fault(words), *values).fog
     assert fog.sigma_t[0] == pytest.approx(sigma_t)
     assert fog.albedo[0] == pytest.approx(albedo, abs=1e-5)
-    assert (fog.sigma_t[1], fog.albedo[1]) == (FOG.sigma_t[1], FOG.albedo[1])  # nothing stays nothing
+    # nothing stays nothing
+    assert (fog.sigma_t[1], fog.albedo[1]) == (FOG.sigma_t[1], FOG.albedo[1])
 
 
 def test_phase_functions_are_normalised_and_have_their_shapes():
@@ -72,7 +75,9 @@ def test_phase_functions_are_normalised_and_have_their_shapes():
     }
     for words, at_half in laws.items():
         law = changed(fault(words)).fog.phase[0]
-        assert quad(lambda c, law=law: float(law(np.array(c))), -1, 1, points=[0])[0] / 2 == pytest.approx(1)
+        assert quad(lambda c, law=law: float(law(np.array(c))), -1, 1, points=[0])[
+            0
+        ] / 2 == pytest.approx(1)
         if at_half is not None:
             assert float(law(np.array(0.5))) == pytest.approx(at_half)
     k = 1.55 * 0.3 - 0.55 * 0.027
@@ -124,12 +129,16 @@ def test_the_medium_begins_and_ends_at_planes_and_distances():
         assert (fog.near, fog.far, fog.spherical) == expected
     view = SimpleNamespace(
         distance=np.array([*np.arange(11.0), np.inf]),
-        reference=SimpleNamespace(lights=(SimpleNamespace(position=np.array([0.0, 3.0, 4.0])),), origin=np.zeros(3)),
+        reference=SimpleNamespace(
+            lights=(SimpleNamespace(position=np.array([0.0, 3.0, 4.0])),), origin=np.zeros(3)
+        ),
     )
     ends = fault("the fog ends", "at a plane").begin(SimpleNamespace(view=view), Guess(FOG))
     assert ends == [pytest.approx((9 * part,)) for part in (0.9, 0.6, 0.35)]
     view.distance = np.array([np.inf])
-    assert fault("the fog ends", "at a plane").begin(SimpleNamespace(view=view), Guess(FOG))[0] == (9.0,)
+    assert fault("the fog ends", "at a plane").begin(SimpleNamespace(view=view), Guess(FOG))[0] == (
+        9.0,
+    )
 
 
 def test_depths_are_taken_for_distances_where_the_words_say():
@@ -150,15 +159,23 @@ def test_height_fog_by_hand():
     assert layers("a falloff was asked for") == [(1.0, 2.0, 0.25), (0.5, -1.0, 0.125)]
     half = [(1.0, 2.0, pytest.approx(4 / math.log(2))), (0.5, -1.0, pytest.approx(8 / math.log(2)))]
     assert layers("densities halve") == half
-    doubled = [(1.0, 2.0, pytest.approx(4 * math.log(2))), (0.5, -1.0, pytest.approx(8 * math.log(2)))]
+    doubled = [
+        (1.0, 2.0, pytest.approx(4 * math.log(2))),
+        (0.5, -1.0, pytest.approx(8 * math.log(2))),
+    ]
     assert layers("ln 2 times") == doubled
     assert layers("bases of layers are", values=(1.5,)) == [(1.0, 3.5, 4.0), (0.5, 0.5, 8.0)]
     assert layers("and bases {1", values=(0.5, 1.5)) == [(1.0, 3.5, 2.0), (0.5, 0.5, 4.0)]
     assert changed(fault("layers are clamped"), fog=LAYERED).fog.height.clamped
     even = changed(fault("the fog is homogeneous"), 0.2, fog=LAYERED).fog
-    assert (even.sigma_t, even.height.density([-5.0, 9.0]).tolist()) == (((0.2, 0.2, 0.2),), [1.0, 1.0])
+    assert (even.sigma_t, even.height.density([-5.0, 9.0]).tolist()) == (
+        ((0.2, 0.2, 0.2),),
+        [1.0, 1.0],
+    )
     lights = (SimpleNamespace(position=np.array([0.0, 0.0, 2.0])),)
-    predictor = SimpleNamespace(reference=SimpleNamespace(origin=np.array([5.0, 5.0, -1.0]), lights=lights))
+    predictor = SimpleNamespace(
+        reference=SimpleNamespace(origin=np.array([5.0, 5.0, -1.0]), lights=lights)
+    )
     # Densities 1 + 0.5 exp(-3/8) at the lamp, exp(3/4) + 0.5 at the camera.
     mean = (1 + 0.5 * math.exp(-3 / 8) + math.exp(3 / 4) + 0.5) / 2
     begun = fault("the fog is homogeneous").begin(predictor, Guess(LAYERED))
@@ -173,7 +190,9 @@ def test_light_by_distance_is_what_the_words_say():
         assert found is not None
         return found(r)
 
-    np.testing.assert_allclose(window("(r^2 + e)", "softened", values=(1.0,)), [0.2, 0.5, 0.8, 25 / 26])
+    np.testing.assert_allclose(
+        window("(r^2 + e)", "softened", values=(1.0,)), [0.2, 0.5, 0.8, 25 / 26]
+    )
     disk = 2 / (r**2 + 4 + r * np.sqrt(r**2 + 4))
     np.testing.assert_allclose(window("that of a disk", values=(2.0,)) / r**2, disk)
     ended = np.array([0.2, 0.5, 0.8, 0.0]) * (1 - np.minimum(r / 4, 1) ** 4) ** 2
@@ -202,9 +221,9 @@ def test_spots_and_places_are_those_of_the_scenery():
     assert changed(fault("3 x^2 - 2 x^3")).scenery.edge == "smoothstep"
     assert changed(fault("Blender's with a blend"), 0.4).scenery.blend == 0.4
     assert changed(fault("are spheres of the radius"), 0.4).scenery.radius == 0.4
-    assert changed(fault("the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m"), 1.0, -2.0, 0.5).scenery.moved == (
-        (1.0, -2.0, 0.5),
-    )
+    assert changed(
+        fault("the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m"), 1.0, -2.0, 0.5
+    ).scenery.moved == ((1.0, -2.0, 0.5),)
 
 
 def test_a_light_whose_shadows_are_held_moves_its_fog_alone():
@@ -212,7 +231,9 @@ def test_a_light_whose_shadows_are_held_moves_its_fog_alone():
     held = position_held(lamp, Guess(FOG), (1.0, 2.0, 3.0), (0.5, 2.0, 2.0))
     assert held.scenery.moved == ((0.5, 2.0, 2.0),)
     assert held.fog.moved == ((0.5, 0.0, 1.0), (0.0, 0.0, 0.0))
-    spot = SimpleNamespace(reference=SimpleNamespace(lights=(SimpleNamespace(axis=np.array([0.0, 0.0, -1.0])),)))
+    spot = SimpleNamespace(
+        reference=SimpleNamespace(lights=(SimpleNamespace(axis=np.array([0.0, 0.0, -1.0])),))
+    )
     held = position_held(spot, Guess(FOG), (1.0, 2.0, 3.0), (0.5, 2.0, 2.0))
     assert held.scenery.moved == ((1.0, 2.0, 3.0),)
     assert held.fog.moved == FOG.moved
@@ -230,16 +251,29 @@ def test_values_and_the_camera_by_hand():
     np.testing.assert_allclose(values("a black level", numbers=(0.5,)), colours + 0.5)
     np.testing.assert_allclose(values("a gamma of", numbers=(2.0,)), np.sqrt(colours))
     seen = SimpleNamespace(values=np.array([[1.5, np.nan, 0.3]]))
-    np.testing.assert_allclose(values("cut off at", predictor=SimpleNamespace(seen=seen)), np.minimum(colours, 1.5))
+    np.testing.assert_allclose(
+        values("cut off at", predictor=SimpleNamespace(seen=seen)), np.minimum(colours, 1.5)
+    )
     cosines = SimpleNamespace(cosines=np.array([1.0, 0.5]))
     fallen = values("a vignette", numbers=(2.0,), predictor=cosines)
     np.testing.assert_allclose(fallen, colours * [[1.0], [0.25]])
-    exposed = changed(fault("the image is {0:.4g} times as bright"), 3.0, fog=replace(FOG, exposure=(1.0, 2.0, 1.0)))
+    exposed = changed(
+        fault("the image is {0:.4g} times as bright"),
+        3.0,
+        fog=replace(FOG, exposure=(1.0, 2.0, 1.0)),
+    )
     assert exposed.fog.exposure == (3.0, 6.0, 3.0)
-    assert changed(fault("the image is {0:.3g} pixels too far right"), 0.5, -1.25).scenery.offset == (-0.5, 1.25)
+    assert changed(
+        fault("the image is {0:.3g} pixels too far right"), 0.5, -1.25
+    ).scenery.offset == (-0.5, 1.25)
     oblong = SimpleNamespace(shape=(30, 40))
-    assert changed(fault("of the other axis"), predictor=oblong).scenery.zoom == pytest.approx(4 / 3)
-    assert changed(fault("the image shows {0:.4g} times the width that it should"), 1.25).scenery.zoom == 1.25
+    assert changed(fault("of the other axis"), predictor=oblong).scenery.zoom == pytest.approx(
+        4 / 3
+    )
+    assert (
+        changed(fault("the image shows {0:.4g} times the width that it should"), 1.25).scenery.zoom
+        == 1.25
+    )
     image = np.arange(12.0).reshape(2, 2, 3)
     assert (changed(fault("interchanged")).undo(image) == image.transpose(1, 0, 2)).all()
     assert (changed(fault("mirrored")).undo(image) == image[:, ::-1]).all()
@@ -271,11 +305,14 @@ def test_ranges_of_numbers_hold_their_starts_and_what_changes_nothing():
     for each in FAULTS:
         for number in each.parameters:
             assert all(number.low <= start <= number.high for start in number.starts), each.words
-            # A factor of 1 and an amount of 0 change nothing; an edge without a blend is another fault.
+            # A factor of 1 and an amount of 0 change nothing; an edge without
+            # a blend is another fault.
             nothing = 1.0 if number.scale == "log" else 0.0
             assert number.low <= nothing <= number.high or "blend" in each.words, each.words
             # Several numbers are looked for together from one place: where nothing is changed.
-            assert len(each.parameters) == 1 or each.begin or number.starts == (nothing,), each.words
+            assert len(each.parameters) == 1 or each.begin or number.starts == (nothing,), (
+                each.words
+            )
             assert "g {0" not in each.words or -1 < number.low < number.high < 1
 
 
@@ -302,14 +339,20 @@ def test_the_colour_of_ambient_light_is_what_most_of_the_fog_has_too_much():
     more = opacity * np.array([2.0, -1.0, 0.5])
     more[0] = 99.0  # a tenth of the opacity does not decide
     predictor = SimpleNamespace(
-        transmittance=lambda guess: 1 - opacity, shown=lambda guess: 1 + more, predicted=lambda guess: np.ones((4, 3))
+        transmittance=lambda guess: 1 - opacity,
+        shown=lambda guess: 1 + more,
+        predicted=lambda guess: np.ones((4, 3)),
     )
     assert fault("ambient light").begin(predictor, Guess(FOG)) == [pytest.approx((2.0, 0.0, 0.5))]
 
 
 def test_a_factor_on_the_fog_or_on_surfaces_begins_where_it_explains_what_is_left():
-    assert changed(fault("the fog is {0:.4g} times as bright"), 3.0).fog == replace(FOG, airlight=(3.0, 3.0))
-    assert changed(fault("surfaces are {0:.4g} times as bright"), 3.0).fog == replace(FOG, surface=(3.0, 3.0))
+    assert changed(fault("the fog is {0:.4g} times as bright"), 3.0).fog == replace(
+        FOG, airlight=(3.0, 3.0)
+    )
+    assert changed(fault("surfaces are {0:.4g} times as bright"), 3.0).fog == replace(
+        FOG, surface=(3.0, 3.0)
+    )
     one = scaled("intensity", (1,))(None, Guess(FOG), (3.0,))
     assert one.fog.intensity == (2.0, 9.0)
     part = np.array([4.0, 3.0, 2.0, 1.0, 0.0])
@@ -317,7 +360,9 @@ def test_a_factor_on_the_fog_or_on_surfaces_begins_where_it_explains_what_is_lef
         predicted=lambda guess: 1 + guess.fog.airlight[0] * part,
         shown=lambda guess: 1 + np.array([2.5, 2.5, 2.5, 9.0, 7.0]) * part,
     )
-    assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [pytest.approx((2.5,))]
+    assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [
+        pytest.approx((2.5,))
+    ]
     part[:] = 0
     assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [(1.0,)]
 
@@ -327,7 +372,9 @@ def test_higher_orders_are_the_light_beyond_one_scattering_smoothed(monkeypatch)
 
     def batch(reference, seed, paths, *, max_depth):
         asked.append((seed, max_depth))
-        layers = np.arange(1.0, 1 + len(prediction.LAYERS))[:, None, None] * np.ones((1, 12 * 16, 3))
+        layers = np.arange(1.0, 1 + len(prediction.LAYERS))[:, None, None] * np.ones(
+            (1, 12 * 16, 3)
+        )
         return SimpleNamespace(mean=layers * {64: 5.0, 2: 3.0}[max_depth])
 
     monkeypatch.setattr(prediction, "volpath_batch", batch)

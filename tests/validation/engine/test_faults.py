@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: faults of single lights and classes of lights are said of those; faults that a scene cannot have are not."""
+"""Claim: faults of single lights and classes of lights are said of those; faults that a
+scene cannot have are not.
+"""
 
 from collections import defaultdict
 from types import SimpleNamespace
@@ -29,7 +31,10 @@ def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
     scene = read_reference(mi.load_dict(bounded))
 
     def words_of(reference):
-        return [fault.words.format(1.5) for fault in faults_of(SimpleNamespace(reference=reference))[len(FAULTS) :]]
+        return [
+            fault.words.format(1.5)
+            for fault in faults_of(SimpleNamespace(reference=reference))[len(FAULTS) :]
+        ]
 
     words = words_of(scene)
     assert "point and spot lights are 1.5 times as bright as they should be" in words
@@ -37,13 +42,20 @@ def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
         assert f"the light '{name}' is 1.5 times as bright as it should be" in words
         assert f"the fog of the light '{name}' is 1.5 times as bright as it should be" in words
         assert f"nothing casts a shadow in the light of the light '{name}'" in words
-        assert f"nothing casts a shadow in the light of the light '{name}' in the fog, on surfaces it does" in words
-    assert len(words) == 4 * 4  # the sun is the only directional light: it has its name and is looked at once
-    assert words_of(read_reference(mi.load_dict(tiny_scene()))) == []  # one light: the brightness of the whole
+        assert (
+            f"nothing casts a shadow in the light of the light '{name}' in the fog, on surfaces it "
+            "does" in words
+        )
+    # the sun is the only directional light: it has its name and is looked at once
+    assert len(words) == 4 * 4
+    # one light: the brightness of the whole
+    assert words_of(read_reference(mi.load_dict(tiny_scene()))) == []
     monkeypatch.setattr(faults, "_MANY_LIGHTS", 2)
     among_many = words_of(scene)
     assert len(among_many) == 4 * 2
-    assert {words for words in among_many if "'" in words} == {words for words in words if "'sun'" in words}
+    assert {words for words in among_many if "'" in words} == {
+        words for words in words if "'sun'" in words
+    }
 
 
 def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
@@ -55,7 +67,9 @@ def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
 
 
 def test_traits_of_a_scene_and_its_image_by_hand():
-    """A lamp, a soft and a hard spot over a ball in fog of Henyey and Greenstein's function, seen in 4 x 3 pixels."""
+    """A lamp, a soft and a hard spot over a ball in fog of Henyey and Greenstein's
+    function, seen in 4 x 3 pixels.
+    """
     lights = (
         SimpleNamespace(axis=None),
         SimpleNamespace(axis=(0, 0, -1), beam=0.2, cutoff=0.3),
@@ -63,7 +77,16 @@ def test_traits_of_a_scene_and_its_image_by_hand():
     )
     values = np.random.default_rng(1).uniform(1, 2, (12, 3))
 
-    def found(*, lights=lights, shapes=("ball",), media=(), holds="total", values=values, shape=(3, 4), **fog):
+    def found(
+        *,
+        lights=lights,
+        shapes=("ball",),
+        media=(),
+        holds="total",
+        values=values,
+        shape=(3, 4),
+        **fog,
+    ):
         phase = SimpleNamespace(is_constant=True)
         reference = SimpleNamespace(
             lights=lights,
@@ -83,7 +106,17 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         )
         return {name for name, there in traits(predictor).items() if there}
 
-    usual = {"shapes", "lamps", "point lights", "spots", "soft spots", "no bounds", "even fog", "fog", "all light"}
+    usual = {
+        "shapes",
+        "lamps",
+        "point lights",
+        "spots",
+        "soft spots",
+        "no bounds",
+        "even fog",
+        "fog",
+        "all light",
+    }
     usual |= {"both", "absorption", "lobes", "g", "oblong", "colours", "more light"}
     assert found() == usual
     assert found(holds="airlight") == usual - {"all light", "both"}
@@ -96,18 +129,25 @@ def test_traits_of_a_scene_and_its_image_by_hand():
     assert found(lights=lights[:1]) == usual - {"spots", "soft spots"}
     assert found(lights=lights[1:]) == usual - {"point lights"}
     assert found(lights=lights[2:]) == usual - {"point lights", "soft spots"}
-    assert found(media=(SimpleNamespace(phase=SimpleNamespace(is_constant=False)),)) == usual - {"no bounds"}
+    assert found(media=(SimpleNamespace(phase=SimpleNamespace(is_constant=False)),)) == usual - {
+        "no bounds"
+    }
     assert found(shape=(6, 2)) == usual
     assert found(shape=(4, 4)) == usual - {"oblong"} | {"square"}
     assert found(values=values[:, :1] * np.ones(3)) == usual - {"colours"}
     assert found(values=np.minimum(values, 1.5)) == usual | {"stop"}
     for clamped, name in ((True, "clamped layers"), (False, "rising layers")):
-        assert found(height=HeightFog(constant=1.0, clamped=clamped)) == usual - {"even fog"} | {"height fog", name}
+        assert found(height=HeightFog(constant=1.0, clamped=clamped)) == usual - {"even fog"} | {
+            "height fog",
+            name,
+        }
 
 
 def test_pairs_have_faults_of_two_kinds_in_the_order_in_which_they_happen():
     def fault(kind, *steps):
-        return Fault("name", "words", None, tuple(Number(0.0, 1.0, step=step) for step in steps), kind=kind)
+        return Fault(
+            "name", "words", None, tuple(Number(0.0, 1.0, step=step) for step in steps), kind=kind
+        )
 
     extinction, curve = fault("medium", 0.0), fault("values")
     lamp, shift = fault("light", 0.0), fault("camera", 0.1, 0.1)
@@ -138,5 +178,6 @@ def test_pixels_are_paired_with_their_neighbours_in_the_next_columns():
     # All pixels of 3 x 4: none of the last column has a next one.
     assert pairs(range(12), 4, 12) == [[0, 1, 2, 4, 5, 6, 8, 9, 10], [1, 2, 3, 5, 6, 7, 9, 10, 11]]
     # Some of many: pixels of the same row, so far apart that their errors are their own.
-    assert pairs([0, 1, APART, APART + 1, 8 - APART, 8], 8, 99) == [[0, 1], [2, 3]]  # 8 is in another row
+    # 8 is in another row
+    assert pairs([0, 1, APART, APART + 1, 8 - APART, 8], 8, 99) == [[0, 1], [2, 3]]
     assert pairs([0, 5], 12, 99) == [[], []]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of engines are found and compared with the reference of their pixels; hints say what looks wrong."""
+"""Images of engines are found and compared with the reference of their pixels;
+hints say what looks wrong.
+"""
 
 import math
 from types import SimpleNamespace
@@ -22,7 +24,12 @@ from airlight.validation.engine.images import (
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.timing import Timing
 
-SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
+SCENES = {
+    "open-fog": "open-fog",
+    "hall": "hall",
+    "hall.small": "hall.small",
+    "mine": "folder/mine.xml",
+}
 SHAPE = (4, 6, 3)
 RANDOM = np.random.default_rng(5)
 AIRLIGHT, SURFACE = RANDOM.uniform(0.5, 2, SHAPE), RANDOM.uniform(0, 3, SHAPE)
@@ -43,7 +50,13 @@ def written(folder, name, **layers):
 
 
 def test_files_are_found_by_the_name_of_their_scene(tmp_path):
-    for name in ("open-fog.exr", "hall.godot.exr", "hall.unreal 5.4.exr", "hall.small.exr", "mine.EXR"):
+    for name in (
+        "open-fog.exr",
+        "hall.godot.exr",
+        "hall.unreal 5.4.exr",
+        "hall.small.exr",
+        "mine.EXR",
+    ):
         written(tmp_path, "x.exr").rename(tmp_path / name)
     (tmp_path / "notes.txt").write_text("not an image")
     images = find_images(tmp_path, SCENES)
@@ -68,7 +81,10 @@ def test_images_of_a_scene_have_one_size(tmp_path):
 
 def measured(path, *, surfaces=True):
     return measure_image(
-        EngineImage("hall", "godot", path), load_scene("hall", (6, 4)), reference_of, surfaces=surfaces
+        EngineImage("hall", "godot", path),
+        load_scene("hall", (6, 4)),
+        reference_of,
+        surfaces=surfaces,
     )
 
 
@@ -80,14 +96,22 @@ def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
     assert judged.comparison.metrics.relative_bias == pytest.approx(0.1, abs=1e-7)
     assert not judged.verdict.right
     assert surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
-    np.testing.assert_allclose(layers["airlight"] + layers["surface"], 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
+    np.testing.assert_allclose(
+        layers["airlight"] + layers["surface"], 1.1 * AIRLIGHT + SURFACE, rtol=1e-6
+    )
     assert measured(path, surfaces=False)[2] is None
 
 
 def test_a_file_without_any_light_is_refused(variant, tmp_path):
     path = written(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
-    for refused in (lambda: measured(path), lambda: images_size((EngineImage("hall", "godot", path),))):
-        with pytest.raises(InputError, match="has no channels R, G, B and no layer 'airlight'; it has beauty, matte"):
+    for refused in (
+        lambda: measured(path),
+        lambda: images_size((EngineImage("hall", "godot", path),)),
+    ):
+        with pytest.raises(
+            InputError,
+            match="has no channels R, G, B and no layer 'airlight'; it has beauty, matte",
+        ):
             refused()
 
 
@@ -105,9 +129,14 @@ def test_colours_in_integers_are_refused_by_name(tmp_path):
 def test_the_reference_that_fits_is_taken(variant, tmp_path):
     for pixel in ("centre", "area"):
         reference = reference_of(pixel)
-        path = written(tmp_path, f"{pixel}.exr", total=0.999 * (reference.airlight + reference.surface))
+        path = written(
+            tmp_path, f"{pixel}.exr", total=0.999 * (reference.airlight + reference.surface)
+        )
         judged, *_ = measured(path)
-        assert (judged.pixel, "means over the areas" in notes_of(judged, None)) == (pixel, pixel == "area")
+        assert (judged.pixel, "means over the areas" in notes_of(judged, None)) == (
+            pixel,
+            pixel == "area",
+        )
         assert judged.comparison.metrics.relative_bias == pytest.approx(-0.001, abs=1e-6)
         np.testing.assert_array_equal(judged.layers.airlight, reference.airlight)
 
@@ -115,7 +144,9 @@ def test_the_reference_that_fits_is_taken(variant, tmp_path):
 def test_an_engine_says_how_long_its_images_took(variant, tmp_path):
     path = written(tmp_path, "hall.godot.exr")
     assert image_times(path) is None
-    (tmp_path / TIMES).write_text('{"hall.godot.exr": {"ms": 3.1, "quartiles": [2.9, 3.4], "device": "a card"}}')
+    (tmp_path / TIMES).write_text(
+        '{"hall.godot.exr": {"ms": 3.1, "quartiles": [2.9, 3.4], "device": "a card"}}'
+    )
     times = image_times(path)
     assert times == (Timing(3.1, 2.9, 3.4, 0), "a card")
     assert "timed on a card" in notes_of(measured(path)[0], times)
@@ -156,7 +187,10 @@ def test_the_right_image_raises_no_suspicion(pattern):
         (lambda image: image[:, ::-1], ["mirrored left to right"]),
         (lambda image: image[..., ::-1], ["channel order B, G, R"]),
         (srgb, ["sRGB curve"]),
-        (lambda image: math.pi * image, ["3.142 times as bright as it should be (pi), +1.65 stops"]),
+        (
+            lambda image: math.pi * image,
+            ["3.142 times as bright as it should be (pi), +1.65 stops"],
+        ),
         (lambda image: image / (4 * math.pi), ["(1/(4 pi)), -3.65 stops"]),
         (lambda image: 683 * image, ["683, lumens a watt"]),
         (lambda image: 4 * math.pi * image[::-1], ["upside down", "(4 pi), +3.65 stops"]),
@@ -181,14 +215,20 @@ def test_best_factor_is_the_median_of_the_ratios_of_lit_values(pattern):
     noisy[2:4] = 0
     hints = find_hints(pattern, noisy)
     lit = (noisy > 0) & (pattern > 1e-3 * pattern.mean())
-    np.testing.assert_allclose(hints.factor, np.exp(np.median(np.log(pattern[lit] / noisy[lit]))), rtol=1e-12)
-    np.testing.assert_allclose(hints.factor_rmse, relative_rmse(pattern, hints.factor * noisy), rtol=1e-12)
+    np.testing.assert_allclose(
+        hints.factor, np.exp(np.median(np.log(pattern[lit] / noisy[lit]))), rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        hints.factor_rmse, relative_rmse(pattern, hints.factor * noisy), rtol=1e-12
+    )
 
 
 @pytest.mark.claim("engine-suspects")
 @pytest.mark.parametrize("fault", [0, 50, np.inf])
 def test_one_pixel_decides_nothing(pattern, fault):
-    """The least squares were 0.001 times the image where one pixel beside a lamp was a thousand times too bright."""
+    """The least squares were 0.001 times the image where one pixel beside a lamp was a
+    thousand times too bright.
+    """
     image = pattern.copy()
     image[5, 6] *= fault
     hints = find_hints(pattern, image)

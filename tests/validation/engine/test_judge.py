@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: an image of an engine is compared with the right layer of the reference, and called right where it is."""
+"""Claim: an image of an engine is compared with the right layer of the reference, and
+called right where it is.
+"""
 
 import re
 
@@ -14,7 +16,12 @@ from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import EngineImage, measure_image
 from airlight.validation.engine.judge import Verdict, compare_scene, judge, references
 from airlight.validation.engine.seen import expected_layer, judged_layer, seen_image
-from airlight.validation.estimates.quadrature import reference_error, reference_image, reference_layer, relative_error
+from airlight.validation.estimates.quadrature import (
+    reference_error,
+    reference_image,
+    reference_layer,
+    relative_error,
+)
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import scene_xml
 
@@ -41,7 +48,11 @@ def write(tmp_path):
 
     def written(**layers):
         path = tmp_path / "engine.exr"
-        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}), finite=False)
+        write_exr(
+            path,
+            Image({name.replace("__", "."): values for name, values in layers.items()}),
+            finite=False,
+        )
         return path
 
     return written
@@ -59,7 +70,9 @@ def test_airlight_is_compared_where_there_is_one(scene, expected, write):
     assert (verdict.comparison.failures, verdict.hints.words) == ((), ())
     assert 0 <= relative_error(verdict.known) < 1e-6
     assert verdict.known.kind == "proven"
-    verdict = compare_scene(scene, write(airlight=expected.airlight, surface=2 * expected.surface), layer="surface")
+    verdict = compare_scene(
+        scene, write(airlight=expected.airlight, surface=2 * expected.surface), layer="surface"
+    )
     np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
 
@@ -93,27 +106,39 @@ AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/
 
 @pytest.fixture(scope="module")
 def area_lit(variant, tmp_path_factory):
-    """A scene under an area light that the camera sees: its file, the scene at 16 x 12 pixels and its reference."""
+    """A scene under an area light that the camera sees: its file, the scene at 16 x 12
+    pixels and its reference.
+    """
     path = tmp_path_factory.mktemp("area") / "area.xml"
     path.write_text(scene_xml(AREA))
     loaded = load_scene(str(path), (16, 12))
     return str(path), loaded, reference_image(loaded.scene)
 
 
-def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(area_lit, write):
-    """The same engine image was right in the live view and wrong in `compare` and `report --images`, or the reverse."""
+def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(
+    area_lit, write
+):
+    """The same engine image was right in the live view and wrong in `compare` and `report
+    --images`, or the reverse.
+    """
     path, loaded, expected = area_lit
     assert expected.emitted.max() > 10 * (expected.airlight + expected.surface).max()
     file = write(total=reference_layer(expected, "total"))
     assert compare_scene(path, file, pixel="centre").verdict.right
-    judged, *_ = measure_image(EngineImage("area", "engine", file), loaded, references(loaded), surfaces=True)
+    judged, *_ = measure_image(
+        EngineImage("area", "engine", file), loaded, references(loaded), surfaces=True
+    )
     assert judged.verdict.right
     dark = compare_scene(path, write(total=expected.airlight + expected.surface), pixel="centre")
     assert not dark.verdict.right
-    assert dark.hints.words == ("the image does not show the area lights that the camera sees: compare its airlight",)
+    assert dark.hints.words == (
+        "the image does not show the area lights that the camera sees: compare its airlight",
+    )
     for layers, made in (({"emitted": expected.emitted}, {}), ({}, {"airlight:scene": "area"})):
         own = judged_layer(
-            Image({"total": expected.airlight + expected.surface, **layers}, attributes=made), "own.exr", name=""
+            Image({"total": expected.airlight + expected.surface, **layers}, attributes=made),
+            "own.exr",
+            name="",
         )
         np.testing.assert_array_equal(expected_layer(expected, own), own.values)
     # Neither a fit nor a diagnosis explains the radiance of the light itself.
@@ -125,19 +150,29 @@ def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_
 
 @pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
 @pytest.mark.parametrize("layer", ["airlight", "total"])
-def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, area_lit, write, layer):
-    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
+def test_the_references_own_standard_errors_count_as_those_of_its_file(
+    tmp_path, area_lit, write, layer
+):
+    """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr
+    IMAGE` says; it left them out.
+    """
     path, _, expected = area_lit
     values = reference_layer(expected, layer)
     errors = reference_error(expected, layer)
     sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
     image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
     reference = tmp_path / "reference.exr"
-    write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8}))
-    by_file = compare_images(read_exr(reference), read_exr(write(**image)), layer=layer, margin=0.01).statistics
+    write_exr(
+        reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8})
+    )
+    by_file = compare_images(
+        read_exr(reference), read_exr(write(**image)), layer=layer, margin=0.01
+    ).statistics
     compared = compare_scene(path, write(**image), layer=layer, pixel="centre", margin=0.01)
     by_scene = compared.comparison.statistics
-    assert by_scene.reference_variance_fraction == pytest.approx(by_file.reference_variance_fraction, rel=1e-5)
+    assert by_scene.reference_variance_fraction == pytest.approx(
+        by_file.reference_variance_fraction, rel=1e-5
+    )
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
     assert by_file.reference_variance_fraction > 0.9
     assert compared.known.kind == "statistical"
@@ -154,13 +189,19 @@ def test_layers_that_are_not_there_are_refused(scene, expected, write):
     assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6
 
 
-@pytest.mark.parametrize(("size", "value"), [((1, 1), 0.0), ((4, 3), -1.0), ((1, 1), np.nan), ((4, 3), 3e38)])
+@pytest.mark.parametrize(
+    ("size", "value"), [((1, 1), 0.0), ((4, 3), -1.0), ((1, 1), np.nan), ((4, 3), 3e38)]
+)
 def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, size, value):
-    """All warnings are errors in the tests; the text of an image without failures has no nan and no inf."""
+    """All warnings are errors in the tests; the text of an image without
+    failures has no nan and no inf.
+    """
     path = tmp_path / "own.xml"
     path.write_text(scene_xml(size=size))
     write_exr(
-        tmp_path / "odd.exr", Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}), finite=False
+        tmp_path / "odd.exr",
+        Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}),
+        finite=False,
     )
     compared = compare_scene(str(path), tmp_path / "odd.exr", all_metrics=True)
     assert not compared.verdict.right
@@ -171,19 +212,31 @@ def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, 
 SIZE = (80, 60)
 
 
-@pytest.fixture(scope="module", params=["open-fog", pytest.param("sphere-spot", marks=pytest.mark.slow)])
+@pytest.fixture(
+    scope="module", params=["open-fog", pytest.param("sphere-spot", marks=pytest.mark.slow)]
+)
 def traced(request, variant, tmp_path_factory):
     """The image of a path tracer with a box filter: means over pixels, with its noise.
 
-    Every value has Gaussian noise of 2 %, values next to the lamp of 30 %, as LuxCore's had at 512 paths a pixel, and
-    the pixel of the lamp is twice as bright as it should be: its variance is infinite.
+    Every value has Gaussian noise of 2 %, values next to the lamp of 30 %, as LuxCore's had at 512
+    paths a pixel, and the pixel of the lamp is twice as bright as it should be: its variance is
+    infinite.
     """
     expected = reference_image(load_scene(request.param, SIZE).scene, pixel="area")
     total = reference_layer(expected, "total")
     beside = expected.light_angle < 3 * np.deg2rad(58 / SIZE[0])
-    noise = np.where(beside, 0.3, 0.02)[:, :, None] * np.random.default_rng(7).standard_normal((*total.shape[:2], 1))
-    noise[np.unravel_index(expected.light_angle.argmin(), expected.light_angle.shape)] += 1.0 if beside.any() else 0.0
-    return request.param, expected, np.maximum(1 + noise, 0) * total, tmp_path_factory.mktemp("traced")
+    noise = np.where(beside, 0.3, 0.02)[:, :, None] * np.random.default_rng(7).standard_normal(
+        (*total.shape[:2], 1)
+    )
+    noise[np.unravel_index(expected.light_angle.argmin(), expected.light_angle.shape)] += (
+        1.0 if beside.any() else 0.0
+    )
+    return (
+        request.param,
+        expected,
+        np.maximum(1 + noise, 0) * total,
+        tmp_path_factory.mktemp("traced"),
+    )
 
 
 def compared(traced, image):
@@ -201,7 +254,11 @@ def test_the_right_image_of_a_path_tracer_is_called_right_without_options(traced
     assert judged.verdict.right
     assert judged.comparison.failures == judged.hints.words == ()
     np.testing.assert_allclose(judged.hints.factor, 1, atol=0.002)
-    assert judged.summary().splitlines()[-1].startswith("verdict          right: means over 6 x 6 pixels are within")
+    assert (
+        judged.summary()
+        .splitlines()[-1]
+        .startswith("verdict          right: means over 6 x 6 pixels are within")
+    )
 
 
 @pytest.mark.claim("engine-verdict", "engine-pixels")
@@ -226,7 +283,9 @@ FAULTS = {
     "a pixel too low": (lambda image, expected: moved(image), "off"),
     "a haze of 5 %": (lambda image, expected: image + 0.05 * image.mean(), "off"),
     "fog that ends": (
-        lambda image, expected: image - 0.1 * expected.airlight * (np.arange(SIZE[0]) < 30)[:, None],
+        lambda image, expected: (
+            image - 0.1 * expected.airlight * (np.arange(SIZE[0]) < 30)[:, None]
+        ),
         "off",
     ),
     "black": (lambda image, expected: 0 * image, "the image is black everywhere"),
@@ -256,12 +315,16 @@ def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     assert (place.pixels, place.worst, place.kind, place.few) == (1, (11, 7), "lamp", True)
     np.testing.assert_allclose(place.fraction, 9 / (9 + 0.0009), rtol=1e-12)
     np.testing.assert_allclose(place.relative_rmse_without, np.sqrt(0.0009 / 599), rtol=1e-12)
-    assert "100 % of the squared error in 1 pixel (beside a light, in column 11, row 7)" in place.words
+    assert (
+        "100 % of the squared error in 1 pixel (beside a light, in column 11, row 7)" in place.words
+    )
     assert error_place(expected, expected, lamp) is None
     assert not error_place(expected, 1.1 * expected, lamp).few
 
 
-@pytest.mark.claim("engine-verdict", tolerance="three standard deviations of the noise of a mean over 64 pixels")
+@pytest.mark.claim(
+    "engine-verdict", tolerance="three standard deviations of the noise of a mean over 64 pixels"
+)
 def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     expected = np.ones((160, 160, 3))
     image = expected * (1 + 0.04 * np.random.default_rng(2).standard_normal(expected.shape))
@@ -274,22 +337,29 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     verdict = judge(expected, image, find_hints(expected, image), ())
     assert "means over 8 x 8 pixels are" in verdict.words
     assert "scatter" not in verdict.words
-    assert not judge(expected, expected, find_hints(expected, expected), ("2 pixels are negative",)).right
+    assert not judge(
+        expected, expected, find_hints(expected, expected), ("2 pixels are negative",)
+    ).right
     assert judge(expected, expected, find_hints(expected, expected), ()).right
     dark = judge(0 * expected, 0 * expected, find_hints(expected, expected), ())
     assert dark.words == "not right: nothing is lit in the pixels that are compared"
 
 
-@pytest.mark.claim("engine-verdict", tolerance="none: one of 75 lit values is wrong by a tenth, 1.2 % RMS")
+@pytest.mark.claim(
+    "engine-verdict", tolerance="none: one of 75 lit values is wrong by a tenth, 1.2 % RMS"
+)
 def test_one_wrong_block_of_few_is_not_forgiven():
-    """A hundredth of the values may be wrong, which of 25 blocks is none; it used to be one at least."""
+    """A hundredth of the values may be wrong, which of 25 blocks is none; it
+    used to be one at least.
+    """
     expected = np.zeros((160, 160, 3))
     expected[:40, :40] = 1.0
     image = expected.copy()
     image[8:16, 8:16, 1] *= 1.1
     assert judge(expected, expected, find_hints(expected, expected), ()).right
     assert not judge(expected, image, find_hints(expected, image), ()).right
-    # Of 400 lit blocks four may be as wrong as they like: that of a lamp, whose variance is infinite, among them.
+    # Of 400 lit blocks four may be as wrong as they like: that of a lamp, whose variance
+    # is infinite, among them.
     lit = np.ones(expected.shape)
     image = lit.copy()
     image[8:16, 8:16] *= 3

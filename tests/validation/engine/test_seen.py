@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: what is known of an engine's image before it is judged: how many samples its lights need, what a pixel is."""
+"""Claim: what is known of an engine's image before it is judged: how many samples its
+lights need, what a pixel is.
+"""
 
 from types import SimpleNamespace
 
@@ -7,7 +9,13 @@ import numpy as np
 import pytest
 
 from airlight.validation.engine import seen
-from airlight.validation.engine.seen import PixelKind, decide_pixel, needed_samples, relative_errors, stopped
+from airlight.validation.engine.seen import (
+    PixelKind,
+    decide_pixel,
+    needed_samples,
+    relative_errors,
+    stopped,
+)
 
 
 @pytest.fixture
@@ -31,7 +39,8 @@ def test_samples_of_a_light_are_doubled_until_dim_pixels_stay_too(images):
     lit, unlit = (SimpleNamespace(area=area, width=2, height=1) for area in (("lamp",), ()))
     first = seen.SAMPLES
     assert needed_samples(lit) == first
-    images[first], images[2 * first] = 0.08, 0.04  # a fiftieth of the bright pixel, and off by its half and its quarter
+    # a fiftieth of the bright pixel, and off by its half and its quarter
+    images[first], images[2 * first] = 0.08, 0.04
     assert needed_samples(lit) == 4 * first
     assert needed_samples(unlit) == first
     images.update({first * 2**n: 0.02 * 2.0**-n for n in range(12)})
@@ -53,9 +62,13 @@ def test_values_stop_where_eight_are_the_largest():
 
 def test_the_kind_of_a_pixel_is_the_one_that_leaves_less_and_is_said():
     errors = {"centre": 0.02, "area": 0.5}
-    kind, found = decide_pixel(("area", "centre"), str.upper, lambda all: [errors[each.lower()] for each in all])
+    kind, found = decide_pixel(
+        ("area", "centre"), str.upper, lambda all: [errors[each.lower()] for each in all]
+    )
     assert (kind.pixel, found) == ("centre", "CENTRE")
     assert kind.words == "centres fit: 2 % off where the two differ; means over the area: 50 % off"
-    kind, found = decide_pixel(("area", "centre"), str.upper, lambda all: [], exact=lambda found: True)
+    kind, found = decide_pixel(
+        ("area", "centre"), str.upper, lambda all: [], exact=lambda found: True
+    )
     assert (kind, found) == (PixelKind("area"), "AREA")
     assert kind.words == "judged by means over the area"

@@ -39,16 +39,21 @@ def test_volpath_agrees_with_the_reference(scene):
     verdicts = agreement(scene, **BUDGET)
     assert set(verdicts) == {"airlight", "surface"}
     for layer, verdict in verdicts.items():
-        assert (verdict.layer, verdict.width, verdict.height, verdict.samples) == (layer, 24, 18, 64)
+        assert (verdict.layer, verdict.width, verdict.height, verdict.samples) == (
+            layer,
+            24,
+            18,
+            64,
+        )
         assert 32 <= verdict.batches <= 40
         statistics = verdict.statistics
-        # The half width is 0.7 %: a right reference would be called wrong once in 10 000 seeds, and the seeds are
-        # fixed.
+        # The half width is 0.7 %: a right reference would be called wrong once in 10 000 seeds,
+        # and the seeds are fixed.
         assert statistics.equivalent is True, layer
         assert statistics.rejected == 0
         assert statistics.rejected_blocks == 0
-        # 40 batches: the deviation of z is sqrt(39/37) = 1.03. Channels share paths, so some 400 values are independent
-        # and know it to 1.03/sqrt(800) = 0.036: three of these.
+        # 40 batches: the deviation of z is sqrt(39/37) = 1.03. Channels share paths, so some 400
+        # values are independent and know it to 1.03/sqrt(800) = 0.036: three of these.
         assert statistics.z_std == pytest.approx(1.03, abs=0.11)
         assert statistics.margin == 0.02
         assert statistics.detectable_bias < 0.05
@@ -58,7 +63,9 @@ def test_volpath_agrees_with_the_reference(scene):
 @pytest.mark.parametrize("factor", [1.05, 0.95])
 def test_reference_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
     """In one layer alone; the other one still agrees."""
-    false_reference(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
+    false_reference(
+        monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)})
+    )
     verdicts = agreement(scene, **BUDGET)
     assert verdicts[layer].statistics.equivalent is False
     assert verdicts[layer].statistics.relative_bias == pytest.approx(1 / factor - 1, abs=0.015)
@@ -81,10 +88,11 @@ def test_reference_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatc
 
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
-    """A light path that is shorter by a fraction s is brighter by s sigma_t <r>, <r> its mean length over the light.
+    """A light path that is shorter by a fraction s is brighter by s sigma_t <r>, <r> its
+    mean length over the light.
 
-    The slope comes from a fraction of 1 %, whose square term is half of 0.01 sigma_t <r>, below 1 % of it. One bias
-    over the other is the ratio of the two references: no sample counts.
+    The slope comes from a fraction of 1 %, whose square term is half of 0.01 sigma_t <r>, below 1 %
+    of it. One bias over the other is the ratio of the two references: no sample counts.
     """
     plain, shorter = reference_image(scene), reference_image(scene, shadow_scale=0.99)
     masks = layer_masks(read_reference(scene), plain)
@@ -106,8 +114,12 @@ def test_pixels_near_a_light_are_left_out(scene):
 
 
 def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
-    """Two batches are traced whatever the time; they do not decide about a bias of one in ten million."""
-    verdicts = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
+    """Two batches are traced whatever the time; they do not decide about a
+    bias of one in ten million.
+    """
+    verdicts = agreement(
+        scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0
+    )
     assert {verdict.batches for verdict in verdicts.values()} == {2}
     assert not verdicts["airlight"].finished
     assert verdicts["airlight"].statistics.equivalent is False

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Batches through the cache, merged or alone: the same numbers, nothing lost by an interruption; when runs end."""
+"""Batches through the cache, merged or alone: the same numbers, nothing lost by an
+interruption; when runs end.
+"""
 
 import errno
 import time
@@ -60,14 +62,20 @@ def volpath(scene, **options):
 
 def assert_same(actual, expected):
     for field in fields(Batches):
-        np.testing.assert_array_equal(getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name)
+        np.testing.assert_array_equal(
+            getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name
+        )
         assert type(getattr(actual, field.name)) is type(getattr(expected, field.name))
 
 
 @pytest.mark.claim("runs-go-on", tolerance="none: equal")
 @pytest.mark.parametrize(("first", "count"), [(0, 2), (0, 21), (5, 3), (5, 20)])
-def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tmp_path, first, count):
-    """A run from an empty cache, a second one, and one from a cache that holds more on both sides: the same bits."""
+def test_the_cache_never_changes_what_is_returned(
+    scene, traced, monkeypatch, tmp_path, first, count
+):
+    """A run from an empty cache, a second one, and one from a cache that holds more on
+    both sides: the same bits.
+    """
     fresh = volpath(scene, batches=count, first_seed=first)
     assert traced == list(range(first, first + count))
     again = volpath(scene, batches=count, first_seed=first)
@@ -84,13 +92,17 @@ def test_moments_are_those_of_all_batches(scene, traced):
     pooled = volpath(scene, batches=21, first_seed=5).batches
     means = np.stack(
         [
-            airlight.validation.estimates.monte_carlo.volpath_batch(read_reference(scene), seed, 4).mean
+            airlight.validation.estimates.monte_carlo.volpath_batch(
+                read_reference(scene), seed, 4
+            ).mean
             for seed in range(5, 26)
         ]
     )
     # Sums of 21 numbers in another order: a few roundings.
     np.testing.assert_allclose(pooled.mean, means.mean(axis=0), rtol=1e-13)
-    np.testing.assert_allclose(pooled.standard_error, means.std(axis=0, ddof=1) / np.sqrt(21), rtol=1e-12)
+    np.testing.assert_allclose(
+        pooled.standard_error, means.std(axis=0, ddof=1) / np.sqrt(21), rtol=1e-12
+    )
     np.testing.assert_array_equal(pooled.totals, means.mean(axis=2))
 
 
@@ -124,8 +136,12 @@ def test_damage_is_found_counted_and_repaired(scene, traced, damage, name):
         content[len(content) // 2] ^= 1
     elif damage == "of another seed":
         volpath(scene, batches=8, first_seed=16)
-        content = bytearray((folder / ("000016-000023.npz" if "-" in name else "000008.npz")).read_bytes())
-    path.write_bytes(content[: {"truncated": len(content) // 3, "empty": 0}.get(damage, len(content))])
+        content = bytearray(
+            (folder / ("000016-000023.npz" if "-" in name else "000008.npz")).read_bytes()
+        )
+    path.write_bytes(
+        content[: {"truncated": len(content) // 3, "empty": 0}.get(damage, len(content))]
+    )
     repaired = volpath(scene, batches=11)
     assert_same(repaired.batches, whole.batches)
     assert repaired.damaged == 1
@@ -222,7 +238,14 @@ def test_merged_moments_are_those_of_all_batches():
         np.testing.assert_allclose(merged.layers[name], means[:, number].mean(axis=0), rtol=1e-13)
         error = means[:, number].std(axis=0, ddof=1) / np.sqrt(12)
         np.testing.assert_allclose(merged.layers[f"{name}_se"], error, rtol=1e-12)
-    expected = {"spp": 192, "batches": 12, "seed": 0, "seeds": "0-11", "merged": 3, "estimator": "volpath"}
+    expected = {
+        "spp": 192,
+        "batches": 12,
+        "seed": 0,
+        "seeds": "0-11",
+        "merged": 3,
+        "estimator": "volpath",
+    }
     assert {name: merged.attributes[f"airlight:{name}"] for name in expected} == expected
 
 
@@ -230,11 +253,23 @@ def test_merged_moments_are_those_of_all_batches():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"scene_digest": "cd34"}, r"a.exr and b.exr differ in the scene or its size \(ab12 and cd34\)"),
-        ({"estimator": "single-scatter"}, r"differ in the estimator \(volpath and single-scatter\)"),
-        ({"seeds": "3-5"}, "a.exr and b.exr share the seeds 3; compute one of them again with another --seed"),
+        (
+            {"scene_digest": "cd34"},
+            r"a.exr and b.exr differ in the scene or its size \(ab12 and cd34\)",
+        ),
+        (
+            {"estimator": "single-scatter"},
+            r"differ in the estimator \(volpath and single-scatter\)",
+        ),
+        (
+            {"seeds": "3-5"},
+            "a.exr and b.exr share the seeds 3; compute one of them again with another --seed",
+        ),
         ({"seeds": "4-9"}, "b.exr: its header names 6 seeds and 3 batches"),
-        ({"seeds": ""}, "b.exr is no Monte Carlo reference of `airlight reference`: it lacks seeds"),
+        (
+            {"seeds": ""},
+            "b.exr is no Monte Carlo reference of `airlight reference`: it lacks seeds",
+        ),
     ],
 )
 def test_files_that_do_not_go_together_are_refused(changes, words):
@@ -247,19 +282,23 @@ def test_samples_are_split_into_batches_that_have_at_least_as_many(samples):
     batches, each = batch_plan(Budget(samples=samples), 100)
     assert batches >= min(32, max(2, samples))  # 32 give a standard error that is known to 13 %
     assert each in (1, 2, 4, 8, 16, 32, 64)
-    # Never less than asked for, and not a whole batch more, but for the two that a standard error needs.
+    # Never less than asked for, and not a whole batch more, but for the two
+    # that a standard error needs.
     assert samples <= batches * each < samples + max(each, 2)
 
 
 def batches(mean, error, count=4):
     mean, error = np.asarray(mean, float), np.asarray(error, float)
-    return Batches(tuple(range(count)), 1, mean, error**2 * count * (count - 1), np.zeros((count, 2, 3)))
+    return Batches(
+        tuple(range(count)), 1, mean, error**2 * count * (count - 1), np.zeros((count, 2, 3))
+    )
 
 
 def test_errors_by_hand():
     """Two pixels; each channel of each layer has its own error, and the largest counts."""
     airlight = [[1.0, 2.0, 1.0], [3.0, 2.0, 1.0]]
-    airlight_error = [[0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]  # red: sqrt(0.09 + 0.16)/4; the worst is 0.3 of 1
+    # red: sqrt(0.09 + 0.16)/4; the worst is 0.3 of 1
+    airlight_error = [[0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]
     surface = [[5.0, 5.0, 5.0], [0.0, 5.0, 5.0]]
     surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
     traced = batches([airlight, surface], [airlight_error, surface_error])
@@ -273,14 +312,18 @@ def test_errors_by_hand():
 
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_beside_a_light_are_those_that_the_reference_names(variant):
-    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
+    """The same pixels as from the quadrature's own angles; a light in view, one
+    behind us, one in the sphere.
+    """
     behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
     hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
     scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))
     reference = read_reference(scene)
     expected = reference_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(reference)
     assert 0 < expected.sum() < 40
-    np.testing.assert_array_equal(near_light(reference, surface_hits(reference).distance), expected.ravel())
+    np.testing.assert_array_equal(
+        near_light(reference, surface_hits(reference).distance), expected.ravel()
+    )
 
 
 @pytest.mark.parametrize("odd", [np.nan, np.inf])
@@ -296,11 +339,18 @@ def test_no_target_is_met_by_what_is_no_number(odd, layer):
 
 
 def test_an_error_of_no_pixel_is_not_zero():
-    """All airlight beside a light, lit or not the surface, or no light at all: nothing is known of the error."""
+    """All airlight beside a light, lit or not the surface, or no light at all:
+    nothing is known of the error.
+    """
     lit, dark = np.ones((4, 3)), np.zeros((4, 3))
     some = np.array([True, True, False, False])
     beside = lit * some[:, None]  # lit only where pixels are left out
-    cases = [(lit, dark, ~np.zeros(4, bool)), (lit, lit, ~np.zeros(4, bool)), (beside, lit, some), (dark, dark, ~some)]
+    cases = [
+        (lit, dark, ~np.zeros(4, bool)),
+        (lit, lit, ~np.zeros(4, bool)),
+        (beside, lit, some),
+        (dark, dark, ~some),
+    ]
     for fog, surface, near in cases:
         errors = relative_errors(batches([fog, surface], [0.1 * fog, 0.1 * surface]), near)
         assert (errors.pooled, errors.worst) == (None, None)
@@ -319,7 +369,9 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def loaded(variant, monkeypatch, own_cache, clock):
-    """A scene whose batches are random numbers of relative deviation 0.4, and take a second each."""
+    """A scene whose batches are random numbers of relative deviation
+    0.4, and take a second each.
+    """
 
     import airlight.validation.estimates.monte_carlo
 
@@ -329,18 +381,22 @@ def loaded(variant, monkeypatch, own_cache, clock):
         return single_batch(seed, samples, mean)
 
     monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "volpath_batch", trace)
-    lamp = {"type": "point", "position": [0.3, -9.0, 1.1]}  # behind the camera: no pixel is left out
+    # behind the camera: no pixel is left out
+    lamp = {"type": "point", "position": [0.3, -9.0, 1.1]}
     return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(4, 3), lamp=lamp)), "", "")
 
 
 def run(loaded, budget):
     told = []
-    reference = monte_carlo_reference(loaded, "volpath", budget=budget, progress=lambda *args: told.append(args))
+    reference = monte_carlo_reference(
+        loaded, "volpath", budget=budget, progress=lambda *args: told.append(args)
+    )
     return reference, told
 
 
 def test_progress_shows_the_error_falling_to_its_target(loaded):
-    # One batch has the pooled error 0.4/sqrt(12) = 0.115, K batches 0.115/sqrt(K): some 133 for 0.01.
+    # One batch has the pooled error 0.4/sqrt(12) = 0.115, K batches
+    # 0.115/sqrt(K): some 133 for 0.01.
     reference, told = run(loaded, Budget(error=0.01))
     batches = reference.image.attributes["airlight:batches"]
     assert reference.reached
@@ -366,7 +422,9 @@ def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
 @pytest.mark.claim("targets-of-a-run")
 def test_a_run_whose_error_is_not_known_ends_and_reaches_nothing(loaded, monkeypatch):
     monkeypatch.setattr(
-        airlight.validation.estimates.images, "near_light", lambda reference, distance: np.ones(12, dtype=bool)
+        airlight.validation.estimates.images,
+        "near_light",
+        lambda reference, distance: np.ones(12, dtype=bool),
     )
     reference, _ = run(loaded, Budget(error=0.5))
     assert (reference.image.attributes["airlight:batches"], reference.reached) == (32, False)
@@ -403,7 +461,10 @@ def test_a_reference_has_the_layers_and_is_kept(variant, tmp_path, monkeypatch):
     assert (first.cached, again.cached) == (0, 32)
     layers = first.image.layers
     sampled = ("airlight", "surface", "airlight_1", "airlight_2_inf", "surface_straight")
-    assert set(layers) == {name + end for name in sampled for end in ("", "_se")} | {"opacity", "background"}
+    assert set(layers) == {name + end for name in sampled for end in ("", "_se")} | {
+        "opacity",
+        "background",
+    }
     for name, values in layers.items():
         np.testing.assert_array_equal(values, again.image.layers[name])
     np.testing.assert_allclose(

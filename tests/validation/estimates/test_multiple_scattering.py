@@ -22,7 +22,9 @@ def layers(albedo, depth):
 
 @pytest.mark.claim("left-out-fraction")
 def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
-    """With the same seed the same paths are traced, so this holds path by path, to float32 rounding."""
+    """With the same seed the same paths are traced, so this holds path by
+    path, to float32 rounding.
+    """
     full = [layers(0.8, depth)[0] for depth in (2, 3, 4)]
     half = [layers(0.4, depth)[0] for depth in (2, 3, 4)]
     orders = [(sums[0], sums[1] - sums[0], sums[2] - sums[1]) for sums in (full, half)]
@@ -34,7 +36,8 @@ def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
 
 def test_share_grows_with_the_optical_depth(variant):
     thin, thick = (
-        multiple_scattering_fraction(scene(sigma_t=s), max_depth=6, batches=6, samples=8) for s in (0.01, 0.6)
+        multiple_scattering_fraction(scene(sigma_t=s), max_depth=6, batches=6, samples=8)
+        for s in (0.01, 0.6)
     )
     assert 0 < thin.medium.value < 0.1 < thick.medium.value < 1
     assert thick.everything.value > 0

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""References by quadrature: from the cache, refused where they are infinite, and what images are compared with."""
+"""References by quadrature: from the cache, refused where they are infinite, and what
+images are compared with.
+"""
 
 from dataclasses import fields, replace
 
@@ -56,7 +58,9 @@ def computed(monkeypatch):
 
 def assert_same(actual, expected):
     for field in fields(actual):
-        np.testing.assert_array_equal(getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name)
+        np.testing.assert_array_equal(
+            getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name
+        )
         assert type(getattr(actual, field.name)) is type(getattr(expected, field.name))
 
 
@@ -73,7 +77,9 @@ def test_the_reference_of_some_pixels_is_that_of_the_image(scene, own_cache):
     some, whole = reference_of_pixels(scene, pixels), reference_image(scene)
     for layer in ("airlight", "surface", "distance", "light_angle"):
         values = getattr(whole, layer)
-        np.testing.assert_array_equal(getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels])
+        np.testing.assert_array_equal(
+            getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels]
+        )
 
 
 @pytest.mark.claim("area-light-goes-on")
@@ -91,7 +97,9 @@ def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, 
     with pytest.raises(KeyboardInterrupt):
         reference_image(scene)
     counted = []
-    monkeypatch.setattr(area_lights, "_scattered", lambda *arguments: (counted.append(1), compute(*arguments))[1])
+    monkeypatch.setattr(
+        area_lights, "_scattered", lambda *arguments: (counted.append(1), compute(*arguments))[1]
+    )
     again = reference_image(scene)
     went_on = len(counted)
     assert not list(own_cache.glob("**/airlight-*"))
@@ -108,7 +116,9 @@ def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, 
 
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_volpath_should_find_a_little_more_light(variant):
-    """exp(-sigma_t r (1 - epsilon)) over exp(-sigma_t r): at most 1 + 2 epsilon where sigma_t r is below 2."""
+    """exp(-sigma_t r (1 - epsilon)) over exp(-sigma_t r): at most 1 + 2 epsilon
+    where sigma_t r is below 2.
+    """
     scene = load_scene("open-fog", (16, 12)).scene
     image = reference_image(scene)
     mask = layer_masks(read_reference(scene), image)["airlight"]
@@ -122,20 +132,30 @@ def test_volpath_should_find_a_little_more_light(variant):
 
 
 def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
-    """Without albedo a pixel inside the light is Le exp(-sigma_t x): volpath's paths see the light or are absorbed."""
-    place = mi.ScalarTransform4f().translate([0.0, 0.0, 2.5]).rotate([1, 0, 0], 180).scale([5.1, 4.7, 1.0])
+    """Without albedo a pixel inside the light is Le exp(-sigma_t x): volpath's paths see
+    the light or are absorbed.
+    """
+    place = (
+        mi.ScalarTransform4f()
+        .translate([0.0, 0.0, 2.5])
+        .rotate([1, 0, 0], 180)
+        .scale([5.1, 4.7, 1.0])
+    )
     scene = lit_scene(size=(3, 2), medium=fog(0.21, 0.0), lamp=lamp(to_world=place, bsdf=NULL))
     seen = read_reference(scene)
     reference = quadrature_image(seen, plan=PointPlan(error=0.0, first=2, most=2))
     paths, shown = 1 << 14, {}
-    ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(0.0), mi.Vector3f(np.repeat(seen.direction, paths, axis=0).T)))
+    ray = mi.RayDifferential3f(
+        mi.Ray3f(mi.Point3f(0.0), mi.Vector3f(np.repeat(seen.direction, paths, axis=0).T))
+    )
     for hidden in (False, True):
         integrator = mi.load_dict({"type": "volpath", "max_depth": 2, "hide_emitters": hidden})
         sampler = mi.load_dict({"type": "independent"})
         sampler.seed(1, 6 * paths)
         colour = integrator.sample(scene, sampler, ray, scene.sensors()[0].get_medium())[0]
         shown[hidden] = np.array(colour, dtype=np.float64).T.reshape(2, 3, paths, 3).mean(axis=2)
-    # A path passes with probability p >= 0.43: four standard errors sqrt((1 - p)/(p paths)) of its mean are 3.6 %.
+    # A path passes with probability p >= 0.43: four standard errors sqrt((1 - p)/(p
+    # paths)) of its mean are 3.6 %.
     expected = reference_layer(reference, "total")
     assert expected.min() > 0.4
     assert shown[False] == pytest.approx(expected, rel=0.04)
@@ -148,10 +168,20 @@ def test_variances_of_the_total_add_up():
     none = np.full((1, 1), np.inf)
     plain = ReferenceImage(layer, 0 * layer, 2 * layer, none, none, 0, 0.0)
     lit = ReferenceImage(
-        layer, 0 * layer, 2 * layer, none, none, 0, 0.0, emitted=5 * layer, airlight_se=3 * layer, surface_se=4 * layer
+        layer,
+        0 * layer,
+        2 * layer,
+        none,
+        none,
+        0,
+        0.0,
+        emitted=5 * layer,
+        airlight_se=3 * layer,
+        surface_se=4 * layer,
     )
     assert reference_error(plain, "total") is None
-    # The error of the airlight is not that of all layers: of surfaces there is none, and so none of the sum.
+    # The error of the airlight is not that of all layers: of surfaces there is
+    # none, and so none of the sum.
     assert known_to(plain, "airlight") == Estimate(float(layer.mean()), 0.0, "proven")
     for unknown in ("surface", "total"):
         assert known_to(plain, unknown).error is None
@@ -166,11 +196,15 @@ def test_variances_of_the_total_add_up():
         assert known_to(lit, name).kind == "statistical"
 
 
-@pytest.mark.parametrize("common", [1.0, 0.0], ids=["all pixels are wrong together", "each by itself"])
+@pytest.mark.parametrize(
+    "common", [1.0, 0.0], ids=["all pixels are wrong together", "each by itself"]
+)
 def test_errors_of_points_that_all_pixels_share_add_up(common):
-    """200 references of 12 x 8 pixels with the mean 1: the interval of the image holds 1 in 95 % of them.
+    """200 references of 12 x 8 pixels with the mean 1: the interval of the image
+    holds 1 in 95 % of them.
 
-    The binomial law leaves 0.89 to 1 once in 10 000 runs. Pixels taken for independent held it in a third of them.
+    The binomial law leaves 0.89 to 1 once in 10 000 runs. Pixels taken for independent
+    held it in a third of them.
     """
     random = np.random.default_rng(4)
     mask, held, apart = np.ones((8, 12), dtype=bool), 0, 0
@@ -187,8 +221,12 @@ def test_errors_of_points_that_all_pixels_share_add_up(common):
             values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means
         )
         sure = NoisyImage(np.ones((8, 12, 3)), np.full((8, 12, 3), 1e-9), 64)
-        statistics = compare_statistics(reference_estimate(reference, "airlight", sure, mask), sure, mask=mask)
-        held += statistics.relative_bias_ci_batches[0] <= 0 <= statistics.relative_bias_ci_batches[1]
+        statistics = compare_statistics(
+            reference_estimate(reference, "airlight", sure, mask), sure, mask=mask
+        )
+        held += (
+            statistics.relative_bias_ci_batches[0] <= 0 <= statistics.relative_bias_ci_batches[1]
+        )
         apart += statistics.relative_bias_ci[0] <= 0 <= statistics.relative_bias_ci[1]
     assert held / 200 > 0.89
     assert apart / 200 < 0.5 if common else apart / 200 > 0.89
@@ -200,7 +238,9 @@ def scene_with(position, *, size=(9, 9), **changes):
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     if position is not None:
         scene["lamp"]["position"] = position
-    return mi.load_dict({name: part for name, part in (scene | changes).items() if part is not None})
+    return mi.load_dict(
+        {name: part for name, part in (scene | changes).items() if part is not None}
+    )
 
 
 def references(scene):
@@ -216,7 +256,10 @@ def references(scene):
 @pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
 def test_every_estimator_refuses_a_light_at_the_camera_or_on_a_ray(variant, position):
     for reference in references(scene_with(position)):
-        with pytest.raises(InputError, match=r"light 1 at .* is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
+        with pytest.raises(
+            InputError,
+            match=r"light 1 at .* is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)",
+        ):
             reference()
 
 
@@ -250,5 +293,8 @@ def test_a_reference_that_is_not_finite_is_refused_and_not_kept(variant, own_cac
 
     monkeypatch.setattr(module, "quadrature_image", broken)
     for _ in range(2):
-        with pytest.raises(InputError, match="1 of 12 pixels whose surface is not finite, first in column 2 of row 1"):
+        with pytest.raises(
+            InputError,
+            match="1 of 12 pixels whose surface is not finite, first in column 2 of row 1",
+        ):
             module.reference_image(scene)

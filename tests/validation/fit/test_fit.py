@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight compare --fit`: what explains an image, how sure that is, and what no image can tell."""
+"""`airlight compare --fit`: what explains an image, how sure that is,
+and what no image can tell.
+"""
 
 import importlib
 import re
@@ -26,7 +28,9 @@ SIZE = (48, 36)
 TOOLS = Path(__file__).resolve().parents[3] / "docs/tools"
 
 
-def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, position="0.7, 0.3, 1.9"):
+def scene_file(
+    tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, position="0.7, 0.3, 1.9"
+):
     lamps = [("lamp", position), ("side", "-1.1, 0.6, 0.4")][:lights]
     light = '<emitter type="point" id="{}"><point name="position" value="{}"/></emitter>'
     fog = f'<float name="sigma_t" value="{sigma_t}"/><float name="albedo" value="{albedo}"/>'
@@ -39,12 +43,18 @@ def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, po
 def image_of(path):
     reference = reference_image(load_scene(path).scene)
     return Image(
-        {"airlight": reference.airlight, "surface": reference.surface, "total": reference.airlight + reference.surface}
+        {
+            "airlight": reference.airlight,
+            "surface": reference.surface,
+            "total": reference.airlight + reference.surface,
+        }
     )
 
 
 def predictor_of(reference, values):
-    return Predictor(Seen(reference, values, "airlight", np.ones(len(values), bool)), SceneLight(reference))
+    return Predictor(
+        Seen(reference, values, "airlight", np.ones(len(values), bool)), SceneLight(reference)
+    )
 
 
 def fitted(image, scene, names, **how):
@@ -52,7 +62,9 @@ def fitted(image, scene, names, **how):
 
 
 @pytest.mark.claim("fit-exact")
-@pytest.mark.parametrize("start", [4.0, *(pytest.param(start, marks=pytest.mark.slow) for start in (0.02, 0.31))])
+@pytest.mark.parametrize(
+    "start", [4.0, *(pytest.param(start, marks=pytest.mark.slow) for start in (0.02, 0.31))]
+)
 def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
     foggier = image_of(scene_file(tmp_path, sigma_t="0.57", albedo="0.71", g="-0.2"))
     scene = scene_file(tmp_path)
@@ -75,12 +87,18 @@ def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_pat
     sys.path.insert(0, str(TOOLS))
     numpy_faults = importlib.import_module("numpy_faults")
     sys.path.remove(str(TOOLS))
-    scene, wanted = tmp_path / "scene.xml", replace(numpy_faults.LAYERED, layer=(0.2, 0.83), sigma_t=0.47)
+    scene, wanted = (
+        tmp_path / "scene.xml",
+        replace(numpy_faults.LAYERED, layer=(0.2, 0.83), sigma_t=0.47),
+    )
     scene.write_text(numpy_faults.scene_xml(numpy_faults.LAYERED))
     image = Image({"total": numpy_faults.rendered(wanted, area=False, noise=0.003, seed=3)})
-    fit = fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_1", "H_1", "albedo"], pixel="centre")
+    fit = fit_image(
+        image, load_scene(str(scene), (64, 48)), ["sigma_1", "H_1", "albedo"], pixel="centre"
+    )
     values = {each.name: each for each in fit.parameters}
-    # 96 steps a ray and 16 parts of a path err by some 1e-3; the noise is 3e-3 in each of 3072 pixels.
+    # 96 steps a ray and 16 parts of a path err by some 1e-3; the noise is
+    # 3e-3 in each of 3072 pixels.
     assert values["sigma_1"].value == pytest.approx(0.47, rel=5e-3)
     assert values["H_1"].value == pytest.approx(0.83, rel=5e-3)
     assert fit.explained > 0.999
@@ -101,7 +119,9 @@ def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
     values = {each.name: each.value for each in fit.parameters}
-    assert values == pytest.approx({"intensity:lamp": 1.4, "intensity:side": 0.3, "sigma_t": 0.31}, rel=1e-5)
+    assert values == pytest.approx(
+        {"intensity:lamp": 1.4, "intensity:side": 0.3, "sigma_t": 0.31}, rel=1e-5
+    )
     only = fitted(image, scene, ["intensity:side", "intensity:1"])
     assert [each.name for each in only.parameters] == ["intensity:side", "intensity:lamp"]
 
@@ -109,14 +129,18 @@ def test_each_of_several_lights_has_a_factor(variant, tmp_path):
 @pytest.mark.slow
 def test_a_light_is_found_where_it_is_with_its_shadows(variant, tmp_path):
     image = image_of(scene_file(tmp_path, position="0.82, 0.17, 1.7"))
-    fit = fitted(image, scene_file(tmp_path), ["light.x", "light.y", "light.z", "sigma_t"], layer="airlight")
+    fit = fitted(
+        image, scene_file(tmp_path), ["light.x", "light.y", "light.z", "sigma_t"], layer="airlight"
+    )
     values = [each.value for each in fit.parameters]
     assert values == pytest.approx([0.82, 0.17, 1.7, 0.31], rel=1e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.claim("fit-confounded")
-def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfaces(variant, tmp_path):
+def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfaces(
+    variant, tmp_path
+):
     scene = scene_file(tmp_path)
     image = image_of(scene)
     fit = fitted(image, scene, ["sigma_t", "albedo", "intensity", "exposure"], layer="airlight")
@@ -143,7 +167,9 @@ def test_pixels_that_disagree_are_left_out(variant, tmp_path):
     spoiled = np.array(image.layers["airlight"])
     spoiled[:14, :20] = 7.0  # an object that the scene does not have: a sixth of the image
     spoiled[20, :10] = np.nan
-    fit = fitted(Image({"airlight": spoiled}), scene, ["sigma_t", "albedo"], starts={"sigma_t": 1.0})
+    fit = fitted(
+        Image({"airlight": spoiled}), scene, ["sigma_t", "albedo"], starts={"sigma_t": 1.0}
+    )
     assert [each.value for each in fit.parameters] == pytest.approx([0.31, 0.83], rel=1e-4)
     # 7.0 is the largest value there is: those pixels count as cut off, and take no part at all.
     assert fit.left_out < 20
@@ -171,15 +197,19 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
     for _ in range(trials):
         noisy = {
             "relative": lambda: clean * (1 + 0.01 * generator.standard_normal((count, 1))),
-            "absolute": lambda: clean + 0.01 * clean.mean() * generator.standard_normal(clean.shape),
+            "absolute": lambda: (
+                clean + 0.01 * clean.mean() * generator.standard_normal(clean.shape)
+            ),
             "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
         }[noise]()
-        model = Model.of(Predictor(replace(predictor.seen, values=noisy), predictor.light), unknowns)
+        model = Model.of(
+            Predictor(replace(predictor.seen, values=noisy), predictor.light), unknowns
+        )
         solution = weighted_fit(model, robust_fit(model, wanted))
         low, high = interval_ends(model, solution).T
         covered += (low < wanted) & (wanted < high)
-    # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
-    # nine are looked at.
+    # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once
+    # in 16 000, of which nine are looked at.
     assert (covered >= 177).all(), covered / trials
 
 

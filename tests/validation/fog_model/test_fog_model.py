@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fog model: radiance from paths is that of the reference, whatever the lights and media, and laws are its own."""
+"""The fog model: radiance from paths is that of the reference, whatever the lights and
+media, and laws are its own.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -35,13 +37,17 @@ def model_and_image(name):
     [
         "sphere-spot",
         "three-media",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("open-fog", "omni-box", "windows", "clutter")),
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("open-fog", "omni-box", "windows", "clutter")
+        ),
     ],
 )
 def test_radiance_is_that_of_the_reference(variant, name):
     reference, model, image = model_and_image(name)
     airlight, surface = model.layers(scene_fog(reference))
-    # Nodes err by 3e-8 a panel where the integrand is smooth, by 2e-5 where a segment grazes a sphere of medium.
+    # Nodes err by 3e-8 a panel where the integrand is smooth, by 2e-5 where a segment
+    # grazes a sphere of medium.
     error = relative(airlight, image.airlight.reshape(-1, 3))
     assert np.quantile(error, 0.99) < 1e-6
     assert error.max() < 5e-5
@@ -80,9 +86,15 @@ def test_laws_can_be_changed_one_by_one(variant):
     for law, wanted in (
         ({"light_segment": (0.0, 0.0)}, summed(sigma_t * nodes.x)),
         ({"camera_segment": (0.0, 0.0)}, summed(sigma_t * nodes.r)),
-        ({"planar": frozenset({"nodes"})}, summed(sigma_t * (nodes.x * (direction @ axis) + nodes.r))),
+        (
+            {"planar": frozenset({"nodes"})},
+            summed(sigma_t * (nodes.x * (direction @ axis) + nodes.r)),
+        ),
         ({"distance_power": 1.0}, summed(sigma_t * (nodes.x + nodes.r), 1.0)),
-        ({"window": lambda r: np.exp(-r)}, summed(sigma_t * (nodes.x + nodes.r), factor=np.exp(-nodes.r))),
+        (
+            {"window": lambda r: np.exp(-r)},
+            summed(sigma_t * (nodes.x + nodes.r), factor=np.exp(-nodes.r)),
+        ),
         ({"airlight": (0.7,)}, 0.7 * right[:, 0]),
         ({"exposure": (3.0, 1.0, 1.0)}, 3 * right[:, 0]),
     ):
@@ -91,10 +103,14 @@ def test_laws_can_be_changed_one_by_one(variant):
 
 @pytest.mark.parametrize("radius", [1e-9, 1e-3, 0.3])
 def test_even_samples_of_a_sphere_give_its_light_however_small_and_far_it_is(radius):
-    """By even normals: 2000 samples are the light of the sphere to 1 %, also where its solid angle is 1e-20 sr."""
+    """By even normals: 2000 samples are the light of the sphere to 1 %, also where its
+    solid angle is 1e-20 sr.
+    """
     count = np.arange(2000) + 0.5
     z, turn = 1 - count / 1000, np.pi * (1 + np.sqrt(5)) * count
-    normals = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    normals = np.stack(
+        [np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1
+    )
     lights = [ReferenceLight(radius * normal, np.ones(3), axis=normal) for normal in normals]
     r = np.array([1.0, 40.0, 1e4])
     # Distance and direction from each place to the first sample.

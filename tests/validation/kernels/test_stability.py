@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: studies of kernels find what is wrong and where, and hold `exact` to its bar, on rays with a certified J."""
+"""Claim: studies of kernels find what is wrong and where, and hold `exact` to its bar, on
+rays with a certified J.
+"""
 
 import csv
 from dataclasses import replace
@@ -39,13 +41,20 @@ def isotropic(cases):
 
 
 def study(function, *, exact=False):
-    return kernel_stability(Kernel("own:kernel", function, exact=exact), {GENERATED: isotropic(hard_rays(256))})
+    return kernel_stability(
+        Kernel("own:kernel", function, exact=exact), {GENERATED: isotropic(hard_rays(256))}
+    )
 
 
 def four_rays():
     columns = {name: np.ones(4) for name in ("foot", "height", "sigma_t")}
     rays = table(
-        ["isotropic"] * 3 + ["hg"], np.zeros(4), x0=np.zeros(4), x1=np.arange(1.0, 5.0), tags="aabb", **columns
+        ["isotropic"] * 3 + ["hg"],
+        np.zeros(4),
+        x0=np.zeros(4),
+        x1=np.arange(1.0, 5.0),
+        tags="aabb",
+        **columns,
     )
     return replace(rays, value=np.array([1.0, 2.0, 4.0, 8.0]))
 
@@ -96,7 +105,10 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
 def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
     verdict = study(gauss, exact=True)
     assert verdict.exact
-    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict.broken)
+    assert any(
+        "float32 maximum, |g| up to 0.9" in words and "isotropic" in words
+        for words in verdict.broken
+    )
     assert any("float64 maximum" in words for words in verdict.broken)
     assert not any("NaN" in words or "negative" in words for words in verdict.broken)
 
@@ -114,9 +126,11 @@ def test_negative_and_missing_values_break_the_claim(variant):
 
 @pytest.mark.claim("differences-of-gamma")
 def test_differences_of_gamma_lose_what_theory_says(variant):
-    """Light volumes add up Gamma(x) = J(0, x). For a sliver far from camera and light two nearly equal Gammas remain.
+    """Light volumes add up Gamma(x) = J(0, x). For a sliver far from camera and light two
+    nearly equal Gammas remain.
 
-    Each is rounded to about half an epsilon, so that their difference is off by about epsilon times their sum.
+    Each is rounded to about half an epsilon, so that their difference is off by about
+    epsilon times their sum.
     """
     random, count = np.random.default_rng(1), 256
     distance, angle = 10 ** random.uniform(-1, 1, count), np.pi * random.uniform(0.02, 0.98, count)
@@ -126,7 +140,9 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     sigma_t = 10 ** random.uniform(-3, 0.7, count) / (x0 + np.hypot(x0 - foot, height))
     columns = {"foot": foot, "height": height, "sigma_t": sigma_t}
     thin = with_reference(
-        table(["isotropic"] * count, np.zeros(count), x0=x0, x1=x1, tags=["sliver"] * count, **columns)
+        table(
+            ["isotropic"] * count, np.zeros(count), x0=x0, x1=x1, tags=["sliver"] * count, **columns
+        )
     )
     start = np.zeros(count)
     ends = (replace(thin, x0=start), replace(thin, x0=start, x1=x0))
@@ -138,12 +154,37 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     assert 0.05 < np.median(off / (2.0**-23 * (far.astype(np.float64) + near))) < 5
 
 
-# Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
-# flushes lost all of the first and the third, a nearly isotropic lobe, and 2.4 % of the second.
+# Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A
+# processor that flushes lost all of the first and the third, a nearly isotropic lobe, and 2.4 % of
+# the second.
 FLUSHED = (
-    ("hazy", 132789.140625, 232308.1875, 0.0, 32985.58984375, 0.00022316776448860765, 1.2482876161892056e-33),
-    ("rayleigh", 689046.9375, 1363.2552490234375, 0.0, 372320.25, 8.510394400218502e-05, 8.723572803710459e-32),
-    ("isotropic", -438344.6875, 1188.7958984375, 0.0, 10104.048828125, 0.00013516764738596976, 3.828543456423609e-34),
+    (
+        "hazy",
+        132789.140625,
+        232308.1875,
+        0.0,
+        32985.58984375,
+        0.00022316776448860765,
+        1.2482876161892056e-33,
+    ),
+    (
+        "rayleigh",
+        689046.9375,
+        1363.2552490234375,
+        0.0,
+        372320.25,
+        8.510394400218502e-05,
+        8.723572803710459e-32,
+    ),
+    (
+        "isotropic",
+        -438344.6875,
+        1188.7958984375,
+        0.0,
+        10104.048828125,
+        0.00013516764738596976,
+        3.828543456423609e-34,
+    ),
 )
 
 
@@ -151,12 +192,17 @@ def flushed(*given):
     phase, foot, height, x0, x1, sigma_t, value = zip(*given)
     columns = {"foot": foot, "height": height, "x0": x0, "x1": x1, "sigma_t": sigma_t}
     arrays = {name: np.array(column, dtype=np.float64) for name, column in columns.items()}
-    return replace(table(phase, np.zeros(len(phase)), tags=["thick"] * len(phase), **arrays), value=np.array(value))
+    return replace(
+        table(phase, np.zeros(len(phase)), tags=["thick"] * len(phase), **arrays),
+        value=np.array(value),
+    )
 
 
 def faults(cases, J, precision="single"):
     """Return what values break of the bar, if the other precision is right."""
-    values = dict.fromkeys(("single", "double"), cases.value) | {precision: np.asarray(J, dtype=np.float64)}
+    values = dict.fromkeys(("single", "double"), cases.value) | {
+        precision: np.asarray(J, dtype=np.float64)
+    }
     return _broken(GENERATED, cases, values)
 
 
@@ -184,7 +230,9 @@ def test_order_of_the_rows_does_not_matter(variant, data_folder, tmp_path):
     """Rows are evaluated by phase function and must go back to where they were."""
     lines = (data_folder / FILES[1]).read_text().splitlines()
     order = np.random.default_rng(5).permutation(len(lines) - 1)
-    (tmp_path / "mixed.csv").write_text("\n".join([lines[0], *(lines[1 + k] for k in order)]) + "\n")
+    (tmp_path / "mixed.csv").write_text(
+        "\n".join([lines[0], *(lines[1 + k] for k in order)]) + "\n"
+    )
     straight = integrate_cases(read_cases(data_folder / FILES[1]), "quadrature", "double")
     mixed = integrate_cases(read_cases(tmp_path / "mixed.csv"), "quadrature", "double")
     np.testing.assert_array_equal(mixed, straight[order])
@@ -203,13 +251,20 @@ def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     cases = read_cases(case_file(tmp_path, SHORT))
     counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
     # After the header and the remark the third case is in line 5.
-    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 4, 0, 5)
+    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (
+        4,
+        4,
+        0,
+        5,
+    )
     assert counts["max"] == pytest.approx(0.3)
     assert counts["p50"] == pytest.approx(0.15)
 
 
 def test_values_below_float32_are_compared_in_absolute_terms(tmp_path):
-    cases = read_cases(case_file(tmp_path, "phase,t,h,x0,x1,sigma_t,value\nisotropic,1,2,0,inf,900,1e-60\n"))
+    cases = read_cases(
+        case_file(tmp_path, "phase,t,h,x0,x1,sigma_t,value\nisotropic,1,2,0,inf,900,1e-60\n")
+    )
     assert summary(cases, np.array([0.0]))["max"] < 1e-20
 
 
@@ -221,14 +276,22 @@ def test_written_rows_are_those_of_the_source_with_their_results(data_folder, tm
     write_results(cases, results, tmp_path / "out.csv")
     with open(source, newline="") as given, open(tmp_path / "out.csv", newline="") as written:
         before, after = list(csv.DictReader(given)), list(csv.DictReader(written))
-    assert [row | {"result": repr(float(value))} for row, value in zip(before, results, strict=True)] == after
+    assert [
+        row | {"result": repr(float(value))} for row, value in zip(before, results, strict=True)
+    ] == after
     assert list(after[0])[-1] == "result"
     np.testing.assert_array_equal([float(row["result"]) for row in after], results)
 
 
 def cost(family, size, ns, error, **others):
     time = RayTime(median=ns, low=ns, high=ns, repetitions=5)
-    name = {"kernel": f"{family}-{size}", "family": family, "size": size, "phase": "isotropic", "g": 0.0}
+    name = {
+        "kernel": f"{family}-{size}",
+        "family": family,
+        "size": size,
+        "phase": "isotropic",
+        "g": 0.0,
+    }
     return KernelCost(**name, device=time, wall=time, p99=error / 10, max=error, **others)
 
 
@@ -286,7 +349,9 @@ def rays():  # of one test, so that the reference is kept in the tests' own cach
 
 
 def spans(column, low, high):
-    """Whether values reach within a factor of 4 of both ends and never leave the range (float32 rounding aside)."""
+    """Whether values reach within a factor of 4 of both ends and never leave the range
+    (float32 rounding aside).
+    """
     return low * 0.999 <= column.min() < 4 * low and 0.25 * high < column.max() <= high * 1.001
 
 
@@ -353,8 +418,14 @@ def test_foot_and_height_have_two_names_and_fog_without_a_phase_function_is_isot
     ("text", "message"),
     [
         ("phase,g,t,h,x0,x1\nhazy,0,1,1,0,1\n", "line 1: no column 'sigma_t'"),
-        (HEAD + "hazy,0,1,1,0,1,0.1\nhazy,0,1,one,0,1,0.1\n", "line 3, column 'h': 'one' is not a number"),
-        (HEAD + "hazy,0,1,-1,0,1,0.1\n", "line 2, column 'h': -1 is out of range; expected a number >= 0"),
+        (
+            HEAD + "hazy,0,1,1,0,1,0.1\nhazy,0,1,one,0,1,0.1\n",
+            "line 3, column 'h': 'one' is not a number",
+        ),
+        (
+            HEAD + "hazy,0,1,-1,0,1,0.1\n",
+            "line 2, column 'h': -1 is out of range; expected a number >= 0",
+        ),
         (
             HEAD + "hazi,0,1,1,0,1,0.1\n",
             "line 2, column 'phase': no phase function is called 'hazi'; did you mean 'hazy'",

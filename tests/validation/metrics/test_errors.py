@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: metrics are those of their formulas, by hand or by published pairs, without a unit; FLIP of its package."""
+"""Claim: metrics are those of their formulas, by hand or by published pairs, without a
+unit; FLIP of its package.
+"""
 
 import importlib.util
 import os
@@ -20,7 +22,8 @@ EXACT = 1e-14  # some roundings of double precision
 
 @pytest.mark.claim("error-formulas", tolerance="rounding")
 def test_hand_computed_values():
-    # mean(r) = 2.5; d = 1, 0, -1, 2: mean 0.5, mean square 6/4; |d|/r = 1, 0, 1/3, 1/2 sorted 0, 1/3, 1/2, 1.
+    # mean(r) = 2.5; d = 1, 0, -1, 2: mean 0.5, mean square 6/4; |d|/r = 1, 0, 1/3,
+    # 1/2 sorted 0, 1/3, 1/2, 1.
     reference = np.array([[1.0, 2.0], [3.0, 4.0]])
     metrics = error_metrics(reference, reference + np.array([[1.0, 0.0], [-1.0, 2.0]]))
     assert metrics.pixels == 4
@@ -84,13 +87,16 @@ def test_black_reference_has_absolute_errors_only():
     metrics = error_metrics(np.zeros((2, 2, 3)), np.full((2, 2, 3), 0.5))
     assert (metrics.bias, metrics.rmse) == (0.5, 0.5)
     as_json = plain(metrics)
-    assert all(as_json[name] is None for name in ("relative_bias", "relative_rmse", "p50", "p99", "max"))
+    assert all(
+        as_json[name] is None for name in ("relative_bias", "relative_rmse", "p50", "p99", "max")
+    )
     assert as_json["rmse"] == 0.5
 
 
 ROUNDINGS = 1e-13  # some roundings of double precision
 
-# r = 0.09, 0.19, 0.99 and t = r + 0.1, r - 0.1, r: every denominator below is a number that a hand can divide by.
+# r = 0.09, 0.19, 0.99 and t = r + 0.1, r - 0.1, r: every denominator below is a number
+# that a hand can divide by.
 REFERENCE = np.array([[0.09, 0.19, 0.99]])
 TEST = REFERENCE + np.array([[0.1, -0.1, 0.0]])
 
@@ -147,7 +153,9 @@ def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
     assert scaled.unit == pytest.approx(factor * plain.unit, rel=1e-12)
     for field in fields(PublishedErrors)[1:]:
         # 1e-11: the rounding of the factor, squared and divided.
-        assert getattr(scaled, field.name) == pytest.approx(getattr(plain, field.name), rel=1e-11), field.name
+        assert getattr(scaled, field.name) == pytest.approx(
+            getattr(plain, field.name), rel=1e-11
+        ), field.name
 
 
 # Sharma, Wu and Dalal 2005, table 1: L*, a*, b* of two colours and their CIEDE2000 to four digits.
@@ -191,11 +199,13 @@ def grey(value):
 
 def test_published_pairs_of_ciede2000():
     difference = ciede2000(SHARMA[:, :3], SHARMA[:, 3:6])
-    assert difference == pytest.approx(SHARMA[:, 6], abs=0.5e-4 + 1e-9)  # half a unit of the last digit
+    # half a unit of the last digit
+    assert difference == pytest.approx(SHARMA[:, 6], abs=0.5e-4 + 1e-9)
 
 
 def test_published_pair_of_delta_e_itp():
-    # The example of colour-science, BT.2124's own formula: dI = 0.00137, dT = 0.00172, dP = -0.00114.
+    # The example of colour-science, BT.2124's own formula: dI = 0.00137,
+    # dT = 0.00172, dP = -0.00114.
     first = np.array([0.4885468072, -0.04739350675, 0.07475401302])
     second = np.array([0.4899203231, -0.04567508203, 0.07361341775])
     by_hand = 720 * np.sqrt(0.0013735159**2 + (0.00171842472 / 2) ** 2 + 0.00114059527**2)
@@ -224,7 +234,9 @@ def test_the_default_exposure_takes_the_unit_out(factor):
     test = reference * rng.normal(1, 0.05, reference.shape)
     here, there = colour_difference(reference, test), colour_difference(factor * reference, factor * test)
     assert there.exposure == pytest.approx(here.exposure - np.log2(factor), abs=1e-9)
-    for name in ("ciede2000_mean", "ciede2000_max", "itp_mean", "itp_max", "clipped", "clipped_itp"):
+    for name in ("ciede2000_mean", "ciede2000_max", "itp_mean", "itp_max", "clipped", (
+        "clipped_itp"
+    )):
         assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-9), name
     assert 0.9 / np.percentile(reference, 99) == pytest.approx(2.0**here.exposure, rel=1e-12)
 
@@ -252,7 +264,9 @@ def test_refuses_what_does_not_fit(metric, shape, options, message):
 
 
 real = pytest.mark.skipif(
-    importlib.util.find_spec("flip_evaluator") is None, reason="flip-evaluator has no wheel for this machine"
+    importlib.util.find_spec("flip_evaluator") is None, reason=(
+        "flip-evaluator has no wheel for this machine"
+    )
 )
 SHAPE = (24, 32, 3)
 
@@ -270,15 +284,20 @@ def fake(tmp_path, monkeypatch):
 
     def install(body):
         (tmp_path / "flip_evaluator.py").write_text(body)
-        monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+        monkeypatch.setenv("PYTHONPATH", (
+            f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+        ))
 
     return install
 
 
 def answer(expression):
-    """Return the body of a package that answers with this expression of the reference r and the test t."""
+    """Return the body of a package that answers with this expression of the
+    reference r and the test t.
+    """
     return (
-        f"import numpy as np\ndef evaluate(r, t, *args, parameters, **kw):\n    return {expression}, -1, parameters\n"
+        "import numpy as np\ndef evaluate(r, t, *args, parameters, **kw):\n    return "
+        f"{expression}, -1, parameters\n"
     )
 
 
@@ -296,7 +315,8 @@ def test_the_value_is_that_of_the_package(pair):
     }
     single = [image.astype(np.float32) for image in pair]
     _, mean, _ = flip_evaluator.evaluate(*single, "HDR", applyMagma=False, parameters=parameters)
-    # Scaling by a power of two changes no digit of the image, but the exposure is added to it in float32.
+    # Scaling by a power of two changes no digit of the image, but the exposure
+    # is added to it in float32.
     assert flip.value == pytest.approx(mean, abs=1e-5)
     assert flip.note == ""
     assert error_map.shape == SHAPE[:2]
@@ -310,7 +330,9 @@ def test_equal_images_have_none_and_larger_errors_more(pair):
 
 
 @pytest.mark.parametrize("side", ["reference", "test image"])
-@pytest.mark.parametrize(("bad", "what"), [(np.nan, "NaN or inf"), (np.inf, "NaN or inf"), (-1e-9, "negative")])
+@pytest.mark.parametrize(("bad", "what"), [(np.nan, "NaN or inf"), (np.inf, "NaN or inf"), (-1e-9, (
+    "negative"
+))])
 def test_bad_pixels_are_a_note(pair, side, bad, what):
     images = dict(zip(("reference", "test image"), (image.copy() for image in pair)))
     images[side][3, 4:6, 1] = bad

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: sequences of another make give the values that made them, which faulty measures miss.
 
-A lamp passes pillars before a wall, in images whose sides no block divides. The histories are those of
-`scipy.signal.lfilter`, and the noise is gamma: positive and skewed, as that of samples of light.
+A lamp passes pillars before a wall, in images whose sides no block divides. The histories are those
+of `scipy.signal.lfilter`, and the noise is gamma: positive and skewed, as that of samples of light.
 """
 
 import math
@@ -71,14 +71,22 @@ VALUES: list[tuple[str, Callable[[Measures], Estimate], float, float]] = [
     ("noise", lambda found: found.lag.lag, 0.0, 0.0),
     ("noise", lambda found: found.bias, -0.03, 0.0),
     ("ghost", lambda found: found.ghost_by_age[AGE - 1], FRACTION, 0.0),
-    # The variance of each change of an average of weight w is 2 w^2/(2 - w), less while it still remembers its start.
-    ("at rest", lambda found: found.flicker, SIGMA * WEIGHT * math.sqrt(2 / (2 - WEIGHT)), 0.05 * SIGMA),
+    # The variance of each change of an average of weight w is 2 w^2/(2 - w), less while it
+    # still remembers its start.
+    (
+        "at rest",
+        lambda found: found.flicker,
+        SIGMA * WEIGHT * math.sqrt(2 / (2 - WEIGHT)),
+        0.05 * SIGMA,
+    ),
 ]
 
 
 def measured(frames: np.ndarray, references: np.ndarray = LIGHT) -> Measures:
     everywhere = np.ones((HEIGHT, WIDTH), dtype=bool)
-    found = measure(Sequence(len(frames), frames.__getitem__, references.__getitem__, lambda n: everywhere))
+    found = measure(
+        Sequence(len(frames), frames.__getitem__, references.__getitem__, lambda n: everywhere)
+    )
     assert found is not None
     return found
 
@@ -86,7 +94,10 @@ def measured(frames: np.ndarray, references: np.ndarray = LIGHT) -> Measures:
 @pytest.fixture(scope="module")
 def found():
     still = np.broadcast_to(LIGHT[:1], LIGHT.shape)
-    return {name: measured(frames, still if name == "at rest" else LIGHT) for name, frames in MADE.items()}
+    return {
+        name: measured(frames, still if name == "at rest" else LIGHT)
+        for name, frames in MADE.items()
+    }
 
 
 def missed(estimate: Estimate, value: float, tolerance: float = 0.0) -> bool:
@@ -96,20 +107,29 @@ def missed(estimate: Estimate, value: float, tolerance: float = 0.0) -> bool:
 
 @pytest.mark.claim("sequence-lag")
 def test_values_that_made_the_sequences_are_found(found):
-    wrong = [(name, value) for name, of, value, tolerance in VALUES if missed(of(found[name]), value, tolerance)]
+    wrong = [
+        (name, value)
+        for name, of, value, tolerance in VALUES
+        if missed(of(found[name]), value, tolerance)
+    ]
     assert len(wrong) <= 0.1 * len(VALUES), wrong
 
 
 def test_frames_of_a_history_are_no_independent_runs():
-    """By Student's law their means would hold the bias, which is zero, far too rarely; those of a series hold it."""
+    """By Student's law their means would hold the bias, which is zero, far too rarely;
+    those of a series hold it.
+    """
     plain = known = 0
     for seed in range(60):
-        frames = lfilter([WEIGHT], [1, WEIGHT - 1], noise(100 + seed, (FRAMES + 20, 64)), axis=0)[20:]
+        frames = lfilter([WEIGHT], [1, WEIGHT - 1], noise(100 + seed, (FRAMES + 20, 64)), axis=0)[
+            20:
+        ]
         means = frames.mean(axis=1) / MEAN
         half = float(student.ppf(0.975, FRAMES - 1)) * means.std(ddof=1) / math.sqrt(FRAMES)
         plain += abs(means.mean()) < half
         known += mean_of_series(means).within(1e-12) is not Answer.NO
-    assert plain < 0.75 * 60  # an average of weight 0.2 has independent frames for one of nine: 49 % expected
+    # an average of weight 0.2 has independent frames for one of nine: 49 % expected
+    assert plain < 0.75 * 60
     assert known >= 0.9 * 60
 
 

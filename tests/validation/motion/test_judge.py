@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: frames of a scene that changes are judged by the reference of each; a file that is wrong is refused."""
+"""Claim: frames of a scene that changes are judged by the reference of each; a file
+that is wrong is refused.
+"""
 
 import json
 import re
@@ -21,9 +23,15 @@ FRAMES = 8
 
 def written(folder, images, **about):
     for number, image in enumerate(images, 1):
-        write_exr(folder / f"{number:04d}.exr", Image({"airlight": np.asarray(image, dtype=np.float32)}), finite=False)
+        write_exr(
+            folder / f"{number:04d}.exr",
+            Image({"airlight": np.asarray(image, dtype=np.float32)}),
+            finite=False,
+        )
     file = folder / "frames.json"
-    file.write_text(json.dumps({"schema": "airlight-frames/1", "first": 1, "frames": len(images)} | about))
+    file.write_text(
+        json.dumps({"schema": "airlight-frames/1", "first": 1, "frames": len(images)} | about)
+    )
     return str(folder / "####.exr"), file
 
 
@@ -31,7 +39,9 @@ def written(folder, images, **about):
 def lights(variant):
     """Return the places of a light, and the references of their frames."""
     places = [[0.83 - 0.15 * n, 0.47, 1.57] for n in range(FRAMES)]
-    scenes = [load_scene("open-fog", SIZE, {"light.position": tuple(place)}).scene for place in places]
+    scenes = [
+        load_scene("open-fog", SIZE, {"light.position": tuple(place)}).scene for place in places
+    ]
     return {"light.position": places}, [reference_image(scene).airlight for scene in scenes]
 
 
@@ -54,19 +64,29 @@ def test_a_frame_without_a_finite_value_is_named(lights, tmp_path):
     changes, references = lights
     frames = [*references[:3], np.nan * references[3], *references[4:]]
     found = compare_frames("open-fog", *written(tmp_path, frames, changes=changes, pixel="centre"))
-    assert found.failures == (f"{references[3].size} values are NaN or infinite, in frames 3 (0004.exr)",)
-    files = written(tmp_path, [np.nan * each for each in references], changes=changes, pixel="centre")
+    assert found.failures == (
+        f"{references[3].size} values are NaN or infinite, in frames 3 (0004.exr)",
+    )
+    files = written(
+        tmp_path, [np.nan * each for each in references], changes=changes, pixel="centre"
+    )
     with pytest.raises(InputError, match="no frame has a finite value"):
         compare_frames("open-fog", *files)
 
 
 def test_a_margin_that_too_few_frames_tell_is_not_kept(lights, tmp_path):
-    """The error of a bias of seven frames is not known: it counted as 0, and the bias of 0.4 % as within 0.5 %."""
+    """The error of a bias of seven frames is not known: it counted as 0, and the bias
+    of 0.4 % as within 0.5 %.
+    """
     changes, references = {"light.position": lights[0]["light.position"][:7]}, lights[1][:7]
     frames = [1.004 * each for each in references]
-    found = compare_frames("open-fog", *written(tmp_path, frames, changes=changes, pixel="centre"), margin=0.005)
+    found = compare_frames(
+        "open-fog", *written(tmp_path, frames, changes=changes, pixel="centre"), margin=0.005
+    )
     assert "not shown to be within +-0.005: its error is unknown" in found.failures[0]
-    exact = compare_frames("open-fog", *written(tmp_path, references, changes=changes, pixel="centre"), margin=0.005)
+    exact = compare_frames(
+        "open-fog", *written(tmp_path, references, changes=changes, pixel="centre"), margin=0.005
+    )
     assert not exact.failures
 
 
@@ -74,12 +94,16 @@ def test_exposure_is_taken_away(lights, tmp_path):
     changes, references = lights
     stops = [0.5 * n for n in range(FRAMES)]
     frames = [2**stop * image for stop, image in zip(stops, references, strict=True)]
-    found = compare_frames("open-fog", *written(tmp_path, frames, changes=changes, pixel="centre", exposure=stops))
+    found = compare_frames(
+        "open-fog", *written(tmp_path, frames, changes=changes, pixel="centre", exposure=stops)
+    )
     assert found.verdict.kind == "exact"
 
 
 def test_jittered_frames_are_those_between_the_pixels(variant, tmp_path):
-    """Every second pixel of an image of twice the size passes a quarter of a pixel beside the centres."""
+    """Every second pixel of an image of twice the size passes a quarter of a
+    pixel beside the centres.
+    """
     size, quarters = (16, 12), [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)]
     fine = reference_image(load_scene("sphere-spot", (32, 24)).scene).airlight
     frames = [fine[int(down > 0) :: 2, int(right > 0) :: 2] for right, down in 2 * quarters]
@@ -87,7 +111,9 @@ def test_jittered_frames_are_those_between_the_pixels(variant, tmp_path):
     kinds = {}
     for sign in (1, -1):
         jitter = [[sign * right, sign * down] for right, down in 2 * quarters]
-        found = compare_frames("sphere-spot", *written(tmp_path, frames, jitter=jitter, pixel="centre"))
+        found = compare_frames(
+            "sphere-spot", *written(tmp_path, frames, jitter=jitter, pixel="centre")
+        )
         kinds[sign] = found.verdict.kind
         assert "disoccluded" not in found.masks
     assert kinds[1] == "exact"
@@ -96,13 +122,19 @@ def test_jittered_frames_are_those_between_the_pixels(variant, tmp_path):
 
 def test_what_a_camera_uncovers_has_a_row_of_its_own(variant, tmp_path):
     size = (48, 36)
-    origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[:3, 3].ravel()
+    origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[
+        :3, 3
+    ].ravel()
     places = [[float(origin[0] + 0.12 * n), *map(float, origin[1:])] for n in range(4)]
     images = [
-        reference_image(load_scene("sphere-spot", size, {"camera.origin": tuple(place)}).scene).airlight
+        reference_image(
+            load_scene("sphere-spot", size, {"camera.origin": tuple(place)}).scene
+        ).airlight
         for place in places
     ]
-    found = compare_frames("sphere-spot", *written(tmp_path, images, changes={"camera.origin": places}, pixel="centre"))
+    found = compare_frames(
+        "sphere-spot", *written(tmp_path, images, changes={"camera.origin": places}, pixel="centre")
+    )
     assert {"all", "disoccluded", "rest"} <= found.masks.keys()
     parts = [found.masks[name].values for name in ("disoccluded", "rest")]
     assert sum(parts) == found.measures.values
@@ -131,12 +163,16 @@ def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
         )
         (tmp_path / "moved.xml").write_text(moved)
         images.append(reference_image(load_scene(str(tmp_path / "moved.xml")).scene).airlight)
-        ball.append([[scale, 0, 0, x], [0, scale, 0, 0], [0, 0, scale, 1.5 - 1.5 * scale], [0, 0, 0, 1]])
+        ball.append(
+            [[scale, 0, 0, x], [0, scale, 0, 0], [0, 0, scale, 1.5 - 1.5 * scale], [0, 0, 0, 1]]
+        )
         cos, sin = np.cos(angle), np.sin(angle)
         wall.append([[cos, -sin, 0, 0], [sin, cos, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     (tmp_path / "scene.xml").write_text(SCENE % ("", ""))
     scene = str(tmp_path / "scene.xml")
-    found = compare_frames(scene, *written(tmp_path, images, objects={"ball": ball, "wall": wall}, pixel="centre"))
+    found = compare_frames(
+        scene, *written(tmp_path, images, objects={"ball": ball, "wall": wall}, pixel="centre")
+    )
     assert found.verdict.kind == "exact"
     assert found.measures.reference_change > 0.01
     # The ball leaves half of where it stood.
@@ -148,7 +184,10 @@ def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
     [
         ({"frames": 9}, "frame 8 has no file"),
         ({"first": 3}, "frame 6 has no file"),
-        ({"changes": {"light.position": [[0, 0, 1]]}}, "light.position has 1 values, expected one for each of 8"),
+        (
+            {"changes": {"light.position": [[0, 0, 1]]}},
+            "light.position has 1 values, expected one for each of 8",
+        ),
         ({"changes": {"light.place": [1] * FRAMES}}, "frame 0: --change: got 'light.place'"),
         ({"exposure": [1.0]}, "exposure has 1 values"),
         ({"exposure": "bright"}, "exposure: got 'bright', expected a number from"),
@@ -156,11 +195,23 @@ def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
         ({"fps": 0}, "fps: got 0, expected a number from 1e-06"),
         ({"frame": 8}, "got 'frame'"),
         ({"jitter": [[0, 0]]}, "jitter has 1 values"),
-        ({"jitter": [[0, 0, 0]] * FRAMES}, "jitter[0]: got [0, 0, 0], expected right and down [pixels]"),
-        ({"jitter": [[0, 3]] * FRAMES}, "jitter[0]: got [0, 3], expected right and down [pixels], each at most 1"),
-        ({"objects": {"ground": [np.eye(4).tolist()]}}, "ground has 1 values, expected one for each of 8"),
+        (
+            {"jitter": [[0, 0, 0]] * FRAMES},
+            "jitter[0]: got [0, 0, 0], expected right and down [pixels]",
+        ),
+        (
+            {"jitter": [[0, 3]] * FRAMES},
+            "jitter[0]: got [0, 3], expected right and down [pixels], each at most 1",
+        ),
+        (
+            {"objects": {"ground": [np.eye(4).tolist()]}},
+            "ground has 1 values, expected one for each of 8",
+        ),
         ({"objects": {"ground": [np.eye(3).tolist()] * FRAMES}}, "objects.ground[0]: got [[1.0"),
-        ({"objects": {"ground": [np.diag([1, 1, 2, 1]).tolist()] * FRAMES}}, "not a rotation times a scale"),
+        (
+            {"objects": {"ground": [np.diag([1, 1, 2, 1]).tolist()] * FRAMES}},
+            "not a rotation times a scale",
+        ),
         (
             {"objects": {"grund": [np.eye(4).tolist()] * FRAMES}},
             "frame 0: objects: got 'grund', the scene has no shapes",
@@ -178,25 +229,39 @@ def test_frames_of_two_sizes_are_refused_by_number(lights, tmp_path):
     changes, references = lights
     images = [*references[:5], references[5][:, :16], *references[6:]]
     pattern, file = written(tmp_path, images, changes=changes)
-    with pytest.raises(InputError, match=r"frame 5: .*0006.exr has 16 x 24 pixels, the first frame 32 x 24"):
+    with pytest.raises(
+        InputError, match=r"frame 5: .*0006.exr has 16 x 24 pixels, the first frame 32 x 24"
+    ):
         compare_frames("open-fog", pattern, file)
 
 
 def test_frames_of_a_scene_at_rest_share_a_reference_and_grow_old(variant, tmp_path, monkeypatch):
-    """A camera that moves once: what it uncovers stays recent for some frames, though nothing changes in them."""
+    """A camera that moves once: what it uncovers stays recent for some frames, though
+    nothing changes in them.
+    """
     size, asked = (16, 12), []
-    monkeypatch.setattr(judge, "reference_image", lambda *args, **how: asked.append(1) or reference_image(*args, **how))
+    monkeypatch.setattr(
+        judge,
+        "reference_image",
+        lambda *args, **how: asked.append(1) or reference_image(*args, **how),
+    )
     monkeypatch.setattr(judge, "_RECENT", 2)
-    origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[:3, 3].ravel()
+    origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[
+        :3, 3
+    ].ravel()
     here, there = ([float(origin[0] + shift), *map(float, origin[1:])] for shift in (0.0, 0.4))
-    scenes = [load_scene("sphere-spot", size, {"camera.origin": tuple(at)}).scene for at in (here, there)]
+    scenes = [
+        load_scene("sphere-spot", size, {"camera.origin": tuple(at)}).scene for at in (here, there)
+    ]
     images = [reference_image(scene).airlight for scene in scenes]
     uncovered = []
     for rest in (1, 3):
         frames = [images[0], *rest * [images[1]]]
         changes = {"camera.origin": [here, *rest * [there]]}
         asked.clear()
-        found = compare_frames("sphere-spot", *written(tmp_path, frames, changes=changes, pixel="centre"))
+        found = compare_frames(
+            "sphere-spot", *written(tmp_path, frames, changes=changes, pixel="centre")
+        )
         assert len(asked) == 2
         assert found.verdict.kind == "exact"
         uncovered.append(found.masks["disoccluded"].values)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: flicker, lag and ghost of a sequence are those of signals that are known in closed form, with true errors."""
+"""Claim: flicker, lag and ghost of a sequence are those of signals that are known in
+closed form, with true errors.
+"""
 
 import math
 
@@ -16,9 +18,13 @@ WEIGHT = 0.1  # of the new frame in an exponential average
 
 
 def moving_light() -> np.ndarray:
-    """Return references, (frames, height, width, 3): a spot of light that circles on a dim ground, and jumps once."""
+    """Return references, (frames, height, width, 3): a spot of light that circles on a
+    dim ground, and jumps once.
+    """
     row, column = np.mgrid[:HEIGHT, :WIDTH]
-    turn = 2 * np.pi * np.arange(FRAMES)[:, None, None] / 30 + (np.arange(FRAMES) >= 25)[:, None, None]
+    turn = (
+        2 * np.pi * np.arange(FRAMES)[:, None, None] / 30 + (np.arange(FRAMES) >= 25)[:, None, None]
+    )
     square = (column - 16 - 9 * np.cos(turn)) ** 2 + (row - 12 - 6 * np.sin(turn)) ** 2
     return (0.2 + np.exp(-square / 30))[..., None] * np.array([1.0, 0.8, 0.6])
 
@@ -45,9 +51,13 @@ def ghosted(fraction: float, age: int) -> np.ndarray:
     return frames
 
 
-def measured(frames: np.ndarray, references: np.ndarray = LIGHT, resets: tuple[int, ...] = (0,)) -> Measures:
+def measured(
+    frames: np.ndarray, references: np.ndarray = LIGHT, resets: tuple[int, ...] = (0,)
+) -> Measures:
     everywhere = np.ones(references.shape[1:3], dtype=bool)
-    sequence = Sequence(len(frames), frames.__getitem__, references.__getitem__, lambda n: everywhere, resets)
+    sequence = Sequence(
+        len(frames), frames.__getitem__, references.__getitem__, lambda n: everywhere, resets
+    )
     found = measure(sequence)
     assert found is not None
     return found
@@ -70,13 +80,26 @@ def test_a_common_factor_changes_nothing():
 
 
 def test_the_order_of_channels_and_pixels_changes_nothing():
-    """Cells and blocks of other pixels have other means, so of pixels in another order only plain sums stay."""
+    """Cells and blocks of other pixels have other means, so of pixels in another
+    order only plain sums stay.
+    """
     frames = averaged(LIGHT) + noise(1, 0.1)
     places = np.random.default_rng(0).permutation(HEIGHT * WIDTH)
-    shuffled = [each.reshape(FRAMES, -1, 3)[:, places].reshape(LIGHT.shape) for each in (frames, LIGHT)]
-    one, other, moved = measured(frames), measured(frames[..., ::-1], LIGHT[..., ::-1]), measured(*shuffled)
+    shuffled = [
+        each.reshape(FRAMES, -1, 3)[:, places].reshape(LIGHT.shape) for each in (frames, LIGHT)
+    ]
+    one, other, moved = (
+        measured(frames),
+        measured(frames[..., ::-1], LIGHT[..., ::-1]),
+        measured(*shuffled),
+    )
     # Sums for ghosts are of float32 numbers.
-    for name, tolerance in {"lag": 1e-6, "ghost": 1e-6, "flicker_beside_lag": 1e-9, "relative_rmse": 1e-9}.items():
+    for name, tolerance in {
+        "lag": 1e-6,
+        "ghost": 1e-6,
+        "flicker_beside_lag": 1e-9,
+        "relative_rmse": 1e-9,
+    }.items():
         assert _told(other, name) == pytest.approx(_told(one, name), rel=tolerance)
     for name in ("relative_rmse", "bias", "flicker", "pop", "reference_change"):
         assert _told(moved, name) == pytest.approx(_told(one, name), rel=1e-9)
@@ -143,22 +166,28 @@ def test_white_noise_has_the_closed_form():
     found = measured(LIGHT + noise(4, 0.2))
     values = LIGHT.size
     assert found.relative_rmse.value == pytest.approx(0.2, abs=4 * 0.2 / math.sqrt(2 * values))
-    # Differences of neighbours share a frame: their mean square has 3/2 of the variance of independent ones.
-    assert found.flicker.value == pytest.approx(0.2 * math.sqrt(2), abs=4 * 0.2 * math.sqrt(1.5 / values))
+    # Differences of neighbours share a frame: their mean square has 3/2 of the
+    # variance of independent ones.
+    assert found.flicker.value == pytest.approx(
+        0.2 * math.sqrt(2), abs=4 * 0.2 * math.sqrt(1.5 / values)
+    )
     for estimate in (found.bias, found.lag.lag, found.ghost, found.lag.offset):
         assert abs(estimate.value) < 4 * estimate.error
     assert motion_verdict(found).kind == "noise"
 
 
 def test_without_a_change_of_the_reference_no_lag_is_told():
-    """At rest an average of weight a leaves sqrt(a/(2 - a)) of the noise, which after a reset takes some frames."""
+    """At rest an average of weight a leaves sqrt(a/(2 - a)) of the noise, which after a
+    reset takes some frames.
+    """
     still = np.broadcast_to(LIGHT[:1], LIGHT.shape)
     found = measured(averaged(still + noise(5, 0.1)), still)
     assert found.lag.lag.value is None
     assert found.ghost.value is None
     assert motion_verdict(found).kind == "cannot be told"
     floor = 0.1 * math.sqrt(WEIGHT / (2 - WEIGHT))
-    # Over forty frames the mean variance after the reset exceeds the floor by the fraction sum of 0.81^n/40 = 0.13.
+    # Over forty frames the mean variance after the reset exceeds the floor by the fraction
+    # sum of 0.81^n/40 = 0.13.
     ratio = WEIGHT / (2 - WEIGHT)
     expected = floor * math.sqrt(np.mean([1 + 0.81**n * (1 / ratio - 1) for n in range(FRAMES)]))
     assert found.relative_rmse.value == pytest.approx(
@@ -167,7 +196,9 @@ def test_without_a_change_of_the_reference_no_lag_is_told():
 
 
 def test_histories_begin_at_resets():
-    """After a reset frames are the reference again; a sequence without a first one is told all the same."""
+    """After a reset frames are the reference again; a sequence without a first
+    one is told all the same.
+    """
     frames = np.concatenate([averaged(LIGHT[:20]), averaged(LIGHT[20:])])
     found = measured(frames, resets=(0, 20))
     assert found.lag.persistence.value == pytest.approx(0.9, abs=1e-6)
@@ -201,11 +232,19 @@ def test_values_that_are_not_finite_are_counted_and_left_out():
 
 @pytest.mark.parametrize(("factor", "kind"), [(1.0, "exact"), (2.0, "cannot be told")])
 def test_light_in_one_block_has_no_errors_and_decides_nothing(factor, kind):
-    """Without its block nothing is left: no number has an error, and frames twice too bright are not exact."""
+    """Without its block nothing is left: no number has an error, and frames twice
+    too bright are not exact.
+    """
     light = np.zeros_like(LIGHT)
     light[:, 8:16, 8:16] = LIGHT[:, 8:16, 8:16]
     found = measured(factor * light, light)
-    for estimate in (found.relative_rmse, found.flicker, found.lag.gain, found.lag.persistence, found.ghost):
+    for estimate in (
+        found.relative_rmse,
+        found.flicker,
+        found.lag.gain,
+        found.lag.persistence,
+        found.ghost,
+    ):
         assert estimate.error is None
     assert found.bias.value == pytest.approx(factor - 1)
     assert motion_verdict(found).kind == kind
@@ -215,11 +254,16 @@ def test_rounding_is_no_noise():
     """Frames twice too bright, with light in 9 x 9 pixels."""
     light = np.zeros_like(LIGHT)
     light[:, 8:17, 8:17] = LIGHT[:, 8:17, 8:17]
-    assert motion_verdict(measured(2 * light, light)).words == "no lag: no noise beyond rounding, and a factor of 2"
+    assert (
+        motion_verdict(measured(2 * light, light)).words
+        == "no lag: no noise beyond rounding, and a factor of 2"
+    )
 
 
 def test_the_mean_of_runs_is_unknown_where_one_of_them_is():
-    """The first run stood for all where another told nothing, and its values that are not finite for those of all."""
+    """The first run stood for all where another told nothing, and its values that are not
+    finite for those of all.
+    """
     still = np.broadcast_to(LIGHT[:1], LIGHT.shape).copy()
     broken = still.copy()
     broken[3, 2, 1] = np.nan
@@ -228,7 +272,8 @@ def test_the_mean_of_runs_is_unknown_where_one_of_them_is():
     assert (found.lag.lag.value, found.lag.delay, found.nonfinite) == (None, None, 3)
     assert motion_verdict(found).kind == "cannot be told"
     assert found.relative_rmse.value == pytest.approx(0.1, rel=0.01)
-    assert mean_measures([runs[0], runs[0]]) == runs[0]  # one seed twice: no spread, which is no error of 0
+    # one seed twice: no spread, which is no error of 0
+    assert mean_measures([runs[0], runs[0]]) == runs[0]
 
 
 @pytest.mark.slow
@@ -236,7 +281,8 @@ def test_the_mean_of_runs_is_unknown_where_one_of_them_is():
 def test_intervals_hold_the_reference():
     """Of 100 repeats 95 % intervals hold it in 90 to 99, and numbers scatter as their errors say.
 
-    The interval of the bias is wider, as its frames need not be independent (`mean_of_series`): 1.3 times at 40 frames.
+    The interval of the bias is wider, as its frames need not be independent
+    (`mean_of_series`): 1.3 times at 40 frames.
     """
     frames, held = ghosted(0.0, 6), np.zeros(4)
     scores = []

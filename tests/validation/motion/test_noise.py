@@ -23,7 +23,9 @@ SIGMA = 0.2
 
 def renders(seed: int, count: int, bias: float = 0.0, sigma: float = SIGMA) -> list[np.ndarray]:
     random = np.random.default_rng(seed)
-    return [(1 + bias) * REFERENCE + sigma * random.normal(size=REFERENCE.shape) for _ in range(count)]
+    return [
+        (1 + bias) * REFERENCE + sigma * random.normal(size=REFERENCE.shape) for _ in range(count)
+    ]
 
 
 @pytest.mark.claim("noise-white")
@@ -31,12 +33,17 @@ def test_white_noise_has_the_closed_form():
     runs, values = 16, REFERENCE.size
     found = measure_noise(REFERENCE, renders(1, runs), seconds=0.25)
     # The mean of s^2 over values has the relative deviation sqrt(2/(values (runs - 1))), 0.8 %.
-    assert found.variance.value == pytest.approx(SIGMA**2, rel=4 * math.sqrt(2 / (values * (runs - 1))))
+    assert found.variance.value == pytest.approx(
+        SIGMA**2, rel=4 * math.sqrt(2 / (values * (runs - 1)))
+    )
     # Squares of noise that is not there: deviation sigma^2 sqrt(2/(N(N-1) P)).
-    assert abs(found.squared_bias.value) < 4 * SIGMA**2 * math.sqrt(2 / (runs * (runs - 1) * values))
+    assert abs(found.squared_bias.value) < 4 * SIGMA**2 * math.sqrt(
+        2 / (runs * (runs - 1) * values)
+    )
     assert abs(found.bias.value) < 4 * SIGMA / math.sqrt(runs * values)
     assert found.root_bias is None or found.squared_bias.value > 0
-    np.testing.assert_allclose(found.spectrum, 1, atol=0.15)  # 4/sqrt(N k/2 channels), k = 12 in the first ring
+    # 4/sqrt(N k/2 channels), k = 12 in the first ring
+    np.testing.assert_allclose(found.spectrum, 1, atol=0.15)
     np.testing.assert_allclose(
         found.blur_gain, 1, atol=0.1
     )  # 768/(4 pi s^2) = 4 independent places of 16 runs, 3 channels
@@ -49,7 +56,10 @@ def test_noise_of_another_spectrum_is_told():
     random = np.random.default_rng(2)
     white = random.normal(size=(8, 24, 32, 3))
     blue = [REFERENCE + 0.1 * (each - np.roll(each, 1, axis=1)) for each in white]
-    blotches = [REFERENCE + 0.1 * sum(np.roll(each, shift, axis=(0, 1)) for shift in range(4)) for each in white]
+    blotches = [
+        REFERENCE + 0.1 * sum(np.roll(each, shift, axis=(0, 1)) for shift in range(4))
+        for each in white
+    ]
     # |1 - exp(-2 pi i f)|^2 is below 0.59 for f < 1/8, and depends on one frequency of two: 0.1 of its mean.
     assert measure_noise(REFERENCE, blue).low_fraction < 0.3
     assert measure_noise(REFERENCE, blotches).low_fraction > 1.5
@@ -57,7 +67,9 @@ def test_noise_of_another_spectrum_is_told():
 
 @pytest.mark.claim("noise-bias")
 def test_a_bias_of_a_thousandth_is_found():
-    """Of 1000 trials intervals hold it in 93 to 97 %; at its detectable size nine of ten find it, at zero one of 20."""
+    """Of 1000 trials intervals hold it in 93 to 97 %; at its detectable size nine of ten
+    find it, at zero one of 20.
+    """
     reference, bias, sigma, trials = REFERENCE[:8, :8], 0.001, 0.0095, 1000
     scale = float(np.sqrt(reference.size)) * float(reference.mean())
     runs = next(count for count in range(4, 99) if detectable(count) * sigma / scale < bias)
@@ -66,7 +78,9 @@ def test_a_bias_of_a_thousandth_is_found():
     noise = sigma * random.normal(size=(trials, runs, *reference.shape))
     errors = noise.mean(axis=(2, 3, 4)) / reference.mean()  # of runs without a bias
     middle, half = np.array([student(each) for each in errors]).T
-    intervals = [np.stack([own + middle - half, own + middle + half], axis=1) for own in (bias, 0.0)]
+    intervals = [
+        np.stack([own + middle - half, own + middle + half], axis=1) for own in (bias, 0.0)
+    ]
     held = np.mean((intervals[0][:, 0] <= bias) & (bias <= intervals[0][:, 1]))
     found, false = (np.mean(np.prod(np.sign(ends), axis=1) > 0) for ends in intervals)
     assert 0.93 <= held <= 0.97  # 0.95 +- 0.007
@@ -75,12 +89,15 @@ def test_a_bias_of_a_thousandth_is_found():
     one = measure_noise(reference, [(1 + bias) * reference + each for each in noise[0]])
     np.testing.assert_allclose(one.bias_ci, intervals[0][0], rtol=1e-9, atol=1e-12)
     assert one.runs == runs
-    assert one.detectable_bias == pytest.approx(bias, rel=0.8)  # by the deviation of 14 runs, +- 19 %
+    # by the deviation of 14 runs, +- 19 %
+    assert one.detectable_bias == pytest.approx(bias, rel=0.8)
 
 
 @pytest.mark.claim("noise-tails")
 def test_a_heavy_tail_is_not_taken_for_a_bias():
-    """Runs without a bias have too dark a mean while the brightest values are missing; skewed noise has none."""
+    """Runs without a bias have too dark a mean while the brightest values are
+    missing; skewed noise has none.
+    """
     reference, runs, trials = np.ones((24, 32, 3)), 12, 40
     random = np.random.default_rng(11)
 
@@ -90,21 +107,26 @@ def test_a_heavy_tail_is_not_taken_for_a_bias():
     power = 1.4  # of the tail: a mean of 1, no variance
     tails = (1 - 1 / power) * (1 - random.random((trials, runs, 24, 32))) ** (-1 / power)
     found = [said(each) for each in tails]
-    assert np.mean([np.prod(np.sign(each.bias_ci)) > 0 for each in found]) > 0.12  # by Student; 0.27 of 400
+    # by Student; 0.27 of 400
+    assert np.mean([np.prod(np.sign(each.bias_ci)) > 0 for each in found]) > 0.12
     assert np.mean([each.verdict.startswith("a bias") for each in found]) <= 0.05
     assert "cannot be told" in found[0].verdict
-    # In skewed noise with a variance a bias of detectable size is found as often as without a look at the tail.
+    # In skewed noise with a variance a bias of detectable size is found as often as
+    # without a look at the tail.
     exponential = random.exponential(size=(trials, runs, 24, 32))
     bias = detectable(runs) / math.sqrt(768)
     skewed = [said(each) for each in exponential - bias]
     assert not any("cannot be told" in each.verdict for each in skewed)
-    assert np.mean([each.verdict.startswith("a bias of -") for each in skewed]) > 0.75  # 0.9 +- 0.047
+    # 0.9 +- 0.047
+    assert np.mean([each.verdict.startswith("a bias of -") for each in skewed]) > 0.75
 
 
 @pytest.mark.claim("noise-bias")
 @pytest.mark.parametrize("runs", [2, 5])
 def test_the_squared_bias_is_unbiased(runs):
-    """Its mean of 300 repeats is within three errors of the square that was injected, also from two runs."""
+    """Its mean of 300 repeats is within three errors of the square that was
+    injected, also from two runs.
+    """
     reference, bias, sigma = REFERENCE[:4, :4], 0.05, 0.2
     random = np.random.default_rng(runs)
     noise = sigma * random.normal(size=(300, runs, *reference.shape))
@@ -125,7 +147,9 @@ def test_a_bias_of_changing_sign_shows_in_its_square():
 
 
 def test_a_seed_used_twice_is_noticed(variant, tmp_path):
-    """Eight files of four images are four runs: their squared bias, which is 0, would be far from it by its error."""
+    """Eight files of four images are four runs: their squared bias, which is 0, would be
+    far from it by its error.
+    """
     exact = reference_image(load_scene("open-fog", (16, 12)).scene).airlight
     random = np.random.default_rng(116)
     images = [exact + 0.3 * exact.mean() * random.normal(size=exact.shape) for _ in range(4)]
@@ -142,7 +166,11 @@ def test_a_run_without_a_finite_value_is_named(variant, tmp_path):
     exact = reference_image(load_scene("open-fog", (16, 12)).scene).airlight
     random = np.random.default_rng(5)
     for run in range(4):
-        image = np.nan * exact if run == 2 else exact + 0.1 * exact.mean() * random.normal(size=exact.shape)
+        image = (
+            np.nan * exact
+            if run == 2
+            else exact + 0.1 * exact.mean() * random.normal(size=exact.shape)
+        )
         write_exr(tmp_path / f"{run}.exr", Image({"airlight": image}), finite=False)
     found = compare_runs("open-fog", tmp_path / "#.exr", pixel="centre")
     assert found.noise.runs == 3
@@ -155,7 +183,9 @@ def test_a_run_without_a_finite_value_is_named(variant, tmp_path):
 
 @pytest.mark.parametrize("made", ["independent", "history", "accumulated", "skewed"])
 def test_runs_that_depend_on_one_another_have_no_average(made):
-    """A history between runs, and averages that go on, correlate the noise of neighbours; skewed noise does not."""
+    """A history between runs, and averages that go on, correlate the noise of
+    neighbours; skewed noise does not.
+    """
     runs = renders(6, 8)
     if made == "history":
         for number in range(1, 8):

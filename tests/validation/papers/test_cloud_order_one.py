@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: order 1 and opacity of the methods for clouds are those of light paths, which share no code with them."""
+"""Claim: order 1 and opacity of the methods for clouds are those of light paths, which
+share no code with them.
+"""
 
 import numpy as np
 import pytest
@@ -23,17 +25,26 @@ TWO = {
 
 @pytest.mark.statistical
 @pytest.mark.slow
-@pytest.mark.claim("cloud-single-scattering", tolerance="4.5 standard errors of the mean; seeds are fixed")
+@pytest.mark.claim(
+    "cloud-single-scattering", tolerance="4.5 standard errors of the mean; seeds are fixed"
+)
 def test_order_one_is_that_of_light_paths():
     """Two clouds of different droplets, one behind the other and in one another's light."""
     back = cloud("back", ring((61.3, 190.7, -40.1)), TWO)
     scene = loaded(sun=SUN, front=cloud("front", ring()), back=back)
     sampled = monte_carlo_reference(
-        LoadedScene("rings", scene, "", ""), "cloud-paths", budget=Budget(samples=1024), orders=("1",)
+        LoadedScene("rings", scene, "", ""),
+        "cloud-paths",
+        budget=Budget(samples=1024),
+        orders=("1",),
     ).image
     method = METHODS["cloud-octaves"]
-    frame = render_frame(frame_renderer(read_scene(scene), method, octaves=1, steps=128, extra_layers=True))
-    reference, error = (sampled.layers[name].astype(np.float64) for name in ("airlight_1", "airlight_1_se"))
+    frame = render_frame(
+        frame_renderer(read_scene(scene), method, octaves=1, steps=128, extra_layers=True)
+    )
+    reference, error = (
+        sampled.layers[name].astype(np.float64) for name in ("airlight_1", "airlight_1_se")
+    )
     difference = frame.airlight - reference
     assert np.count_nonzero(error) > 150
     # Four batches: the error of a pixel is known to 40 %, that of all pixels together well.

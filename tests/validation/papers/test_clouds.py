@@ -38,12 +38,17 @@ def test_figures_are_of_their_scenes_and_pixels(monkeypatch):
     monkeypatch.setattr(clouds, "_two_collectors", lambda loaded: np.zeros((2, 2), dtype=bool))
     figures = clouds.clouds_figures()
     assert asked == [("stratocumulus", 512), ("cumulus", 512), ("ring", 128)]
-    assert (figures["stratocumulus"].value, figures["cumulus"].value) == (pytest.approx(0.9), pytest.approx(1.1))
+    assert (figures["stratocumulus"].value, figures["cumulus"].value) == (
+        pytest.approx(0.9),
+        pytest.approx(1.1),
+    )
     lost = figures["gap, lost"]
     assert lost.value == pytest.approx(100 / 3 * 0.5)
     assert lost.low < lost.value < lost.high
     assert figures["lobes, two"] == "no pixel has two collectors"
-    monkeypatch.setattr(clouds, "_two_collectors", lambda loaded: np.array([[False, True], [False, False]]))
+    monkeypatch.setattr(
+        clouds, "_two_collectors", lambda loaded: np.array([[False, True], [False, False]])
+    )
     assert clouds.clouds_figures()["lobes, two"].value == pytest.approx(0.5)
     assert asked[-1] == ("two-lobes", 128)
 
@@ -61,19 +66,24 @@ def test_pixels_with_two_collectors_are_those_whose_searches_end_apart(monkeypat
     monkeypatch.setattr(clouds, "_searched_from", searched)
     monkeypatch.setattr(clouds, "read_scene", lambda scene: scene)
     found = clouds._two_collectors(SimpleNamespace(scene=None))
-    assert found.tolist() == [[False, True, False, False]]  # alike, apart, dark, and within one wide spread
+    # alike, apart, dark, and within one wide spread
+    assert found.tolist() == [[False, True, False, False]]
 
 
 def test_collectors_stand_beside_their_points(variant):
     collector = Collector(mi.Point3f([1, 2], 3, 4), mi.Float([5, 0]))
-    ((moved,), other) = clouds._each(((collector,), collector), lambda each: clouds._beside(each, -250.0))
+    ((moved,), other) = clouds._each(
+        ((collector,), collector), lambda each: clouds._beside(each, -250.0)
+    )
     for each in (moved, other):
         assert np.array(each.centre).T.tolist() == [[-250, 0, 0]] * 2
         assert np.array(each.width).tolist() == [60, 0]  # where there is none, none is made
 
 
 def test_points_are_shaded_where_their_way_to_the_sun_enters_a_cloud_again(variant):
-    """A ball of radius 1 m under one of 0.5 m, seen from below: its own light leaves it, and may enter the other."""
+    """A ball of radius 1 m under one of 0.5 m, seen from below: its own light leaves it,
+    and may enter the other.
+    """
     balls = {
         "lower": {"type": "sphere", "radius": 1.0},
         "upper": {"type": "sphere", "center": [0.0, 0.0, 5.0], "radius": 0.5},
@@ -84,7 +94,9 @@ def test_points_are_shaded_where_their_way_to_the_sun_enters_a_cloud_again(varia
     origin, down = np.array([0.0, 0.0, -8.0]), np.array([0.0, 0.0, -1.0])
     scene = mi.load_dict({"type": "scene", **balls})
     sun = SimpleNamespace(direction=down)
-    shaded = clouds._shaded(SimpleNamespace(scene=scene, suns=(sun,), origin=origin, direction=direction))
+    shaded = clouds._shaded(
+        SimpleNamespace(scene=scene, suns=(sun,), origin=origin, direction=direction)
+    )
     along = direction @ -origin
     inside = along**2 - 63  # of the root of the distance to the lower ball
     hit = inside > 0

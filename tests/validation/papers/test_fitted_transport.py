@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the functions that Bouthors 2008 fits find themselves again in light that has their form."""
+"""Claim: the functions that Bouthors 2008 fits find themselves again in
+light that has their form.
+"""
 
 import drjit as dr
 import numpy as np
@@ -15,9 +17,11 @@ THICKNESSES, DIRECTIONS = 4, 5
 
 
 def printed(number, t, d, mu, cos_phi, sin_phi, mu_l, *, of=dr):
-    """Return a T of the form of Bouthors 2008, section 5.2, with our own numbers and depths in fractions of t.
+    """Return a T of the form of Bouthors 2008, section 5.2, with our own numbers and
+    depths in fractions of t.
 
-    A bell at a depth that does not shrink with t is beyond thin slabs, where nothing of it is left to fit.
+    A bell at a depth that does not shrink with t is beyond thin slabs, where
+    nothing of it is left to fit.
     """
     b, shift = (0.4 + 0.1 * mu - 0.05 * mu_l) * t, 2.3 + 0.2 * mu
     bell = of.exp(-0.5 * ((d - b) / (0.6 * t)) ** 2)
@@ -26,11 +30,17 @@ def printed(number, t, d, mu, cos_phi, sin_phi, mu_l, *, of=dr):
 
 @pytest.mark.slow
 def test_light_of_the_printed_form_is_fitted_by_itself(variant, monkeypatch):
-    """The functions, fitted and looked up, at entries of their tables: between these they are interpolated.
+    """The functions, fitted and looked up, at entries of their tables: between
+    these they are interpolated.
 
-    In 12 evaluations a fit ends within some thousandths: a tenth of the 10 to 30 % by which the form misses real light.
+    In 12 evaluations a fit ends within some thousandths: a tenth of the 10 to 30 % by which
+    the form misses real light.
     """
-    for name, value in (("SETS", SETS[:2]), ("_THICKNESSES", THICKNESSES), ("_DIRECTIONS", DIRECTIONS)):
+    for name, value in (
+        ("SETS", SETS[:2]),
+        ("_THICKNESSES", THICKNESSES),
+        ("_DIRECTIONS", DIRECTIONS),
+    ):
         monkeypatch.setattr(fitted_transport, name, value)
     fitted, random = fit_radiance(printed, array_types()), np.random.default_rng(3)
     mu = fitted_transport._directions(DIRECTIONS)

@@ -9,7 +9,14 @@ import pytest
 from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import Hazy
 from airlight.validation.papers import formulas
-from airlight.validation.papers.formulas import _angular_form, _compared, _moderate, _over_angle, _over_distance, _worst
+from airlight.validation.papers.formulas import (
+    _angular_form,
+    _compared,
+    _moderate,
+    _over_angle,
+    _over_distance,
+    _worst,
+)
 
 
 def test_both_forms_of_the_integral_are_that_of_the_panels():
@@ -29,7 +36,9 @@ def test_the_worst_ratio_is_the_one_farthest_from_one(monkeypatch):
 
 def test_moderate_rays_are_at_moderate_distances_lengths_and_angles():
     def moderate(foot: float, height: float, length: float) -> bool:
-        cases = SimpleNamespace(foot=np.array([foot]), height=np.array([height]), x1=np.array([length]))
+        cases = SimpleNamespace(
+            foot=np.array([foot]), height=np.array([height]), x1=np.array([length])
+        )
         return bool(_moderate(cases)[0])
 
     assert moderate(0.6, 0.8, 2.0)

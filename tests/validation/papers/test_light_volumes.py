@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: what Billeter's sections 4 and 5 are judged by is what its words say: a filter, sizes of quads, a push."""
+"""Claim: what Billeter's sections 4 and 5 are judged by is what its words say: a
+filter, sizes of quads, a push.
+"""
 
 import numpy as np
 import pytest
@@ -24,11 +26,13 @@ def inverse_depths(depth: np.ndarray) -> np.ndarray:
 def test_the_plain_filter_is_the_sum_over_four_neighbours_of_the_depth():
     row, column = np.mgrid[: SIDE + 1, : SIDE + 1].astype(float)
     curved = laplacian(inverse_depths(100 + 0.5 * row**2 - 0.25 * column**2))[0]
-    # The second differences are 1 down and -0.5 across; beside the border a neighbour is the corner itself.
+    # The second differences are 1 down and -0.5 across; beside the border a
+    # neighbour is the corner itself.
     np.testing.assert_allclose(curved[1:-1, 1:-1], 0.5, atol=1e-9)
     assert curved[0, 0] == pytest.approx(abs(0.5 - 0.25))
     inverse = inverse_depths(np.full((SIDE + 1, SIDE + 1), 2.0))
-    inverse[0, 3, 4], inverse[0, 8, 8] = 0.0, 1 / 7.0  # nothing is there: as far as the farthest corner
+    # nothing is there: as far as the farthest corner
+    inverse[0, 3, 4], inverse[0, 8, 8] = 0.0, 1 / 7.0
     response = laplacian(inverse)[0]
     assert response[3, 4] == response[8, 8] == pytest.approx(4 * 5.0)
     assert response[3, 5] == pytest.approx(5.0)
@@ -37,7 +41,8 @@ def test_the_plain_filter_is_the_sum_over_four_neighbours_of_the_depth():
 def test_an_edge_has_quads_of_a_texel_and_what_is_flat_large_ones():
     marked = [np.zeros((1, 2**level, 2**level), dtype=bool) for level in range(4)]
     for level, flags in enumerate(marked):
-        flags[0, (3 << level) // SIDE, (9 << level) // SIDE] = True  # the texel in row 3 and column 9
+        # the texel in row 3 and column 9
+        flags[0, (3 << level) // SIDE, (9 << level) // SIDE] = True
     levels = quad_levels(divide(marked))[0]
     assert levels.shape == (SIDE, SIDE)
     assert (levels[2:4, 8:10] == 4).all()
@@ -50,8 +55,11 @@ def test_the_threshold_of_the_plain_filter_gives_as_many_triangles_as_are_wanted
     row, column = np.mgrid[: SIDE + 1, : SIDE + 1].astype(float)
     bump = inverse_depths(3 + np.exp(-((row - 5) ** 2 + (column - 11) ** 2) / 9))
     counts = [len(triangles(divide(plain_edges(bump, wanted)))) for wanted in (30, 150, 300)]
-    # One texel more divides at most its nodes on three levels and what their neighbours need: some thirty triangles.
-    assert all(wanted - 40 <= count <= wanted for wanted, count in zip((30, 150, 300), counts, strict=True))
+    # One texel more divides at most its nodes on three levels and what their neighbours
+    # need: some thirty triangles.
+    assert all(
+        wanted - 40 <= count <= wanted for wanted, count in zip((30, 150, 300), counts, strict=True)
+    )
     steepest = np.unravel_index(laplacian(bump)[0].argmax(), (SIDE + 1, SIDE + 1))
     finest = plain_edges(bump, 150)[-1][0]
     assert finest[min(steepest[0] // 2, 7), min(steepest[1] // 2, 7)]
@@ -62,14 +70,17 @@ def test_a_mesh_is_pushed_towards_its_light_by_a_fraction_of_its_depth(variant):
     place = np.array(light.position, dtype=float).ravel()
     depth, away = np.array([[2.0], [0.5]]), np.array([[0.6, 0.0, 0.8], [0.0, -1.0, 0.0]])
     s = 1 / depth
-    # A vertex is (light s + direction, s): over s it is the light and the depth along the direction.
+    # A vertex is (light s + direction, s): over s it is the light and the
+    # depth along the direction.
     mesh = VolumeMesh(np.hstack([place * s + away, s]), np.zeros((0, 3), dtype=np.int32))
     pushed = light_volumes._pushed(mesh, light, 0.1).vertices
     np.testing.assert_allclose(pushed[:, :3] / pushed[:, 3:], place + 0.9 * depth * away)
 
 
 def test_figures_of_the_tessellation_are_those_of_small_maps(variant, monkeypatch):
-    """The best bias leaves an eighth of the acne, and the adaptive mesh has the airlight of the static one."""
+    """The best bias leaves an eighth of the acne, and the adaptive mesh has the
+    airlight of the static one.
+    """
     for name, value in {"_BIAS_SIZE": (16, 12), "_BIAS_MAP": 32, "SIZE": (8, 6), "MAP": 64}.items():
         monkeypatch.setattr(light_volumes, name, value)
     figures = light_volumes.tessellation()
@@ -95,5 +106,8 @@ def test_the_clamped_sum_is_the_airlight_of_the_method(variant):
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, 32), light)
     J = light_volumes.crossings_sum(loaded, frame.distance.astype(float).ravel(), mesh, clamp=True)
     factor = frame.airlight / J[..., None]
-    # albedo, extinction and intensity over 4 pi: one factor for each channel; float32 and a table of J
-    np.testing.assert_allclose(factor, np.broadcast_to(np.median(factor, axis=(0, 1)), factor.shape), rtol=1e-3)
+    # albedo, extinction and intensity over 4 pi: one factor for each channel;
+    # float32 and a table of J
+    np.testing.assert_allclose(
+        factor, np.broadcast_to(np.median(factor, axis=(0, 1)), factor.shape), rtol=1e-3
+    )

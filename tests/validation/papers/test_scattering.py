@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: what a constant misses of multiple scattering, and what a constant distance costs, are measured as said."""
+"""Claim: what a constant misses of multiple scattering, and what a constant distance
+costs, are measured as said.
+"""
 
 from types import SimpleNamespace
 
@@ -12,7 +14,9 @@ from airlight.validation.papers import scattering
 from airlight.validation.papers.claims import INTERVAL, Figure
 
 
-def test_multiple_scattering_is_the_worst_of_the_scenes_and_the_fraction_of_thin_fog(variant, monkeypatch):
+def test_multiple_scattering_is_the_worst_of_the_scenes_and_the_fraction_of_thin_fog(
+    variant, monkeypatch
+):
     thin = []
 
     def fraction(scene, batches, samples):
@@ -20,8 +24,13 @@ def test_multiple_scattering_is_the_worst_of_the_scenes_and_the_fraction_of_thin
         return SimpleNamespace(medium=SimpleNamespace(value=0.01, interval=(0.008, 0.012)))
 
     monkeypatch.setattr(scattering, "multiple_scattering_fraction", fraction)
-    monkeypatch.setattr(scattering, "_left_over", {"open-fog": 0.2, "two-pens": 0.5, "colonnade": 0.3}.__getitem__)
-    assert scattering.multiple_scattering() == {"left over": 0.5, "thin": Figure(0.01, 0.008, 0.012, INTERVAL)}
+    monkeypatch.setattr(
+        scattering, "_left_over", {"open-fog": 0.2, "two-pens": 0.5, "colonnade": 0.3}.__getitem__
+    )
+    assert scattering.multiple_scattering() == {
+        "left over": 0.5,
+        "thin": Figure(0.01, 0.008, 0.012, INTERVAL),
+    }
     assert float(np.max(thin[0])) == pytest.approx(0.00173, rel=1e-5)
 
 
@@ -31,7 +40,9 @@ def test_two_and_more_scatterings_are_the_difference_of_depths(monkeypatch):
 
     def batches(scene, integrator, *, batches, samples, first_seed, max_depth):
         asked.append((first_seed, max_depth))
-        layers = {64: 5.0, 2: 3.0}[max_depth] + np.arange(len(scattering.LAYERS))[:, None, None] * np.ones((1, 4, 3))
+        layers = {64: 5.0, 2: 3.0}[max_depth] + np.arange(len(scattering.LAYERS))[
+            :, None, None
+        ] * np.ones((1, 4, 3))
         return SimpleNamespace(batches=SimpleNamespace(mean=layers))
 
     monkeypatch.setattr(scattering, "monte_carlo_batches", batches)
@@ -58,7 +69,8 @@ def test_a_constant_distance_costs_more_the_more_a_medium_attenuates(variant, mo
     both = scattering.constant_distance((8, 6))
     assert 0 < thin["largest bias"] < 0.03
     assert 0.1 < both["largest bias"] < 1
-    # The polynomial of degree 4 adds little to the error of the constant R, the printed equation more.
+    # The polynomial of degree 4 adds little to the error of the constant R,
+    # the printed equation more.
     assert both["polynomial, largest"] >= both["polynomial, median"] == pytest.approx(1, abs=0.01)
     assert thin["printed, median"] > both["printed, median"] > 1.5
 

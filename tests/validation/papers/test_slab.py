@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the figures of Bouthors's slab are ratios, fractions and crossings of the light that the slab has."""
+"""Claim: the figures of Bouthors's slab are ratios, fractions and crossings of the
+light that the slab has.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +34,9 @@ def test_the_change_by_azimuth_is_that_of_the_sum_of_the_modes(monkeypatch):
     ratios = slab._by_azimuth(0.01, None)
     phi = np.linspace(0, np.pi, 10_001)
     radiance = 1 + 0.6 * np.cos(phi) + 0.2 * np.cos(2 * phi)
-    assert list(ratios.values()) == pytest.approx([radiance.max() / radiance.min()] * len(SETS), rel=1e-3)
+    assert list(ratios.values()) == pytest.approx(
+        [radiance.max() / radiance.min()] * len(SETS), rel=1e-3
+    )
     ((thickness, suns, depths),) = asked
     assert (thickness, depths) == (10.0, [1.0])  # 1000 m and 100 m
     assert np.degrees(np.arccos(suns)) == pytest.approx(75.0)
@@ -44,7 +48,8 @@ def test_reflectance_of_a_thin_slab_is_that_of_one_scattering(monkeypatch):
     tau = 1e-3
     assert slab._reflectance(tau, HenyeyGreensteinPhase(0.0)) == pytest.approx(tau / 2, rel=0.01)
     reflected, transmitted = slab._fractions(tau, 60.0, HenyeyGreensteinPhase(0.0))
-    assert (reflected, transmitted) == (pytest.approx(100), pytest.approx(100))  # no order is above 30
+    # no order is above 30
+    assert (reflected, transmitted) == (pytest.approx(100), pytest.approx(100))
     few = [slab._fractions(tau, 0.0, HenyeyGreensteinPhase(0.0)) for tau in (10.0, 40.0)]
     assert few[0][0] > few[1][0] > few[1][1]
 
@@ -55,10 +60,19 @@ def test_the_median_of_a_fit_leaves_out_what_is_dim(monkeypatch):
 
     def curve(fit, exact):
         return TransportCurve(
-            thickness=1.0, depth=0.0, orders="2", angle=exact, exact=exact, grid=exact, fit=fit, whole=whole
+            thickness=1.0,
+            depth=0.0,
+            orders="2",
+            angle=exact,
+            exact=exact,
+            grid=exact,
+            fit=fit,
+            whole=whole,
         )
 
-    monkeypatch.setattr(slab, "transport_curves", lambda: [curve(fit, exact), curve(exact, 1e-9 * exact)])
+    monkeypatch.setattr(
+        slab, "transport_curves", lambda: [curve(fit, exact), curve(exact, 1e-9 * exact)]
+    )
     assert slab.transport_figures() == {"fit, median": pytest.approx(20.0)}
 
 

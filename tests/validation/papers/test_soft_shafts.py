@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: errors, edges, flicker and steps of Ali's figures are what the page of the experiment says, by hand."""
+"""Claim: errors, edges, flicker and steps of Ali's figures are what the page of the
+experiment says, by hand.
+"""
 
 from types import SimpleNamespace
 
@@ -41,7 +43,8 @@ def test_a_ratio_of_errors_has_the_interval_of_a_jackknife():
     assert exact[:3] == pytest.approx((2.0, 2.0, 2.0))
     other = random.normal(size=of.image.shape)
     found = of.ratio(of.image + 2 * other, of.image + noise)
-    # Each error is that of 672 values: the ratio of two has the relative standard deviation 1/sqrt(672), t_15 is 2.13.
+    # Each error is that of 672 values: the ratio of two has the relative standard deviation
+    # 1/sqrt(672), t_15 is 2.13.
     assert found.high - found.value == pytest.approx(found.value - found.low)
     assert found.high - found.value == pytest.approx(2.13 * 2 / np.sqrt(672), rel=0.5)
 
@@ -56,7 +59,8 @@ def test_edges_are_gradients_over_those_of_the_reference():
 
 def test_steps_at_equal_time_are_linear_in_the_times():
     times = {
-        name: SimpleNamespace(median_ms=ms) for name, ms in {"R1": 130.0, "R2": 12.0, "R3": 14.0, "R4": 22.0}.items()
+        name: SimpleNamespace(median_ms=ms)
+        for name, ms in {"R1": 130.0, "R2": 12.0, "R3": 14.0, "R4": 22.0}.items()
     }
     chosen = soft_shafts._at_equal_time(times)  # 118 steps take 118 ms
     assert chosen == {
@@ -73,13 +77,18 @@ def test_the_light_of_flicker_moves_in_equal_steps(variant, monkeypatch):
         (light,) = renderer.scene.area_lights
         middles.append(np.array(light.middle, dtype=float))
         n = (len(middles) - 1) % 5
-        # The square of the frame's number has the second difference 2, and twice that for all but the exact sum.
+        # The square of the frame's number has the second difference 2, and twice that
+        # for all but the exact sum.
         factor = 1.0 if len(middles) <= 5 else 3.0
-        return SimpleNamespace(airlight=factor * n**2 * np.ones((6, 8, 3)), surface=np.zeros((6, 8, 3)))
+        return SimpleNamespace(
+            airlight=factor * n**2 * np.ones((6, 8, 3)), surface=np.zeros((6, 8, 3))
+        )
 
     monkeypatch.setattr(soft_shafts, "render_frame", rendered)
     of = Reference(np.ones((6, 8, 3)), np.ones((6, 8), dtype=bool))
-    assert soft_shafts._flicker(scene, of) == {name: pytest.approx(3.0) for name in ("R2", "R4", "shared points")}
+    assert soft_shafts._flicker(scene, of) == {
+        name: pytest.approx(3.0) for name in ("R2", "R4", "shared points")
+    }
     steps = np.diff(np.array(middles[:5]), axis=0)
     np.testing.assert_allclose(np.linalg.norm(steps, axis=1), 0.02)
     np.testing.assert_allclose(steps, steps[:1] * np.ones((4, 1)), atol=1e-12)
@@ -90,7 +99,9 @@ def test_figures_are_those_of_the_renderings_that_their_names_say(monkeypatch):
     times = {name: SimpleNamespace(median_ms=100.0, rate=(1.0, 1.0, 1.0)) for name in RENDERINGS}
     monkeypatch.setattr(soft_shafts, "shafts_scene", lambda size: (None, Stub()))
     monkeypatch.setattr(soft_shafts, "timings", lambda scene, chosen, seconds: times)
-    monkeypatch.setattr(soft_shafts, "rendered", lambda scene, values: tuple(sorted(values.items(), key=str)))
+    monkeypatch.setattr(
+        soft_shafts, "rendered", lambda scene, values: tuple(sorted(values.items(), key=str))
+    )
     monkeypatch.setattr(soft_shafts, "_flicker", lambda scene, reference: {"R4": 0.5})
     figures = soft_shafts.soft_shafts((8, 6))
 
@@ -103,7 +114,10 @@ def test_figures_are_those_of_the_renderings_that_their_names_say(monkeypatch):
     assert figures["R4 edges"] == r4
     assert figures["R4 over R1"] == (r4, image(steps=150, filter="none"))
     assert figures["R4 over R3"] == (r4, image(steps=32, filter="gauss"))
-    assert figures["3 points over 16"] == (image(**VARIANTS["3 points"]), image(**VARIANTS["16 points"]))
+    assert figures["3 points over 16"] == (
+        image(**VARIANTS["3 points"]),
+        image(**VARIANTS["16 points"]),
+    )
     assert figures["32 taps over fewer"] == (r4, image(steps=4))
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the tables of Biri and Billeter at a small size: rates, errors, and the reason where there is neither."""
+"""Claim: the tables of Biri and Billeter at a small size: rates, errors, and the
+reason where there is neither.
+"""
 
 from types import SimpleNamespace
 
@@ -47,15 +49,21 @@ def test_one_pixel_in_a_stride_is_compared_from_the_middle_of_the_first_block():
 
 def test_the_colonnade_of_table_1_has_a_spot_in_place_of_its_lamp(variant):
     (light,) = read_scene(table_scene("colonnade", (8, 6))).lights
-    assert np.degrees(np.arccos(float(np.array(light.cos_cutoff).ravel()[0]))) == pytest.approx(56.7, abs=1e-3)
+    assert np.degrees(np.arccos(float(np.array(light.cos_cutoff).ravel()[0]))) == pytest.approx(
+        56.7, abs=1e-3
+    )
 
 
 def test_what_takes_too_long_or_fails_is_said(monkeypatch):
-    monkeypatch.setattr(billeter_tables, "timed", lambda work: (work(), SimpleNamespace(seconds=31.0)))
+    monkeypatch.setattr(
+        billeter_tables, "timed", lambda work: (work(), SimpleNamespace(seconds=31.0))
+    )
     monkeypatch.setattr(billeter_tables, "render_frame", lambda renderer: renderer)
     with pytest.raises(TimeoutError, match="a frame takes 31 s, more than the limit of 30 s"):
         frame_within("frame")
-    monkeypatch.setattr(billeter_tables, "timed", lambda work: (work(), SimpleNamespace(seconds=29.0)))
+    monkeypatch.setattr(
+        billeter_tables, "timed", lambda work: (work(), SimpleNamespace(seconds=29.0))
+    )
     assert frame_within("frame") == "frame"
 
     def fails(error):
@@ -64,6 +72,9 @@ def test_what_takes_too_long_or_fails_is_said(monkeypatch):
 
         return work
 
-    assert attempted(("a", "b"), fails(InputError("why"))) == {"a": "not measured: why", "b": "not measured: why"}
+    assert attempted(("a", "b"), fails(InputError("why"))) == {
+        "a": "not measured: why",
+        "b": "not measured: why",
+    }
     assert attempted(("a",), fails(MemoryError())) == {"a": "not measured: out of memory"}
     assert attempted(("a",), lambda: {"a": 1.0}) == {"a": 1.0}

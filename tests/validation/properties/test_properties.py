@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the properties of a scene are what it holds, finite for every scene, and none depends on a unit of length."""
+"""Claim: the properties of a scene are what it holds, finite for every scene, and none
+depends on a unit of length.
+"""
 
 import math
 
@@ -18,13 +20,17 @@ from airlight.validation.scenes.registry import FOG_SCENES
 def _scene(scale=1.0, *, sigma_t=0.37, lamp=(0.3, 0.1, 5.0), extra=None):
     """Return a box of 0.4 m under a lamp, over a floor at z = -1, seen from 4 m away."""
     cube = placed(scaled(box((0.4, 0.4, 0.4)), scale), (0.0, 0.0, 0.0))
-    floor = grid((-9.1 * scale, -9.3 * scale, -scale), (18.7 * scale, 0, 0), (0, 18.3 * scale, 0), (1, 1))
+    floor = grid(
+        (-9.1 * scale, -9.3 * scale, -scale), (18.7 * scale, 0, 0), (0, 18.3 * scale, 0), (1, 1)
+    )
     return read_scene(
         mi.load_dict(
             {
                 "type": "scene",
                 "fog": fog(sigma_t / scale, (0.9, 0.8, 0.7), {"type": "hg", "g": 0.6}),
-                "sensor": camera((0.0, -4.0 * scale, 0.01 * scale), (0, 0, 0), fov=40.0, size=(64, 48)),
+                "sensor": camera(
+                    (0.0, -4.0 * scale, 0.01 * scale), (0, 0, 0), fov=40.0, size=(64, 48)
+                ),
                 "lamp": point_light([scale * value for value in lamp], (1.0, 1.0, 1.0)),
                 "cube": mitsuba_mesh("cube", cube, (0.5, 0.5, 0.5)),
                 "floor": mitsuba_mesh("floor", floor, (0.5, 0.5, 0.5)),
@@ -53,7 +59,10 @@ def test_none_depends_on_the_unit_of_length(variant):
 
 
 @pytest.mark.slow
-@pytest.mark.claim("properties-finite", tolerance="none: every property of fourteen built-in and eight random scenes")
+@pytest.mark.claim(
+    "properties-finite",
+    tolerance="none: every property of fourteen built-in and eight random scenes",
+)
 def test_every_scene_has_the_same_properties_all_finite(variant):
     names = None
     for scene in (*FOG_SCENES, *(f"random:{seed}" for seed in range(8))):

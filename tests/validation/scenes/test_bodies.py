@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounds of media that are no bodies beside one another: what is refused, with the name of an edge, and what is not."""
+"""Bounds of media that are no bodies beside one another: what is refused, with the name of
+an edge, and what is not.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -13,10 +15,14 @@ from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, loaded, ring
 pytestmark = pytest.mark.usefixtures("variant")
 
 FAR = (400.3, 20.1, -30.7)
-WITHIN = np.array([3.71, -0.13, 2.03]) + 101.37 * TURN[:, 0]  # in the middle of the tube of the ring
+# in the middle of the tube of the ring
+WITHIN = np.array([3.71, -0.13, 2.03]) + 101.37 * TURN[:, 0]
 
 CORNERS = ring()[0][ring()[1][5]]  # of a facet, through which a small sphere dips without an edge
-BESIDE, FACET_NORMAL = CORNERS.mean(axis=0), np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])
+BESIDE, FACET_NORMAL = (
+    CORNERS.mean(axis=0),
+    np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0]),
+)
 FACET_NORMAL /= np.linalg.norm(FACET_NORMAL)
 
 
@@ -46,16 +52,40 @@ def ball(name, middle, radius):
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        ([(ring()[0], ring()[1][1:])], r"'0' .* not a closed surface: edge \d+-\d+ at \(.*\), one triangle meets it"),
+        (
+            [(ring()[0], ring()[1][1:])],
+            r"'0' .* not a closed surface: edge \d+-\d+ at \(.*\), one triangle meets it",
+        ),
         ([turned_part(ring(), [7])], r"not a closed surface: edge \d+-\d+ at \(.*the same way"),
-        ([joined([ring(), placed(flipped(torus(31.0, 9.0, (17, 9))), FAR)])], r"is inside out, at edge \d+-\d+ at"),
+        (
+            [joined([ring(), placed(flipped(torus(31.0, 9.0, (17, 9))), FAR)])],
+            r"is inside out, at edge \d+-\d+ at",
+        ),
         ([flipped(ring())], r"is inside out, at edge \d+-\d+ at \("),
-        ([pulled(ring(), 0, (-180.0, 10.0, 5.0))], r"crosses itself: edge \d+-\d+ at \(.*passes through triangle \d+"),
+        (
+            [pulled(ring(), 0, (-180.0, 10.0, 5.0))],
+            r"crosses itself: edge \d+-\d+ at \(.*passes through triangle \d+",
+        ),
         ([ring(), ring((90.3, 20.1, 4.7))], r"'0' and '1' overlap: edge \d+-\d+ at"),
-        ([ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)], r"'1' lies within that of shape '0', at edge \d+-\d+"),
-        ([joined([ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)])], r"has a part within another, at edge \d+-\d+"),
+        (
+            [ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)],
+            r"'1' lies within that of shape '0', at edge \d+-\d+",
+        ),
+        (
+            [joined([ring(), placed(box((7.0, 6.0, 5.0)), WITHIN)])],
+            r"has a part within another, at edge \d+-\d+",
+        ),
     ],
-    ids=["open", "turned", "part-inside-out", "inside-out", "self-crossing", "overlap", "nested", "nested-part"],
+    ids=[
+        "open",
+        "turned",
+        "part-inside-out",
+        "inside-out",
+        "self-crossing",
+        "overlap",
+        "nested",
+        "nested-part",
+    ],
 )
 def test_meshes_that_bound_no_body_are_refused_with_an_edge(parts, message):
     named = {str(number): cloud(str(number), mesh) for number, mesh in enumerate(parts)}
@@ -96,13 +126,25 @@ def test_spheres_beside_meshes_that_are_not_convex(middle, radius, message):
     "pair",
     [
         lambda gap: (ball("a", (0, 0, 0), 0.7), ball("b", (1.2 + gap, 0, 0), 0.5)),
-        lambda gap: (ball("a", (0, 0, 0), 0.7), cloud("b", placed(box((1.0, 1.2, 1.4)), (1.2 + gap, 0.1, 0)))),
-        # At an edge of the cube: its distance from the centre of the sphere counts, not its planes'.
         lambda gap: (
-            cloud("a", placed(box((1.0, 1.2, 1.4)), (*(np.array([0.5, 0.6]) + (0.7 + gap) / np.sqrt(2)), 0))),
+            ball("a", (0, 0, 0), 0.7),
+            cloud("b", placed(box((1.0, 1.2, 1.4)), (1.2 + gap, 0.1, 0))),
+        ),
+        # At an edge of the cube: its distance from the centre of the sphere
+        # counts, not its planes'.
+        lambda gap: (
+            cloud(
+                "a",
+                placed(
+                    box((1.0, 1.2, 1.4)), (*(np.array([0.5, 0.6]) + (0.7 + gap) / np.sqrt(2)), 0)
+                ),
+            ),
             ball("b", (0, 0, 0), 0.7),
         ),
-        lambda gap: (cloud("a", box((1.0, 1.2, 1.4))), cloud("b", placed(box((1.0, 1.2, 1.4)), (1.0 + gap, 0.3, 0.2)))),
+        lambda gap: (
+            cloud("a", box((1.0, 1.2, 1.4))),
+            cloud("b", placed(box((1.0, 1.2, 1.4)), (1.0 + gap, 0.3, 0.2))),
+        ),
         lambda gap: (
             cloud("a", icosphere(2)),
             cloud("b", placed(box((0.2, 0.3, 0.4)), (0, 0, 0) if gap < 0 else (3.0, 0, 0))),

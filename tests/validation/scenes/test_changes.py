@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes and movements of a scene by name: both sides read the same, nothing is read or compiled twice."""
+"""Changes and movements of a scene by name: both sides read the same, nothing
+is read or compiled twice.
+"""
 
 import dataclasses
 from dataclasses import replace
@@ -34,8 +36,16 @@ CHANGES = {
         "medium.albedo": (0.71, 0.63, 0.57),
         "medium.g": (-0.41,),
     },
-    "windows": {"light.direction": (0.7, -0.31, -0.61), "light.irradiance": (11.0,), "medium.sigma_t": (0.37,)},
-    "sphere-spot": {"light.position": (0.41, 0.3, 4.5), "light.direction": (0.1, 0.05, -1.0), "camera.fov": (31.0,)},
+    "windows": {
+        "light.direction": (0.7, -0.31, -0.61),
+        "light.irradiance": (11.0,),
+        "medium.sigma_t": (0.37,),
+    },
+    "sphere-spot": {
+        "light.position": (0.41, 0.3, 4.5),
+        "light.direction": (0.1, 0.05, -1.0),
+        "camera.fov": (31.0,),
+    },
     "three-media": {"medium-3.g": (0.23,), "medium-2.sigma_t": (0.61,), "medium.albedo": (0.5,)},
     "soft-hall": {"light.radiance": (211.0, 307.0, 401.0)},
     "valley": {"medium.H_1": (3.1,), "medium.sigma_2": (0.031,), "medium.z_2": (0.7,)},
@@ -45,7 +55,11 @@ CHANGES = {
 def _numbers(value):
     """All numbers in a tree of dataclasses, tuples and arrays."""
     if dataclasses.is_dataclass(value):
-        return [number for item in dataclasses.fields(value) for number in _numbers(getattr(value, item.name))]
+        return [
+            number
+            for item in dataclasses.fields(value)
+            for number in _numbers(getattr(value, item.name))
+        ]
     if isinstance(value, tuple | list):
         return [number for item in value for number in _numbers(item)]
     if dr.is_array_v(value) or isinstance(value, int | float | bool | str | np.ndarray):
@@ -55,7 +69,10 @@ def _numbers(value):
 
 def _read(scene):
     parts = read_scene(scene)
-    return [_numbers(part) for part in (parts.camera, parts.medium, parts.lights, parts.area_lights, parts.features)]
+    return [
+        _numbers(part)
+        for part in (parts.camera, parts.medium, parts.lights, parts.area_lights, parts.features)
+    ]
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -64,7 +81,10 @@ def test_a_scene_that_is_read_again_is_the_scene_read_anew(name):
     before = read_scene(loaded.scene)
     change_scene(loaded.scene, CHANGES[name])
     again = read_again(before, loaded.scene)
-    read = [_numbers(part) for part in (again.camera, again.medium, again.lights, again.area_lights, again.features)]
+    read = [
+        _numbers(part)
+        for part in (again.camera, again.medium, again.lights, again.area_lights, again.features)
+    ]
     assert read == _read(load_scene(name, (16, 12), CHANGES[name]).scene)
     assert read != _read(load_scene(name, (16, 12)).scene)
     assert again.geometry is before.geometry
@@ -76,10 +96,14 @@ def test_methods_and_reference_see_the_same_camera_light_and_medium():
     np.testing.assert_allclose(np.array(scene.camera.origin).ravel(), reference.origin, rtol=1e-6)
     middle = reference.direction.reshape(12, 16, 3)[5:7, 7:9].mean(axis=(0, 1))
     aim = np.subtract((4.7, 1.5, 4.3), (1.3, 1.9, 4.1))
-    np.testing.assert_allclose(middle / np.linalg.norm(middle), aim / np.linalg.norm(aim), atol=1e-5)
+    np.testing.assert_allclose(
+        middle / np.linalg.norm(middle), aim / np.linalg.norm(aim), atol=1e-5
+    )
     np.testing.assert_allclose(reference.lights[0].position, (5.3, 1.7, 3.9), rtol=1e-6)
     np.testing.assert_allclose(reference.lights[0].intensity, (111.0, 97.0, 53.0), rtol=1e-6)
-    np.testing.assert_allclose(np.array(scene.lights[0].position).ravel(), (5.3, 1.7, 3.9), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.array(scene.lights[0].position).ravel(), (5.3, 1.7, 3.9), rtol=1e-6
+    )
     np.testing.assert_allclose(reference.medium.sigma_t, 0.13, rtol=1e-6)
     np.testing.assert_allclose(float(scene.medium.sigma_t[0][0]), 0.13, rtol=1e-6)
     assert reference.medium.phase.g == pytest.approx(-0.41, rel=1e-6)
@@ -111,7 +135,10 @@ def test_words_of_changes_come_back_to_the_last_digit():
 def test_a_change_that_cannot_be_is_one_line(change, message):
     if not message:  # a target where the camera is
         origin = changeable(load_scene("colonnade").scene)["camera.origin"].value
-        change, message = f"camera.target={','.join(map(repr, origin))}", "got a target at the origin"
+        change, message = (
+            f"camera.target={','.join(map(repr, origin))}",
+            "got a target at the origin",
+        )
     with pytest.raises(InputError) as raised:
         load_scene("colonnade", (16, 12), parse_changes([change]))
     assert message in str(raised.value)
@@ -123,7 +150,9 @@ def test_an_isotropic_medium_gets_a_lobe_for_methods_and_reference(tmp_path, as_
     name = "open-fog"
     if as_file:
         name = str(tmp_path / "fog.xml")
-        parsed = mi.parser.parse_dict(mi.parser.ParserConfig(mi.variant()), SCENES["open-fog"].build())
+        parsed = mi.parser.parse_dict(
+            mi.parser.ParserConfig(mi.variant()), SCENES["open-fog"].build()
+        )
         mi.parser.write_file(parsed, name)
     scene = load_scene(name, (16, 12), {"medium.g": (0.31,), "medium.sigma_t": (0.2,)}).scene
     assert float(read_scene(scene).medium.phase.g[0]) == pytest.approx(0.31)
@@ -155,7 +184,8 @@ def test_lights_circle_at_one_height_and_come_back(variant, name):
     assert radius[0] > 0.1
     np.testing.assert_allclose(radius, radius[0], rtol=1e-5)
     steps = np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)
-    np.testing.assert_allclose(steps, steps[0], rtol=1e-4)  # the step from the last to the first included
+    # the step from the last to the first included
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-4)
 
 
 @pytest.mark.claim("frames-are-replayed")
@@ -170,7 +200,11 @@ def test_lights_circle_at_one_height_and_come_back(variant, name):
             for case in (
                 ("clutter", ("light", "colour"), "shadow-planes"),
                 ("fence", ("light",), "light-volumes"),
-                *(("sphere-spot", ("light",), m) for m in FOG_METHODS if m not in ("shadow-planes", "light-volumes")),
+                *(
+                    ("sphere-spot", ("light",), m)
+                    for m in FOG_METHODS
+                    if m not in ("shadow-planes", "light-volumes")
+                ),
             )
         ),
     ],
@@ -186,7 +220,9 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
             dr.kernel_history_clear()
             _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
             kernels = dr.kernel_history((dr.KernelType.JIT,))
-            compiled = [kernel for kernel in kernels if not kernel["cache_hit"] or kernel["cache_disk"]]
+            compiled = [
+                kernel for kernel in kernels if not kernel["cache_hit"] or kernel["cache_disk"]
+            ]
         assert kernels
         if number:
             assert not compiled
@@ -197,10 +233,17 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves, method)
 
 @pytest.mark.parametrize(
     ("moves", "casts", "prepared_frames"),
-    [(("light",), 1, 4), (("medium", "colour"), 1, 1), (("light", "colour"), 1, 4), (("objects", "medium"), 4, 4)],
+    [
+        (("light",), 1, 4),
+        (("medium", "colour"), 1, 1),
+        (("light", "colour"), 1, 4),
+        (("objects", "medium"), 4, 4),
+    ],
 )
 def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
-    """Four frames: camera rays are cast again where objects move alone, planes are found again where the light does."""
+    """Four frames: camera rays are cast again where objects move alone, planes are found
+    again where the light does.
+    """
     scene, animation = read("two-pens")
     animation = replace(animation, moves=moves)
     renderer = prepared(scene, configuration("shadow-planes"))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scene files as people write them are taken with the right image, or refused by the name of what is in the way."""
+"""Scene files as people write them are taken with the right image, or refused by the
+name of what is in the way.
+"""
 
 from typing import Any
 
@@ -56,7 +58,9 @@ def image(scene):
 
 
 def test_a_cylinder_is_one_mesh_for_all(load):
-    """Its name, place and material stay, and its shadow is that of the round one except for the sides."""
+    """Its name, place and material stay, and its shadow is that of the round
+    one except for the sides.
+    """
     scene = load(LAMP, shape("cylinder", GREY, name="pipe", size=0.3))
     (pipe,) = scene.shapes()
     assert (pipe.id(), pipe.is_mesh(), pipe.face_count()) == ("pipe", True, 512)
@@ -67,9 +71,14 @@ def test_a_cylinder_is_one_mesh_for_all(load):
 
 
 def test_references_to_the_medium_that_is_there_change_nothing(load):
-    """Walls and lamps of Mitsuba 0.6 say in which medium they stand; volpath and both readers see the plain scene."""
+    """Walls and lamps of Mitsuba 0.6 say in which medium they stand; volpath and both
+    readers see the plain scene.
+    """
     fog = '<ref name="exterior" id="fog"/>'
-    ball, lamp = shape("sphere", GREY + fog), shape("rectangle", fog + GLOW, name="glow", at=(-0.6, 0.2, 1.6), size=0.1)
+    ball, lamp = (
+        shape("sphere", GREY + fog),
+        shape("rectangle", fog + GLOW, name="glow", at=(-0.6, 0.2, 1.6), size=0.1),
+    )
     said = load(LAMP, ball, lamp)
     assert all(each.exterior_medium() is None for each in said.shapes())
     plain = load(LAMP, ball.replace(fog, ""), lamp.replace(fog, ""))
@@ -79,25 +88,48 @@ def test_references_to_the_medium_that_is_there_change_nothing(load):
 def test_a_wall_in_a_box_of_fog_may_name_it(load):
     box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
     ball = shape("sphere", GREY + '<ref name="exterior" id="fog"/>', size=0.3)
-    assert all(each.exterior_medium() is None for each in load(LAMP, box, ball, camera=CAMERA.format("")).shapes())
+    assert all(
+        each.exterior_medium() is None
+        for each in load(LAMP, box, ball, camera=CAMERA.format("")).shapes()
+    )
     with pytest.raises(
-        InputError, match=r"'thing' is opaque and references medium 'fog' as exterior, where there is no medium"
+        InputError,
+        match=(
+            r"'thing' is opaque and references medium 'fog' as exterior, where there is no medium"
+        ),
     ):
         load(LAMP, box, ball.replace('x="0.1"', 'x="2.1"'), camera=CAMERA.format(""))
 
 
 def test_a_medium_written_twice_is_one(load):
-    """A camera within a box, and a wall in it, may write out the medium of the box instead of naming it."""
+    """A camera within a box, and a wall in it, may write out the medium of the
+    box instead of naming it.
+    """
     fog = '<medium type="homogeneous" name="{}">' + COEFFICIENTS + "</medium>"
     box = shape("cube", NULL + fog.format("interior"), name="box", size=6)
-    scene = load(LAMP, box, shape("sphere", GREY + fog.format("exterior")), camera=CAMERA.format(fog.format("medium")))
-    plain = load(LAMP, box.replace("<medium", "<medium id='fog'"), shape("sphere", GREY), camera=FOGGY, media="")
+    scene = load(
+        LAMP,
+        box,
+        shape("sphere", GREY + fog.format("exterior")),
+        camera=CAMERA.format(fog.format("medium")),
+    )
+    plain = load(
+        LAMP,
+        box.replace("<medium", "<medium id='fog'"),
+        shape("sphere", GREY),
+        camera=FOGGY,
+        media="",
+    )
     np.testing.assert_array_equal(image(scene), image(plain))
 
 
 def test_a_floor_in_the_bound_of_a_medium_is_noted(load):
-    """There rays that pass the bound miss the floor: volpath and single-scatter lose a quarter of such surfaces."""
-    box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", at=(0, 0, 0.7), size=0.7)
+    """There rays that pass the bound miss the floor: volpath and single-scatter lose a
+    quarter of such surfaces.
+    """
+    box = shape(
+        "cube", NULL + '<ref name="interior" id="fog"/>', name="box", at=(0, 0, 0.7), size=0.7
+    )
     for name, height, noted in (("floor", 0.0, True), ("lower", -0.01, False)):
         floor = shape("rectangle", GREY, name=name, at=(0, 0, height), size=3)
         notes = touching(load(LAMP, box, floor, camera=CAMERA.format("")))
@@ -106,48 +138,75 @@ def test_a_floor_in_the_bound_of_a_medium_is_noted(load):
 
 def test_shapes_keep_their_names_and_are_not_merged(load):
     box = NULL + '<ref name="interior" id="fog"/>'
-    boxes = [shape("cube", box, name=name, at=(x, 0.2, 0.6), size=0.2) for name, x in (("a", -0.4), ("b", 0.5))]
-    assert [each.id() for each in load(LAMP, *boxes, camera=CAMERA.format("")).shapes()] == ["a", "b"]
+    boxes = [
+        shape("cube", box, name=name, at=(x, 0.2, 0.6), size=0.2)
+        for name, x in (("a", -0.4), ("b", 0.5))
+    ]
+    assert [each.id() for each in load(LAMP, *boxes, camera=CAMERA.format("")).shapes()] == [
+        "a",
+        "b",
+    ]
 
 
 def test_instances_give_the_image_of_shapes_written_out(load):
     post = '<shape type="{}" id="{}"><transform name="to_world"><scale x="0.1" y="0.2" z="0.4"/></transform>{}</shape>'
-    places = [(f"post-{number}", f'<translate x="{0.5 * number}" y="0.3" z="0.4"/>') for number in (-1, 0, 1)]
+    places = [
+        (f"post-{number}", f'<translate x="{0.5 * number}" y="0.3" z="0.4"/>')
+        for number in (-1, 0, 1)
+    ]
     group = f'<shape type="shapegroup" id="posts">{post.format("cube", "post", GREY)}</shape>'
     instances = [
-        f'<shape type="instance" id="{name}"><ref id="posts"/><transform name="to_world">{place}</transform></shape>'
+        f'<shape type="instance" id="{name}"><ref id="posts"/><transform '
+        f'name="to_world">{place}</transform></shape>'
         for name, place in places
     ]
-    flat = [post.format("cube", name, GREY).replace("</transform>", place + "</transform>") for name, place in places]
+    flat = [
+        post.format("cube", name, GREY).replace("</transform>", place + "</transform>")
+        for name, place in places
+    ]
     scene = load(LAMP, group, *instances)
     assert [each.id() for each in scene.shapes()] == ["post--1", "post-0", "post-1"]
-    np.testing.assert_allclose(image(scene), image(load(LAMP, *flat)), rtol=1e-5)  # transforms are float32 numbers
+    # transforms are float32 numbers
+    np.testing.assert_allclose(image(scene), image(load(LAMP, *flat)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("turn", ["", '<boolean name="flip_normals" value="true"/>'])
 def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn):
-    """The corners run round the quad, as modelling programs write them; the side that shines is the mesh's."""
+    """The corners run round the quad, as modelling programs write them; the side
+    that shines is the mesh's.
+    """
     (tmp_path / "quad.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
     mesh = '<string name="filename" value="quad.obj"/>' + turn + GLOW
-    quad, rectangle = (load(shape(plugin, inside)) for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW)))
+    quad, rectangle = (
+        load(shape(plugin, inside))
+        for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW))
+    )
     found, wanted = (read_reference(scene).area[0] for scene in (quad, rectangle))
     for name in ("centre", "normal", "area", "power"):
-        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(
+            getattr(found, name), getattr(wanted, name), rtol=1e-5, atol=1e-6
+        )
 
 
 def test_a_lamp_on_a_box_is_its_six_sides(load):
-    """Each of them an area light of its own, shining outwards; together they send what the box sends."""
+    """Each of them an area light of its own, shining outwards; together they
+    send what the box sends.
+    """
     lights = read_reference(load(shape("cube", GLOW, size=0.3))).area
     assert sorted(light.name for light in lights) == [f"thing-{number}" for number in range(1, 7)]
     outwards = [light.normal @ (light.centre - (0.1, 0.1, 0.7)) for light in lights]
     np.testing.assert_allclose(outwards, 0.3, rtol=1e-5)
-    np.testing.assert_allclose(sum(light.power for light in lights), np.pi * 6 * 0.36 * np.array([3, 2, 1]), rtol=1e-5)
+    np.testing.assert_allclose(
+        sum(light.power for light in lights), np.pi * 6 * 0.36 * np.array([3, 2, 1]), rtol=1e-5
+    )
 
 
 def test_a_lamp_that_reflects_is_lit_like_any_surface(load):
     """Its emission does not change its reflection; it lights the scene like a black lamp."""
     rgb = '<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf></bsdf>'
-    turned = shape("rectangle", "{}", at=(0.1, 0.9, 0.7)).replace("<rotate", '<rotate x="1" angle="90"/><rotate')
+    turned = shape("rectangle", "{}", at=(0.1, 0.9, 0.7)).replace(
+        "<rotate", '<rotate x="1" angle="90"/><rotate'
+    )
     plain = image(load(LAMP, turned.format(rgb.format("0.5, 0.4, 0.3"))))
     black = image(load(LAMP, turned.format(rgb.format("0, 0, 0") + GLOW)))
     glowing = image(load(LAMP, turned.format(rgb.format("0.5, 0.4, 0.3") + GLOW)))
@@ -164,7 +223,8 @@ def test_a_sky_is_seen_through_the_fog_and_lights_it(load):
     without = image(load(LAMP, box, camera=CAMERA.format("")))[0].reshape(with_sky.airlight.shape)
     np.testing.assert_array_equal(with_sky.airlight > without, without > 0)
     assert with_sky.emitted is not None
-    through = -np.log(with_sky.emitted / [0.2, 0.3, 0.4]) / 0.23  # Beer's law gives how much fog a ray has met [m]
+    # Beer's law gives how much fog a ray has met [m]
+    through = -np.log(with_sky.emitted / [0.2, 0.3, 0.4]) / 0.23
     assert through.max() == pytest.approx(2.2 / np.cos(np.deg2rad(17)), rel=0.1)
     assert through.min() == pytest.approx(0, abs=1e-6)
     np.testing.assert_allclose(through[..., 0], through[..., 1], atol=1e-6)
@@ -178,7 +238,12 @@ def test_scattering_and_absorption_become_extinction_and_albedo(load, capfd, ver
     camera = CAMERA.format(INSIDE.replace("fog", f"fog-{version}"))
     camera = camera.replace("to_world", "toWorld").replace("<lookat", "<lookAt") if old else camera
     medium = read_reference(
-        load(LAMP, camera=camera, media=media.format(*("SA" if old else ("_s", "_a")), version), version=version)
+        load(
+            LAMP,
+            camera=camera,
+            media=media.format(*("SA" if old else ("_s", "_a")), version),
+            version=version,
+        )
     )
     np.testing.assert_allclose(medium.medium.sigma_t, [0.085, 1.0, 0.085], rtol=1e-6)
     np.testing.assert_allclose(medium.medium.albedo, [0.15 / 0.17, 0.75, 0.14 / 0.17], rtol=1e-6)
@@ -196,14 +261,18 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "medium 'fog' names the material 'skimmilk'; expected its sigma_t .* in numbers": (
         {"media": medium('<string name="material" value="skimmilk"/>')},
     ),
-    "medium 'fog' has a density.*sigma_t": ({"media": medium('<float name="density" value="2"/>')},),
+    "medium 'fog' has a density.*sigma_t": (
+        {"media": medium('<float name="density" value="2"/>')},
+    ),
     "light 'slide' is of type 'projector'": ({}, '<emitter type="projector" id="slide"/>'),
     "light 'gobo', of type 'spot', has a texture": (
         {},
         '<emitter type="spot" id="gobo"><texture type="checkerboard" name="texture"/></emitter>',
     ),
     "light 'sun' is of type 'sunsky'": ({}, '<emitter type="sunsky" id="sun"/>'),
-    'write another up, for example up="0, 1, 0"': ({"camera": FOGGY.replace("0.1, 0, 0.6", "0.2, -4.1, 0")},),
+    'write another up, for example up="0, 1, 0"': (
+        {"camera": FOGGY.replace("0.1, 0, 0.6", "0.2, -4.1, 0")},
+    ),
     "camera 'eye' is of type 'orthographic'": (
         {
             "camera": CAMERA.format(INSIDE)
@@ -242,9 +311,14 @@ def test_what_no_command_takes_is_refused_by_its_name(load, words):
 @pytest.mark.parametrize("coefficient", ["albedo", "sigma_t"])
 def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coefficient):
     """Mitsuba calls a medium homogeneous whose albedo differs from place to place."""
-    mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(str(tmp_path / "grid.vol"))
+    mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(
+        str(tmp_path / "grid.vol")
+    )
     other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
-    scene = load(LAMP, media=medium(GRID.format(coefficient, "grid.vol") + f'<float name="{other}" value="0.4"/>'))
+    scene = load(
+        LAMP,
+        media=medium(GRID.format(coefficient, "grid.vol") + f'<float name="{other}" value="0.4"/>'),
+    )
     for read in (read_reference, read_scene):
         with pytest.raises(InputError, match=f"{coefficient} differs from place to place"):
             read(scene)
@@ -253,7 +327,11 @@ def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coef
 def written(plugin, kind):
     """Return the settings of a file and what it holds to try a plugin."""
     tag = {"PhaseFunction": "phase"}.get(kind, kind.lower())
-    nested = '<bsdf type="diffuse"/>' if plugin in ("twosided", "mask", "blendbsdf", "bumpmap", "normalmap") else ""
+    nested = (
+        '<bsdf type="diffuse"/>'
+        if plugin in ("twosided", "mask", "blendbsdf", "bumpmap", "normalmap")
+        else ""
+    )
     element = f'<{tag} type="{plugin}" id="tried">{{}}</{tag}>'
     inside = {"Sensor": INSIDE + LOOK, "Medium": COEFFICIENTS}.get(kind, nested)
     tried = element.format(inside)
@@ -276,7 +354,10 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
     kinds = ("Sensor", "Emitter", "Shape", "BSDF", "Medium", "PhaseFunction")
     folder = Path(mi.__file__).parent / "plugins"
     plugins = sorted({path.name.partition(".")[0] for path in folder.iterdir()})
-    tried = {plugin: str(mi.PluginManager.instance().plugin_type(plugin)).rpartition(".")[2] for plugin in plugins}
+    tried = {
+        plugin: str(mi.PluginManager.instance().plugin_type(plugin)).rpartition(".")[2]
+        for plugin in plugins
+    }
     said = {}
     for plugin, kind in tried.items():
         if kind in kinds:
@@ -287,14 +368,24 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
             except InputError as refusal:
                 said[plugin] = str(refusal)
     assert all("\n" not in words for words in said.values())
-    assert {"perspective", "point", "sphere", "diffuse", "plastic", "homogeneous", "hg", "rayleigh", "isotropic"} <= {
-        plugin for plugin, words in said.items() if words == "own"
-    }
+    assert {
+        "perspective",
+        "point",
+        "sphere",
+        "diffuse",
+        "plastic",
+        "homogeneous",
+        "hg",
+        "rayleigh",
+        "isotropic",
+    } <= {plugin for plugin, words in said.items() if words == "own"}
     assert "'projector'" in said["projector"]
 
 
 def room(*, without=""):
-    """A window of a room of fog and its five walls, which reference the fog too; a lamp and a ball are inside."""
+    """A window of a room of fog and its five walls, which reference the fog too; a
+    lamp and a ball are inside.
+    """
     turns = {
         "window": '<rotate x="1" angle="90"/><translate y="-1.3"/>',
         "back": '<rotate x="1" angle="90"/><translate y="1.3"/>',
@@ -316,9 +407,13 @@ def test_a_room_of_fog_behind_a_window_is_a_box(load):
     """The image is that of a box of fog within the same walls."""
     rooms = load(*room(), camera=CAMERA.format(""))
     assert next(each for each in rooms.shapes() if each.id() == "window").is_mesh()
-    box = '<shape type="cube" id="window"><transform name="to_world"><scale value="1.3"/></transform>'
+    box = (
+        '<shape type="cube" id="window"><transform name="to_world"><scale value="1.3"/></transform>'
+    )
     walls = [part.replace(OUTSIDE, "") for part in room(without="window")]
-    plain = load(*walls, f'{box}{NULL}<ref name="interior" id="fog"/></shape>', camera=CAMERA.format(""))
+    plain = load(
+        *walls, f'{box}{NULL}<ref name="interior" id="fog"/></shape>', camera=CAMERA.format("")
+    )
     expected = image(plain)
     assert expected[0].max() > 0
     # The box reaches 1e-4 of its size beyond the walls.
@@ -336,7 +431,8 @@ def table(words, values):
 
 
 @pytest.mark.claim(
-    "droplets-in-scenes", tolerance="0.001 of the fraction and of g, 0.1 % of values from 10 to 30 degrees"
+    "droplets-in-scenes",
+    tolerance="0.001 of the fraction and of g, 0.1 % of values from 10 to 30 degrees",
 )
 def test_a_table_keeps_the_light_of_the_peak(variant):
     values = table("mie", 2001)
@@ -363,7 +459,9 @@ def fog_of(phase, size=(8, 6)):
     )
 
 
-@pytest.mark.claim("droplets-in-scenes", tolerance="2e-3 relative: kernels integrate across the kinks of the table")
+@pytest.mark.claim(
+    "droplets-in-scenes", tolerance="2e-3 relative: kernels integrate across the kinks of the table"
+)
 def test_methods_and_reference_see_the_same_fog_of_droplets(variant):
     scene = fog_of(tabulated_phase("mie", 2001))
     assert read_scene(scene).medium.phase.lobe < 0.1
@@ -372,7 +470,9 @@ def test_methods_and_reference_see_the_same_fog_of_droplets(variant):
     assert np.sort(frame) == pytest.approx(np.sort(reference), rel=2e-3)
 
 
-@pytest.mark.claim("droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval")
+@pytest.mark.claim(
+    "droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval"
+)
 @pytest.mark.statistical
 def test_mitsuba_sees_the_same_fog_of_droplets(variant):
     margins = {"single-scatter": 0.01, "volpath": 0.01}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Height fog of Mitsuba's volume and of engines' parameters: its density, what it refuses, and that readers agree."""
+"""Height fog of Mitsuba's volume and of engines' parameters: its density, what it
+refuses, and that readers agree.
+"""
 
 import math
 
@@ -48,10 +50,14 @@ def test_mitsuba_and_the_reference_have_one_density(loaded, clamped):
 
 def test_up_is_the_third_axis_of_the_box(loaded):
     turned = '<transform name="to_world"><scale x="40" y="40" z="43"/><rotate x="1" angle="-90"/></transform>'
-    medium = read_reference(loaded(fog_xml(LAMP, fog=FOG[: FOG.index("<transform")] + turned + "</volume>"))).medium
+    medium = read_reference(
+        loaded(fog_xml(LAMP, fog=FOG[: FOG.index("<transform")] + turned + "</volume>"))
+    ).medium
     np.testing.assert_array_equal(medium.up, [0, 1, 0])
     points = np.array([[3.0, 5.0, -7.0], [3.0, 8.0, 7.0]])
-    np.testing.assert_allclose(_extinction(medium.plugin, points), fog_of(medium).density(points[:, 1]), rtol=3e-6)
+    np.testing.assert_allclose(
+        _extinction(medium.plugin, points), fog_of(medium).density(points[:, 1]), rtol=3e-6
+    )
 
 
 def test_a_dictionary_gives_the_same_medium(loaded):
@@ -60,7 +66,11 @@ def test_a_dictionary_gives_the_same_medium(loaded):
     numbers = {"sigma_1": 0.13, "z_1": 0.3, "H_1": 2.7, "sigma_2": 0.02, "z_2": 1.3, "H_2": 9.7}
     box = mi.ScalarTransform4f().translate([-20, -20, -0.5]).scale([40, 40, 43])
     medium = mi.load_dict(
-        {"type": "heterogeneous", "sigma_t": {"type": "heightfog", "to_world": box} | numbers, "albedo": 0.5}
+        {
+            "type": "heterogeneous",
+            "sigma_t": {"type": "heightfog", "to_world": box} | numbers,
+            "albedo": 0.5,
+        }
     )
     points = np.random.default_rng(1).uniform([-50, -50, 0], [50, 50, 40], (32, 3))
     own = read_reference(scene).medium.plugin
@@ -71,8 +81,16 @@ def test_a_dictionary_gives_the_same_medium(loaded):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('name="H_1" value="2.7"', 'name="H_1" value="0"', "H_1 = 0; expected a scale height above 0"),
-        ('name="sigma_2" value="0.02"', 'name="sigma_2" value="-0.02"', "sigma_2 = -0.02; expected an extinction"),
+        (
+            'name="H_1" value="2.7"',
+            'name="H_1" value="0"',
+            "H_1 = 0; expected a scale height above 0",
+        ),
+        (
+            'name="sigma_2" value="0.02"',
+            'name="sigma_2" value="-0.02"',
+            "sigma_2 = -0.02; expected an extinction",
+        ),
         ('name="H_1" value="2.7"', 'name="H_1" value="0.001"', "nothing bounds the density"),
         ('<translate x="-20"', '<rotate x="1" angle="20"/><translate x="-20"', "tilted"),
         ('<scale x="40" y="40" z="43"/>', '<scale x="40" y="40" z="0"/>', "without a height"),
@@ -86,7 +104,9 @@ def test_refusals_of_the_volume(loaded, old, new, message):
 @pytest.mark.claim("height-fog-refused", tolerance="by name")
 def test_refusals_of_the_scene(loaded):
     sun = SUN.replace('z="-0.45"', 'z="0.1"')
-    with pytest.raises(InputError, match="light 'sun' is directional and shines from the horizon or below"):
+    with pytest.raises(
+        InputError, match="light 'sun' is directional and shines from the horizon or below"
+    ):
         read_reference(loaded(fog_xml(sun)))
     ball = """<shape type="sphere" id="drop"><bsdf type="null"/><ref id="fog" name="exterior"/>
         <medium type="homogeneous" name="interior"/></shape>"""
@@ -102,36 +122,56 @@ def _fog(engine, **given):
     return HeightFog(tuple(Layer(*layer) for layer in layers), clamped=clamped)
 
 
-@pytest.mark.claim("height-fog-engines", tolerance="1e-12 relative: the shader's own formulas in float64")
+@pytest.mark.claim(
+    "height-fog-engines", tolerance="1e-12 relative: the shader's own formulas in float64"
+)
 def test_unreals_transmittance():
     density, falloff, actor, camera, rise, length = 0.037, 0.23, 1.9, 3.1, 7.3, 41.0
-    # In centimetres and powers of two, as its shader has it: F = k rise, the integral D 2^(-k (z - z_0)) (1 - 2^-F)/F.
+    # In centimetres and powers of two, as its shader has it: F = k rise, the integral D 2^(-k
+    # (z - z_0)) (1 - 2^-F)/F.
     k, exponent = falloff / 1000, falloff / 1000 * rise * 100
     at_camera = density / 1000 * 2 ** (-k * (camera - actor) * 100)
     integral = at_camera * (1 - 2**-exponent) / exponent * length * 100
     expected = 2.0**-integral
     fog = _fog("unreal", FogDensity=density, FogHeightFalloff=falloff, FogHeight=actor)
-    assert math.exp(-fog.optical_depth(camera, camera + rise, length)) == pytest.approx(expected, rel=1e-12)
+    assert math.exp(-fog.optical_depth(camera, camera + rise, length)) == pytest.approx(
+        expected, rel=1e-12
+    )
     # The volumetric fog: 0.5 D 2^(-k (z - z_0)) per cm, base e.
-    fog = _fog("unreal-volumetric", FogDensity=density, FogHeightFalloff=falloff, FogHeight=actor, ExtinctionScale=1.3)
+    fog = _fog(
+        "unreal-volumetric",
+        FogDensity=density,
+        FogHeightFalloff=falloff,
+        FogHeight=actor,
+        ExtinctionScale=1.3,
+    )
     assert fog.density(camera) == pytest.approx(0.5 * at_camera * 100 * 1.3, rel=1e-12)
 
 
 @pytest.mark.claim("height-fog-engines", tolerance="1e-12 relative")
 def test_hdrp_and_playcanvas():
     fog = _fog("hdrp", meanFreePath=41.0, baseHeight=2.3, maximumHeight=17.9)
-    np.testing.assert_allclose(fog.density([-3.0, 2.3, 17.9]), np.array([1, 1, 1e-3]) / 41.0, rtol=1e-12)
+    np.testing.assert_allclose(
+        fog.density([-3.0, 2.3, 17.9]), np.array([1, 1, 1e-3]) / 41.0, rtol=1e-12
+    )
     fog = _fog("playcanvas", density=0.07, heightBase=1.1, heightFalloff=0.31)
-    assert fog.density([-4.0, 1.1, 1.1 + 1 / 0.31]) == pytest.approx([0.07, 0.07, 0.07 / math.e], rel=1e-12)
+    assert fog.density([-4.0, 1.1, 1.1 + 1 / 0.31]) == pytest.approx(
+        [0.07, 0.07, 0.07 / math.e], rel=1e-12
+    )
 
 
 def test_parameters_come_back():
     for engine in ENGINES:
         layers = ((0.05, 1.7, 3.9), (0.01, 4.1, 11.3))[: 2 if engine.startswith("unreal") else 1]
-        found = parameters_of(engine, layers, clamped=engine in ("hdrp", "playcanvas"), constant=0.0)
+        found = parameters_of(
+            engine, layers, clamped=engine in ("hdrp", "playcanvas"), constant=0.0
+        )
         assert np.ravel(layers_of(engine, found)[0]) == pytest.approx(np.ravel(layers), rel=1e-12)
         assert isinstance(
-            parameters_of(engine, layers, clamped=engine not in ("hdrp", "playcanvas"), constant=0.0), str
+            parameters_of(
+                engine, layers, clamped=engine not in ("hdrp", "playcanvas"), constant=0.0
+            ),
+            str,
         )
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes are loaded at any size; a file or number of which no finite image can come is refused by name."""
+"""Scenes are loaded at any size; a file or number of which no finite image can
+come is refused by name.
+"""
 
 import re
 
@@ -35,7 +37,8 @@ def refused(text):
         ("", "the file is empty"),
         ('<scene version="3.0.0"><shape type="spher"/></scene>', '"spher" not found'),
         (
-            '<scene version="3.0.0"><shape type="ply"><string name="filename" value="gone.ply"/></shape></scene>',
+            '<scene version="3.0.0"><shape type="ply"><string name="filename" '
+            'value="gone.ply"/></shape></scene>',
             "gone.ply",
         ),
         ('<bsdf type="diffuse" version="3.0.0"/>', "a whole <scene>"),
@@ -62,14 +65,17 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
     """For Mitsuba's own rays and for both readers."""
     expected = mi.load_string(scene_xml(size=size, fov=41.7))
     resized = load_scene(str(small_file), size).scene
-    np.testing.assert_array_equal(read_reference(resized).direction, read_reference(expected).direction)
+    np.testing.assert_array_equal(
+        read_reference(resized).direction, read_reference(expected).direction
+    )
     resized_camera, expected_camera = read_scene(resized).camera, read_scene(expected).camera
     assert (resized_camera.width, resized_camera.height) == size
     np.testing.assert_array_equal(np.array(resized_camera.origin), np.array(expected_camera.origin))
     np.testing.assert_array_equal(np.array(resized_camera.axes), np.array(expected_camera.axes))
     for place in [(0.13, 0.29), (0.71, 0.93)]:
         rays = [
-            s.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(*place), mi.Point2f(0.5))[0] for s in (resized, expected)
+            s.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(*place), mi.Point2f(0.5))[0]
+            for s in (resized, expected)
         ]
         # The projections are derived by the same code in float32.
         np.testing.assert_allclose(np.array(rays[0].d), np.array(rays[1].d), rtol=0, atol=1e-6)

@@ -36,14 +36,18 @@ def compared(tau, sun, phase, photons, **more):
 @pytest.mark.statistical
 @pytest.mark.claim(
     "slab-orders-are-photons",
-    tolerance="4.5 standard errors each, mean square 0.3 to 2.5, as for 15 independent; seeds are fixed",
+    tolerance=(
+        "4.5 standard errors each, mean square 0.3 to 2.5, as for 15 independent; seeds are fixed"
+    ),
 )
 @pytest.mark.parametrize(
     ("tau", "sun", "phase", "albedo"),
     [(5.0, 60.0, "hg:0.75", 0.9), (1.0, 25.0, "isotropic", 1.0), (0.3, 80.0, "hg:-0.3", 0.7)],
 )
 def test_orders_are_those_of_photons(tau, sun, phase, albedo):
-    numbers, z = compared(tau, sun, phase, 400_000, albedo=albedo, orders="1,2,3-4,5-inf,all", depths=[tau / 3, tau])
+    numbers, z = compared(
+        tau, sun, phase, 400_000, albedo=albedo, orders="1,2,3-4,5-inf,all", depths=[tau / 3, tau]
+    )
     assert np.abs(z).max() < 4.5
     assert 0.3 < (z**2).mean() < 2.5
     assert len(z) > 60
@@ -57,17 +61,25 @@ def test_orders_are_those_of_photons(tau, sun, phase, albedo):
 @pytest.mark.parametrize(("phase", "tau"), [("mie", 3.7), ("mie-modified", 2.1)])
 def test_orders_of_droplets_are_those_of_photons(phase, tau):
     """Both sides compute the droplets by themselves; 44 % of the light is below 5 degrees."""
-    _, z = compared(tau, 40.0, phase, 500_000, albedo=0.97, orders="1,2,3-4,5-6,7-inf", depths=[0.0, tau / 2])
+    _, z = compared(
+        tau, 40.0, phase, 500_000, albedo=0.97, orders="1,2,3-4,5-6,7-inf", depths=[0.0, tau / 2]
+    )
     assert np.abs(z).max() < 4.5
     assert 0.3 < (z**2).mean() < 2.5
 
 
-@pytest.mark.parametrize("diameter", [12.0, *(pytest.param(d, marks=pytest.mark.slow) for d in (5.0, 31.7))])
+@pytest.mark.parametrize(
+    "diameter", [12.0, *(pytest.param(d, marks=pytest.mark.slow) for d in (5.0, 31.7))]
+)
 def test_the_fit_to_droplets_is_the_same_on_both_sides(diameter):
     pair = phase_pair(f"hg-draine:{diameter}")
-    assert pair.deterministic.moments(300) == pytest.approx(hg_draine_moments(diameter, 300), abs=1e-12)
+    assert pair.deterministic.moments(300) == pytest.approx(
+        hg_draine_moments(diameter, 300), abs=1e-12
+    )
     cosines = np.linspace(-1, 1, 1001)
-    assert pair.deterministic.values(cosines) == pytest.approx(HgDraine(diameter)(cosines), rel=1e-9)
+    assert pair.deterministic.values(cosines) == pytest.approx(
+        HgDraine(diameter)(cosines), rel=1e-9
+    )
     drawn = pair.sampled().cosines((np.arange(200_000) + 0.5) / 200_000)
     assert drawn.mean() == pytest.approx(pair.deterministic.moments(2)[1], abs=1e-5)
 
@@ -78,10 +90,14 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
     g = 0.75
     values = 17 / (1 + g * g - 2 * g * np.cos(np.deg2rad(degrees))) ** 1.5
     path = tmp_path / "phase.csv"
-    rows = "\n".join(f"{angle:.4f}, {value:.10g}" for angle, value in zip(degrees, values, strict=True))
+    rows = "\n".join(
+        f"{angle:.4f}, {value:.10g}" for angle, value in zip(degrees, values, strict=True)
+    )
     path.write_text(f"# of a measurement\nangle,value\n{rows}\n")
     tabulated, exact = (
-        slab_numbers(slab_request(2.0, 30.0, phase=name, albedo=0.9, orders="1,2", directions="-0.5:20"))
+        slab_numbers(
+            slab_request(2.0, 30.0, phase=name, albedo=0.9, orders="1,2", directions="-0.5:20")
+        )
         for name in (str(path), "hg:0.75")
     )
     assert tabulated["phase"] == str(path)
@@ -130,11 +146,20 @@ def test_files_that_are_no_phase_function(text, words, tmp_path):
 
 @pytest.mark.parametrize(
     ("tau", "sun"),
-    [(0.005, 0.0), *(pytest.param(t, s, marks=pytest.mark.slow) for t in (1e-6, 0.005, 210.0) for s in (0.0, 89.99))],
+    [
+        (0.005, 0.0),
+        *(
+            pytest.param(t, s, marks=pytest.mark.slow)
+            for t in (1e-6, 0.005, 210.0)
+            for s in (0.0, 89.99)
+        ),
+    ],
 )
 def test_hard_cases_have_finite_numbers(tau, sun):
     numbers = slab_numbers(
-        slab_request(tau, sun, phase="hg:0.85", orders="1,2-3,4-inf", directions="1:0,-1:0,0.001:180,-1e-6:0")
+        slab_request(
+            tau, sun, phase="hg:0.85", orders="1,2-3,4-inf", directions="1:0,-1:0,0.001:180,-1e-6:0"
+        )
     )
     values = [value for value, _, _ in paired(numbers, numbers, numbers["error"])]
     assert values
@@ -156,27 +181,46 @@ def irradiance(scene, integrator, seed):
 
 @pytest.mark.statistical
 @pytest.mark.slow
-@pytest.mark.claim("slab-orders-are-mitsubas", tolerance="4.5 standard errors of 32 seeds; seeds are fixed")
+@pytest.mark.claim(
+    "slab-orders-are-mitsubas", tolerance="4.5 standard errors of 32 seeds; seeds are fixed"
+)
 @pytest.mark.parametrize("side", ["reflectance", "transmittance"])
 def test_orders_are_those_of_volpath(variant, side):
-    """A meter above or below the slab, which light passes, sees the flux; depth n + 1 less depth n is order n."""
+    """A meter above or below the slab, which light passes, sees the flux; depth n + 1
+    less depth n is order n.
+    """
     above = side == "reflectance"
     turn = mi.ScalarTransform4f().rotate([1, 0, 0], 180 if above else 0)
     meter = {
         "type": "irradiancemeter",
-        "film": {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}, "component_format": "float32"},
+        "film": {
+            "type": "hdrfilm",
+            "width": 1,
+            "height": 1,
+            "rfilter": {"type": "box"},
+            "component_format": "float32",
+        },
         "sampler": {"type": "independent"},
     }
     sun = np.deg2rad(SUN)
     scene = mi.load_dict(
         {
             "type": "scene",
-            "sun": {"type": "directional", "direction": [np.sin(sun), 0, -np.cos(sun)], "irradiance": 1.0},
+            "sun": {
+                "type": "directional",
+                "direction": [np.sin(sun), 0, -np.cos(sun)],
+                "irradiance": 1.0,
+            },
             "slab": {
                 "type": "cube",
                 "to_world": mi.ScalarTransform4f().scale([_WIDE, _WIDE, TAU / 2]),
                 "bsdf": {"type": "null"},
-                "interior": {"type": "homogeneous", "sigma_t": 1.0, "albedo": ALBEDO, "phase": {"type": "hg", "g": G}},
+                "interior": {
+                    "type": "homogeneous",
+                    "sigma_t": 1.0,
+                    "albedo": ALBEDO,
+                    "phase": {"type": "hg", "g": G},
+                },
             },
             "meter": {
                 "type": "rectangle",
@@ -192,7 +236,10 @@ def test_orders_are_those_of_volpath(variant, side):
         for depth in range(1, max(orders) + 2)
     }
     measured = np.array(
-        [[irradiance(scene, integrator, seed) for seed in range(_SEEDS)] for integrator in by_depth.values()]
+        [
+            [irradiance(scene, integrator, seed) for seed in range(_SEEDS)]
+            for integrator in by_depth.values()
+        ]
     ) / np.cos(sun)
     by_order = np.diff(measured, axis=0)
     numbers = slab_numbers(slab_request(TAU, SUN, phase=f"hg:{G}", albedo=ALBEDO, orders=orders))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the light of a slab by orders agrees with published tables and, summed over all orders, with DISORT."""
+"""Claim: the light of a slab by orders agrees with published tables and, summed over
+all orders, with DISORT.
+"""
 
 import math
 import warnings
@@ -28,7 +30,9 @@ def cloud_c1():
 
 
 def summed(tau, mu0, phase, albedo, depths, streams=32):
-    """Return upward and diffuse downward flux at depths, of all orders, for a flux of pi across the beam."""
+    """Return upward and diffuse downward flux at depths, of all orders, for a
+    flux of pi across the beam.
+    """
     slab = SlabOrders(tau, mu0, phase, albedo, depths=depths, streams=streams)
     _, total = order_sets(slab, ALL)
     places = [int(np.argmin(np.abs(slab.panels.edges - depth))) for depth in depths]
@@ -44,17 +48,25 @@ def disort(tau, mu0, phase, albedo, *, streams):
         return pydisort(tau, albedo, 2 * streams, moments[None, :-1], mu0, np.pi, 0.0, f_arr=peak)
 
 
-@pytest.mark.claim("slab-sums-are-disort", tolerance="1e-5 of the flux, the figure; measured 1e-6 and below")
+@pytest.mark.claim(
+    "slab-sums-are-disort", tolerance="1e-5 of the flux, the figure; measured 1e-6 and below"
+)
 @pytest.mark.parametrize(
     ("albedo", "mu0"),
     [
         (0.9, 0.6),
         (1 - 1e-6, 0.2),
-        *(pytest.param(albedo, mu0, marks=pytest.mark.slow) for albedo in (0.2, 0.99) for mu0 in (0.2, 1.0)),
+        *(
+            pytest.param(albedo, mu0, marks=pytest.mark.slow)
+            for albedo in (0.2, 0.99)
+            for mu0 in (0.2, 1.0)
+        ),
     ],
 )
 def test_sums_of_orders_are_disort(albedo, mu0):
-    """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as processors round; another test is at 1."""
+    """Nearer to 1 DISORT's eigenvalues k^2 lose 1e-5 of the light, as processors
+    round; another test is at 1.
+    """
     for tau, phase in ((2.0, ISOTROPIC), (7.3, HG)):
         depths = [0.0, 0.3, tau / 2, tau]
         up, down = summed(tau, mu0, phase, albedo, depths)
@@ -70,7 +82,13 @@ def test_radiance_inside_and_outside_is_disort():
     chosen = [(3, 0.3), (20, 2.0), (streams + 10, 1.0), (streams - 1, 3.1)]
     depths = [0.0, 0.7, tau]
     ours = slab_radiance(
-        tau, mu0, HG, albedo, depths=depths, directions=[(mu[place], phi) for place, phi in chosen], streams=48
+        tau,
+        mu0,
+        HG,
+        albedo,
+        depths=depths,
+        directions=[(mu[place], phi) for place, phi in chosen],
+        streams=48,
     )
     theirs = np.array([[radiance(depth, phi)[place] for place, phi in chosen] for depth in depths])
     np.testing.assert_allclose(np.pi * ours, theirs, rtol=1e-6, atol=1e-12)
@@ -101,7 +119,9 @@ def test_orders_one_by_one_add_up_to_all_and_the_rest_is_the_rest():
 
 
 def test_order_one_is_its_closed_form():
-    """Reflected isotropic light of order 1, and its displacement, by quadrature over depth and angle."""
+    """Reflected isotropic light of order 1, and its displacement, by
+    quadrature over depth and angle.
+    """
     tau, mu0, albedo = 1.7, 0.6, 0.8
     depth, depth_weight = (each / 2 for each in np.polynomial.legendre.leggauss(60))
     depth, depth_weight = tau * (depth + 0.5), tau * depth_weight
@@ -112,19 +132,33 @@ def test_order_one_is_its_closed_form():
     tangent0, tangent = math.sqrt(1 - mu0**2) / mu0, np.sqrt(1 - mu**2) / mu
     square = (depth**2)[:, None] * (tangent0**2 + tangent**2)
     reflected = weight.sum()
-    (found,) = slab_numbers(slab_request(tau, math.degrees(math.acos(mu0)), albedo=albedo, orders="1"))["orders"]
+    (found,) = slab_numbers(
+        slab_request(tau, math.degrees(math.acos(mu0)), albedo=albedo, orders="1")
+    )["orders"]
     assert found["reflectance"] == pytest.approx(reflected, rel=1e-6)
-    assert found["reflected_mean"] == pytest.approx((weight.sum(1) @ depth) * tangent0 / reflected, rel=1e-6)
-    assert found["reflected_rms"] == pytest.approx(math.sqrt((weight * square).sum() / reflected), rel=1e-5)
+    assert found["reflected_mean"] == pytest.approx(
+        (weight.sum(1) @ depth) * tangent0 / reflected, rel=1e-6
+    )
+    assert found["reflected_rms"] == pytest.approx(
+        math.sqrt((weight * square).sum() / reflected), rel=1e-5
+    )
 
 
 @pytest.mark.claim("slab-conserves", tolerance="1e-8: the albedo is kept 1e-12 below 1")
 @pytest.mark.parametrize(
     ("tau", "suns"),
-    [(3.0, [0.5]), *(pytest.param(tau, [1e-3, 0.5, 1.0], marks=pytest.mark.slow) for tau in (1e-4, 0.01, 3.0, 300.0))],
+    [
+        (3.0, [0.5]),
+        *(
+            pytest.param(tau, [1e-3, 0.5, 1.0], marks=pytest.mark.slow)
+            for tau in (1e-4, 0.01, 3.0, 300.0)
+        ),
+    ],
 )
 def test_light_is_neither_made_nor_lost(tau, suns):
     for mu0 in suns:
-        light = slab_numbers(slab_request(tau, math.degrees(math.acos(mu0)), phase="hg:0.75", orders="all"))["total"]
+        light = slab_numbers(
+            slab_request(tau, math.degrees(math.acos(mu0)), phase="hg:0.75", orders="all")
+        )["total"]
         assert light["reflectance"] + light["transmittance"] == pytest.approx(1, abs=1e-8)
         assert light["reflectance"] > 0

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of the statistical tests by values computed by hand; their rates are in `test_statistics_rates`."""
+"""Tests of the statistical tests by values computed by hand; their rates are in
+`test_statistics_rates`.
+"""
 
 import dataclasses
 
@@ -22,7 +24,9 @@ def test_hand_computed_values():
     assert s.z_std == pytest.approx(np.sqrt((0.25 + 2.25 + 2.25 + 0.25) / 3), rel=1e-12)
     assert s.relative_bias == pytest.approx(0.02, rel=1e-12)
     error = np.sqrt(4 * 0.08**2 + 1.02**2 * 4 * 0.06**2) / 10
-    assert s.relative_bias_ci == pytest.approx((0.02 - 1.959964 * error, 0.02 + 1.959964 * error), rel=1e-6)
+    assert s.relative_bias_ci == pytest.approx(
+        (0.02 - 1.959964 * error, 0.02 + 1.959964 * error), rel=1e-6
+    )
     assert s.detectable_bias == pytest.approx((1.959964 + 1.281552) * error, rel=1e-6)
     assert s.largest_fraction == pytest.approx(0.25, rel=1e-12)
     assert s.relative_bias_ci_batches is None
@@ -32,7 +36,8 @@ def test_hand_computed_values():
 
 
 def test_students_law_and_welchs_degrees_of_freedom(monkeypatch):
-    # z = 3.2 with 3 degrees of freedom: p = 0.0493; normal: p = 0.0014. Equal variances of 4 batches each give 6.
+    # z = 3.2 with 3 degrees of freedom: p = 0.0493; normal: p = 0.0014. Equal variances
+    # of 4 batches each give 6.
     unit = NoisyImage(np.ones((1, 1)))
     z = 3.2
     random = NoisyImage(np.full((1, 1), 1 + 0.1 * z), np.full((1, 1), 0.1), 4)
@@ -53,7 +58,9 @@ def test_sidak_level_counts_all_values():
     for factor, rejected in ((0.999, 0), (1.001, 1)):
         values = np.ones((10, 10, 3))
         values[4, 5, :2] += 0.1 * critical * factor  # two channels of one pixel
-        s = compare_statistics(NoisyImage(np.ones((10, 10, 3))), NoisyImage(values, np.full((10, 10, 3), 0.1)))
+        s = compare_statistics(
+            NoisyImage(np.ones((10, 10, 3))), NoisyImage(values, np.full((10, 10, 3), 0.1))
+        )
         assert s.rejected == rejected
     assert s.expected_rejections == pytest.approx(-np.log(0.99), rel=1e-3)
 
@@ -63,14 +70,17 @@ def test_small_errors_of_a_whole_block_show_in_the_block():
     values = np.ones((24, 20))
     values[8:16, 16:20] += 0.15  # the block at the edge is half a block, z = 8.5
     values[:8, :8] += 0.15
-    s = compare_statistics(NoisyImage(np.ones((24, 20))), NoisyImage(values, np.full((24, 20), 0.1)))
+    s = compare_statistics(
+        NoisyImage(np.ones((24, 20))), NoisyImage(values, np.full((24, 20), 0.1))
+    )
     assert (s.blocks, s.rejected_blocks, s.rejected) == (9, 2, 0)
 
 
 def test_the_variance_of_both_sides_counts_and_is_told_apart():
     # Variances of 0.09 and of 0.16 a pixel at equal means: the reference has 9/25 of the sum.
     statistics = compare_statistics(
-        NoisyImage(np.ones((3, 4)), np.full((3, 4), 0.3)), NoisyImage(np.ones((3, 4)), np.full((3, 4), 0.4))
+        NoisyImage(np.ones((3, 4)), np.full((3, 4), 0.3)),
+        NoisyImage(np.ones((3, 4)), np.full((3, 4), 0.4)),
     )
     assert statistics.reference_variance_fraction == pytest.approx(9 / 25, rel=1e-12)
     assert statistics.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
@@ -90,11 +100,16 @@ def test_mask_and_nonfinite_pixels_leave_no_trace():
     error = np.full((8, 16, 3), -1.0)
     error[:, :8] = estimate.standard_error
     mask = np.arange(16) < 8
-    alone = compare_statistics(NoisyImage(np.ones((8, 8, 3))), dataclasses.replace(estimate, batch_means=None))
+    alone = compare_statistics(
+        NoisyImage(np.ones((8, 8, 3))), dataclasses.replace(estimate, batch_means=None)
+    )
     masked = NoisyImage(wide, error, BATCHES)
-    statistics = compare_statistics(NoisyImage(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1)))
+    statistics = compare_statistics(
+        NoisyImage(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1))
+    )
     assert statistics == dataclasses.replace(alone, masked=64)  # no trace but their number
-    # Without the mask the same pixels fall away because they are not finite, and batch means with them.
+    # Without the mask the same pixels fall away because they are not finite,
+    # and batch means with them.
     with_means = dataclasses.replace(masked, batch_means=estimate.batch_means)
     assert compare_statistics(NoisyImage(np.ones((8, 16, 3))), with_means) == alone
 
@@ -103,7 +118,11 @@ def test_dependent_channels_do_not_narrow_the_interval():
     rng = np.random.default_rng(5)
     grey = monte_carlo(around_one(rng, (BATCHES, *SIZE)))
     colour = NoisyImage(
-        *(np.repeat(np.asarray(v)[..., None], 3, axis=-1) for v in (grey.mean, grey.standard_error)), 16
+        *(
+            np.repeat(np.asarray(v)[..., None], 3, axis=-1)
+            for v in (grey.mean, grey.standard_error)
+        ),
+        16,
     )
     of_grey = compare_statistics(NoisyImage(np.ones(SIZE)), grey)
     of_colour = compare_statistics(NoisyImage(np.ones((*SIZE, 3))), colour)
@@ -115,7 +134,8 @@ def test_detectable_bias_is_that_of_the_wider_interval():
     rng = np.random.default_rng(10)
     estimate = monte_carlo(around_one(rng, (BATCHES, *SIZE)) * rng.normal(1, 0.1, (BATCHES, 1, 1)))
     s = compare_statistics(NoisyImage(np.ones(SIZE)), estimate)
-    # Few batches: (q(0.975) + q(0.90)) / q(0.975) of Student's law with 15 degrees of freedom, 2.131 and 1.341.
+    # Few batches: (q(0.975) + q(0.90)) / q(0.975) of Student's law with 15 degrees of
+    # freedom, 2.131 and 1.341.
     half = 0.5 * (s.relative_bias_ci_batches[1] - s.relative_bias_ci_batches[0])
     assert s.detectable_bias == pytest.approx(half * (2.1314 + 1.3406) / 2.1314, rel=1e-4)
     assert s.relative_bias_ci[1] - s.relative_bias_ci[0] < half
@@ -127,11 +147,31 @@ GOOD = NoisyImage(np.ones((4, 4)), np.ones((4, 4)), 8)
 @pytest.mark.parametrize(
     ("test", "options", "message"),
     [
-        (NoisyImage(np.ones((4, 5))), {}, "two sizes: the reference is 4 x 4 pixels, the test 5 x 4"),
-        (dataclasses.replace(GOOD, standard_error=np.ones((4, 4, 3))), {}, r"has shape \(4, 4, 3\); expected that"),
-        (dataclasses.replace(GOOD, standard_error=-np.ones((4, 4))), {}, "negative or not finite in 16 pixels"),
-        (dataclasses.replace(GOOD, batches=1), {}, "batches of the test: got 1, expected at least 2"),
-        (dataclasses.replace(GOOD, batch_means=[0.9, 1.0]), {}, "have the mean 0.95, the pixels compared 1; give"),
+        (
+            NoisyImage(np.ones((4, 5))),
+            {},
+            "two sizes: the reference is 4 x 4 pixels, the test 5 x 4",
+        ),
+        (
+            dataclasses.replace(GOOD, standard_error=np.ones((4, 4, 3))),
+            {},
+            r"has shape \(4, 4, 3\); expected that",
+        ),
+        (
+            dataclasses.replace(GOOD, standard_error=-np.ones((4, 4))),
+            {},
+            "negative or not finite in 16 pixels",
+        ),
+        (
+            dataclasses.replace(GOOD, batches=1),
+            {},
+            "batches of the test: got 1, expected at least 2",
+        ),
+        (
+            dataclasses.replace(GOOD, batch_means=[0.9, 1.0]),
+            {},
+            "have the mean 0.95, the pixels compared 1; give",
+        ),
         (GOOD, {"margin": 0.0}, "margin: got 0.0"),
     ],
 )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: kernels, methods and studies are named by words, in every combination; each mistake is refused by name."""
+"""Claim: kernels, methods and studies are named by words, in every combination; each
+mistake is refused by name.
+"""
 
 import re
 import sys
@@ -35,7 +37,9 @@ def refused(text):
 
 def test_words_become_values_of_the_type_of_the_default():
     chosen = configuration("ray-march", None, {"steps": "17", "shadow": "map", "map": " 64 "})
-    assert chosen == Configuration("ray-march", None, (("steps", 17), ("shadow", "map"), ("map", 64)))
+    assert chosen == Configuration(
+        "ray-march", None, (("steps", 17), ("shadow", "map"), ("map", 64))
+    )
     assert configuration("ray-march", None, {"steps": np.int64(17)}).parameters == (("steps", 17),)
 
 
@@ -50,7 +54,8 @@ def test_chosen_methods_bring_their_standard_configurations():
     assert chosen_configurations(["unshadowed"]) == tuple(
         standard for standard in STANDARD if standard.method == "unshadowed"
     )
-    # Those whose standard configurations say their light samples have their defaults too, for scenes without any.
+    # Those whose standard configurations say their light samples have their defaults
+    # too, for scenes without any.
     for_extent = {Configuration("soft-shafts"), Configuration("froxel-fog")}
     assert set(chosen_configurations()) == set(STANDARD) | for_extent
     with refused("did you mean"):
@@ -58,7 +63,11 @@ def test_chosen_methods_bring_their_standard_configurations():
 
 
 def test_settings_are_read():
-    assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {"steps": "100", "shadow": "map", "a": "b=c"}
+    assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {
+        "steps": "100",
+        "shadow": "map",
+        "a": "b=c",
+    }
     with refused("--set: got points=3 and points=5, expected one of them"):
         parse_settings(["points=3", "pattern=ring", "points=5"])
     assert parse_settings(["points=3", " points = 3"]) == {"points": "3"}
@@ -76,7 +85,9 @@ def test_kernels_of_ones_own_come_through_the_same_door(variant):
 def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
     assert configuration(f"{own_module}:f") == Configuration(f"{own_module}:f")
     assert configuration(f"{own_module}:g") == Configuration(f"{own_module}:g", "exact")
-    assert chosen_configurations([f"{own_module}:g"]) == (Configuration(f"{own_module}:g", "exact"),)
+    assert chosen_configurations([f"{own_module}:g"]) == (
+        Configuration(f"{own_module}:g", "exact"),
+    )
     with refused("calls no kernel"):
         configuration(f"{own_module}:f", "taylor")
     with refused("on got 'maybe', expected true or false"):
@@ -89,7 +100,9 @@ def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
 def own_module(tmp_path):
     """The path of a file with two methods of one's own."""
     path = tmp_path / "own_configuration_for_tests.py"
-    path.write_text("def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n")
+    path.write_text(
+        "def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n"
+    )
     return path
 
 
@@ -98,15 +111,22 @@ def test_number_behind_a_name_sets_the_first_parameter():
     assert kernel.function is quadrature
     assert kernel.parameters == {"nodes": 24}
     assert find_kernel("taylor-6").parameters == {"degree": 6}
-    # The longest name of the registry wins: 'quadrature-theta-8' is no 'quadrature' of size 'theta-8'.
+    # The longest name of the registry wins: 'quadrature-theta-8' is no
+    # 'quadrature' of size 'theta-8'.
     assert split_name("quadrature-theta-8") == (KERNELS["quadrature-theta"], 8)
 
 
-@pytest.mark.parametrize("name", ["fog_kernel:kernel", "fog_kernel.py:kernel", "{folder}/fog_kernel.py:kernel"])
-def test_a_users_kernel_is_found_in_the_current_folder_and_says_where_it_fails(tmp_path, monkeypatch, name):
+@pytest.mark.parametrize(
+    "name", ["fog_kernel:kernel", "fog_kernel.py:kernel", "{folder}/fog_kernel.py:kernel"]
+)
+def test_a_users_kernel_is_found_in_the_current_folder_and_says_where_it_fails(
+    tmp_path, monkeypatch, name
+):
     folder = tmp_path / "with: colon"
     folder.mkdir()
-    (folder / "fog_kernel.py").write_text("from beside_it import two\n\n\ndef kernel(x):\n    return two / x\n")
+    (folder / "fog_kernel.py").write_text(
+        "from beside_it import two\n\n\ndef kernel(x):\n    return two / x\n"
+    )
     (folder / "beside_it.py").write_text("two = 2\n")
     monkeypatch.chdir(folder)
     for module in ("fog_kernel", "beside_it"):
@@ -130,7 +150,9 @@ NO_NAMES = ("quadratur", "quadrature-", "quadrature-x", "quadrature-1.5", "-4", 
 
 @pytest.mark.parametrize("name", [*NO_KERNELS, *NO_NAMES])
 def test_what_is_no_kernel_is_refused_by_name(name):
-    with pytest.raises(InputError, match=f"^kernel.*{name}" if name in NO_KERNELS else "expected one of exact"):
+    with pytest.raises(
+        InputError, match=f"^kernel.*{name}" if name in NO_KERNELS else "expected one of exact"
+    ):
         find_kernel(name)
 
 
@@ -167,10 +189,17 @@ def test_every_combination_is_a_cell():
 
 def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
     (tmp_path / "hall.xml").write_text("<scene/>")
-    (tmp_path / "study.toml").write_text('scenes = ["hall.xml", "random:7"]\n[random]\ncount = 2\nfirst = 3\n')
+    (tmp_path / "study.toml").write_text(
+        'scenes = ["hall.xml", "random:7"]\n[random]\ncount = 2\nfirst = 3\n'
+    )
     study = read_study(tmp_path / "study.toml")
     assert study.name == "study"
-    assert list(study.scene_names()) == [str(tmp_path / "hall.xml"), "random:7", "random:3", "random:4"]
+    assert list(study.scene_names()) == [
+        str(tmp_path / "hall.xml"),
+        "random:7",
+        "random:3",
+        "random:4",
+    ]
 
 
 @pytest.mark.claim("sweep-studies", tolerance="none")
@@ -182,10 +211,23 @@ def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
         ({"scenes": ["windows", "windows"]}, "scenes: 'windows' is there twice"),
         ({"sceens": ["windows"]}, "got sceens, expected one of .* did you mean 'scenes'"),
         ({"methods": ["unshadowed"], "kernels": ["exakt"]}, "exakt"),
-        ({"methods": ["froxel-fog"], "kernels": ["exact"]}, "kernels: none of the methods calls one"),
+        (
+            {"methods": ["froxel-fog"], "kernels": ["exact"]},
+            "kernels: none of the methods calls one",
+        ),
         ({"methods": ["ray-march"], "parameters": {"ray-march": {"stepz": 3}}}, "stepz.*steps"),
-        ({"methods": ["light-volumes"], "maps": [64], "parameters": {"light-volumes": {"map": 3}}}, "give one of them"),
-        ({"media": [{"light.intensity": 3}]}, "media: got 'light.intensity', expected medium.sigma_t"),
+        (
+            {
+                "methods": ["light-volumes"],
+                "maps": [64],
+                "parameters": {"light-volumes": {"map": 3}},
+            },
+            "give one of them",
+        ),
+        (
+            {"media": [{"light.intensity": 3}]},
+            "media: got 'light.intensity', expected medium.sigma_t",
+        ),
         ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
     ],
 )

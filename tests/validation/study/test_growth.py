@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: exponents are those of times, a jump is a cliff; each work has its steps, of one anchor."""
+"""Claim: exponents are those of times, a jump is a cliff; each work has
+its steps, of one anchor.
+"""
 
 import sys
 
@@ -13,7 +15,14 @@ from airlight.validation.clock import peak_memory
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.meshes import rotation
 from airlight.validation.study.configuration import configuration
-from airlight.validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of, with_copies
+from airlight.validation.study.growth import (
+    growth,
+    ladder,
+    study_growth,
+    subdivided,
+    triangles_of,
+    with_copies,
+)
 from airlight.validation.study.study import Measure, Study
 from tests.helpers.scenes import bounded_medium, tiny_scene
 
@@ -28,7 +37,9 @@ def test_a_power_is_found_and_is_no_cliff(exponent):
 
 
 def test_a_jump_is_a_cliff():
-    """The times of shadow planes before their wedges: 17 times the time for 4 times the triangles."""
+    """The times of shadow planes before their wedges: 17 times the time
+    for 4 times the triangles.
+    """
     works = [20480, 81920, 327680, 1310720, 5242880]
     found = growth("triangles", "frame", works, [57, 81, 128, 2148, 5645])
     assert found.cliff
@@ -65,9 +76,15 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     )
     found = study_growth(study, "map", steps, progress=lambda *done: told.append(done))
     measured, refused = found
-    assert (measured.scene, measured.size, measured.label) == ("sphere-spot", (24, 18), "light-volumes (exact)")
+    assert (measured.scene, measured.size, measured.label) == (
+        "sphere-spot",
+        (24, 18),
+        "light-volumes (exact)",
+    )
     assert [cost.work for cost in measured.costs] == [128, 256]
-    assert all(getattr(cost, name).median_ms > 0 for cost in measured.costs for name in ("frame", "rays"))
+    assert all(
+        getattr(cost, name).median_ms > 0 for cost in measured.costs for name in ("frame", "rays")
+    )
     assert measured.refused is None
     assert measured.run.anchor.median_ms > 0
     assert measured.run.between >= 1
@@ -80,7 +97,9 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
     box = mi.ScalarTransform4f().translate([0.13, 0.17, 0.71]).scale(0.37)
     scene = mi.load_dict(tiny_scene(block={"type": "cube", "to_world": box}))
     count = triangles_of(scene)
-    assert count == 12 + sum(shape.face_count() for shape in scene.shapes() if shape.id() == "floor")
+    assert count == 12 + sum(
+        shape.face_count() for shape in scene.shapes() if shape.id() == "floor"
+    )
     finer = subdivided(scene, 2)
     assert triangles_of(finer) == 16 * count
     assert {shape.id() for shape in finer.shapes()} == {shape.id() for shape in scene.shapes()}
@@ -91,7 +110,9 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
         subdivided(mi.load_dict(tiny_scene(floor=None)), 1)
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak"
+)
 def test_the_peak_is_that_of_what_was_held_together(variant):
     def work(mebibytes):
         held = np.ones(mebibytes * 2**17)
@@ -108,7 +129,9 @@ def test_copies_of_a_light_stand_near_it_and_have_its_intensity_together(variant
     (light,) = scene.lights
     more = with_copies(scene, 4)
     assert [light.kind for light in more.lights] == ["spot"] * 4
-    place, eye = (np.array(each, dtype=float).ravel() for each in (light.position, scene.camera.origin))
+    place, eye = (
+        np.array(each, dtype=float).ravel() for each in (light.position, scene.camera.origin)
+    )
     total = sum(np.array(each.intensity, dtype=float) for each in more.lights)
     np.testing.assert_allclose(total, np.array(light.intensity, dtype=float), rtol=1e-6)
     away = [np.array(each.position, dtype=float).ravel() - place for each in more.lights]
@@ -116,7 +139,9 @@ def test_copies_of_a_light_stand_near_it_and_have_its_intensity_together(variant
     step = 0.07 * np.linalg.norm(place - eye)
     assert distances[0] == 0
     # In the plane across, sqrt(n) steps: a spiral; the third coordinate adds at most 0.3 of it.
-    np.testing.assert_allclose(np.hypot(*np.array(away).T[:2]) / step, np.sqrt(np.arange(4)), rtol=1e-4)
+    np.testing.assert_allclose(
+        np.hypot(*np.array(away).T[:2]) / step, np.sqrt(np.arange(4)), rtol=1e-4
+    )
     assert (np.abs(np.array(away)[:, 2]) <= 0.3 * step * np.sqrt(np.arange(4)) + 1e-6).all()
     assert len({tuple(np.round(each, 6)) for each in away}) == 4
 
@@ -125,7 +150,9 @@ def test_copies_of_a_light_from_infinity_are_turned(variant):
     sun = {"type": "directional", "direction": [0.3, 0.2, -1.0], "irradiance": 2.0}
     camera = {name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"}
     body = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
-    more = with_copies(read_scene(mi.load_dict(tiny_scene(lamp=sun, fog=None, sensor=camera, body=body))), 3)
+    more = with_copies(
+        read_scene(mi.load_dict(tiny_scene(lamp=sun, fog=None, sensor=camera, body=body))), 3
+    )
     axes = [np.array(each.exact_axis, dtype=float).ravel() for each in more.lights]
     turned = [rotation((0.31, 0.53, 0.79), 2.3 * number) @ axes[0] for number in range(3)]
     np.testing.assert_allclose(axes, turned, atol=1e-6)

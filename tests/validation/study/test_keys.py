@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: keys and results change with what decides the numbers alone; a row has every column and finite numbers."""
+"""Claim: keys and results change with what decides the numbers alone; a row has every
+column and finite numbers.
+"""
 
 import math
 from dataclasses import replace
@@ -43,14 +45,20 @@ def test_what_decides_the_numbers_is_in_the_key():
         replace(MADE, packages=(("mitsuba", "3.9.2"),)),
         replace(MADE, variant="cuda_ad_rgb"),
     ]
-    keys = [cell_key(CELL, MADE), *(cell_key(cell, MADE) for cell in others), *(cell_key(CELL, each) for each in made)]
+    keys = [
+        cell_key(CELL, MADE),
+        *(cell_key(cell, MADE) for cell in others),
+        *(cell_key(CELL, each) for each in made),
+    ]
     assert len(set(keys)) == len(keys) == 11
 
 
 def test_what_does_not_is_not():
     turned = replace(CELL, chosen=Configuration("ray-march", None, (("map", 64), ("steps", 4))))
     assert (
-        cell_key(turned, MADE) == cell_key(CELL, MADE) == cell_key(CELL, replace(MADE, airlight="1.1", python="3.11.9"))
+        cell_key(turned, MADE)
+        == cell_key(CELL, MADE)
+        == cell_key(CELL, replace(MADE, airlight="1.1", python="3.11.9"))
     )
 
 
@@ -86,9 +94,14 @@ def test_a_random_scene_is_its_seed_and_the_content_of_its_files(tmp_path):
 
 
 def test_a_users_code_is_in_the_key(tmp_path):
-    """The method's and the kernel's; `tests/reference/storage/test_code.py` says which modules count with it."""
+    """The method's and the kernel's; `tests/reference/storage/test_code.py` says
+    which modules count with it.
+    """
     own = tmp_path / "fog_kernel.py"
-    for chosen in (Configuration("shadow-planes", f"{own}:kernel"), Configuration(f"{own}:kernel", "exact")):
+    for chosen in (
+        Configuration("shadow-planes", f"{own}:kernel"),
+        Configuration(f"{own}:kernel", "exact"),
+    ):
         keys = []
         for factor in (2, 2, 3):
             own.write_text(f"def kernel(x):\n    return {factor} * x\n")
@@ -98,14 +111,18 @@ def test_a_users_code_is_in_the_key(tmp_path):
     assert cell_key(gone, MADE) != cell_key(gone, MADE)  # what has no file is computed again
 
 
-MARCHED = Cell("random:7", (16, 12), ("medium.sigma_t=0.1",), Configuration("ray-march", None, (("steps", 4),)))
+MARCHED = Cell(
+    "random:7", (16, 12), ("medium.sigma_t=0.1",), Configuration("ray-march", None, (("steps", 4),))
+)
 
 
 def test_a_row_has_every_column_and_no_number_that_is_none():
     error = Metrics(192, 0.1, math.nan, 0.2, np.float32(0.5), 0.1, 0.2, math.inf, 3, 0)
     row = row_values(replace(cell_row(MARCHED, key="a", error=error), properties={"depth": 2}))
     assert list(row) == [*(each.key for each in COLUMNS), "properties.depth"]
-    assert [row[f"error.{name}"] for name in ("pixels", "relative_bias", "relative_rmse", "max")] == [
+    assert [
+        row[f"error.{name}"] for name in ("pixels", "relative_bias", "relative_rmse", "max")
+    ] == [
         192,
         None,
         0.5,
@@ -117,9 +134,14 @@ def test_a_row_has_every_column_and_no_number_that_is_none():
         "medium.sigma_t=0.1",
         '{"steps": 4}',
     )
-    assert (row["status"], row["times.frame.median_ms"], row["published.psnr"]) == ("done", None, None)
+    assert (row["status"], row["times.frame.median_ms"], row["published.psnr"]) == (
+        "done",
+        None,
+        None,
+    )
     assert row["command"] == (
-        "airlight view random:7 --method ray-march --set steps=4 --change medium.sigma_t=0.1 --size 16x12"
+        "airlight view random:7 --method ray-march --set steps=4 --change medium.sigma_t=0.1 "
+        "--size 16x12"
     )
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a finished row is never lost and never there twice, whatever ends the process or the disk."""
+"""Claim: a finished row is never lost and never there twice, whatever ends
+the process or the disk.
+"""
 
 import json
 import subprocess
@@ -16,7 +18,12 @@ pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")
 
 def row(key, status="done", **values):
     names = {"p99": "error.p99", "max": "error.max", "relative_rmse": "error.relative_rmse"}
-    return {"key": key, "status": status, "label": "m", **{names.get(name, name): values[name] for name in values}}
+    return {
+        "key": key,
+        "status": status,
+        "label": "m",
+        **{names.get(name, name): values[name] for name in values},
+    }
 
 
 def keys(folder):
@@ -33,7 +40,9 @@ def test_rows_stay_and_later_ones_replace(tmp_path):
         assert (store.status("a"), store.status("b"), store.status("c")) == ("done", "done", None)
     with RowStore(tmp_path) as store:
         again = list(store.rows())
-    assert [(each["key"], each["error.p99"], each["error.max"], each["picture"]) for each in again] == [
+    assert [
+        (each["key"], each["error.p99"], each["error.max"], each["picture"]) for each in again
+    ] == [
         ("a", 0.5, None, None),
         ("b", None, 0.25, b"\x00\xff"),
     ]
@@ -52,7 +61,9 @@ with RowStore(Path(sys.argv[1])) as store:
 
 @pytest.mark.claim("sweeps-go-on", tolerance="none")
 def test_what_was_added_outlives_a_killed_process(tmp_path):
-    ran = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], cwd=Path(__file__).parents[3], check=False)
+    ran = subprocess.run(
+        [sys.executable, "-c", KILLED, str(tmp_path)], cwd=Path(__file__).parents[3], check=False
+    )
     assert ran.returncode == -9
     assert keys(tmp_path) == ["a", "b"]
 
@@ -96,8 +107,12 @@ def test_the_parquet_has_every_row_once_and_the_worst_pictures(tmp_path):
         lines = store.write_json().read_text().splitlines()
     assert table["key"].to_pylist() == [*(f"{number:02d}" for number in range(count)), "none"]
     for line, kept in zip(lines, table.drop_columns(["picture"]).to_pylist(), strict=True):
-        assert json.loads(line) == {name: value for name, value in kept.items() if value is not None}
-    assert table["picture"].to_pylist() == [None] * (count - PICTURES) + [b"new"] * PICTURES + [None]
+        assert json.loads(line) == {
+            name: value for name, value in kept.items() if value is not None
+        }
+    assert table["picture"].to_pylist() == [None] * (count - PICTURES) + [b"new"] * PICTURES + [
+        None
+    ]
     assert table["properties.depth"].to_pylist()[-2:] == [1.5, None]
     assert table["seed"].to_pylist()[-1] == 2**40
     assert table["error.p99"].null_count == 1

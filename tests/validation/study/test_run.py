@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says why; costly work asks first."""
+"""Claim: a cell becomes a row of finite numbers that are those of the metrics, or says
+why; costly work asks first.
+"""
 
 import weakref
 from dataclasses import replace
@@ -40,7 +42,9 @@ MARCH = Configuration("ray-march", None, (("steps", 200),))
 def scene_with(*, shadows=True, clear=False, area_lights=("disk",)):
     """Return of a scene what decides which configurations differ in it."""
     features = SceneFeatures(shadows=shadows, surfaces=True)
-    return SimpleNamespace(features=features, medium=SimpleNamespace(clear=clear), area_lights=area_lights)
+    return SimpleNamespace(
+        features=features, medium=SimpleNamespace(clear=clear), area_lights=area_lights
+    )
 
 
 USUAL, UNTIMED = Measure(), Measure("none")
@@ -67,7 +71,10 @@ def test_a_row_has_the_errors_and_what_they_cost():
     assert row.times.light_moved is None
     assert (row.times.frame.repetitions >= 1, row.cost.lights) == (True, 1)
     assert row.colour.ciede2000_max < 0.1
-    assert row.command == "airlight view sphere-spot --method shadow-planes --set kernel=exact --size 24x18"
+    assert (
+        row.command
+        == "airlight view sphere-spot --method shadow-planes --set kernel=exact --size 24x18"
+    )
     assert row_values(row)["error.p99"] == row.error.p99
 
 
@@ -96,9 +103,12 @@ def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch)
 
 @pytest.mark.usefixtures("variant")
 def test_times_are_left_out_where_nobody_asks():
-    row, _ = row_of("open-fog", configuration("unshadowed"), Measure("none"), ("medium.sigma_t=0.3",))
+    row, _ = row_of(
+        "open-fog", configuration("unshadowed"), Measure("none"), ("medium.sigma_t=0.3",)
+    )
     assert (row.status, row.times, row.medium) == ("done", None, "medium.sigma_t=0.3")
-    assert row.stated.outside == 0  # nothing casts a shadow there, so the kernel's claim holds for whole rays
+    # nothing casts a shadow there, so the kernel's claim holds for whole rays
+    assert row.stated.outside == 0
     assert row_of("windows", configuration("unshadowed"), Measure("none"))[0].stated is None
 
 
@@ -113,7 +123,9 @@ speckled.noisy = True
 @pytest.mark.usefixtures("variant")
 def test_a_row_of_a_noisy_method_has_the_errors_of_its_runs():
     row, _ = row_of("open-fog", configuration(speckled), UNTIMED)
-    reference = cell_reference(load_cell(Cell("open-fog", SIZE, (), configuration("unshadowed")))).airlight
+    reference = cell_reference(
+        load_cell(Cell("open-fog", SIZE, (), configuration("unshadowed")))
+    ).airlight
     # A number even in [0, 2] has the variance 1/3.
     rmse = np.sqrt(np.mean(reference**2) / 3) / reference.mean()
     assert row.noise.runs == module.RUNS
@@ -136,7 +148,9 @@ def test_a_refusal_is_a_row():
 
 
 def test_what_would_take_too_long_is_left_out_with_what_it_would_take(clock, monkeypatch):
-    """16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation, are at least 0.4 s here."""
+    """16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation,
+    are at least 0.4 s here.
+    """
     render = module.render_frame
 
     def slowed(renderer):
@@ -173,7 +187,9 @@ def test_pixels_that_have_a_reference_keep_their_places_and_others_are_none(monk
     def of_pixels(scene, pixels, plan):
         values = np.multiply.outer([pixels], [1.0, 2.0, 3.0])
         bound, spread, none = 0.5 * values, 0.1 * values, np.zeros(values.shape)
-        return ReferenceImage(values, bound, none, none[..., 0], none[..., 0], 0, 0.0, airlight_se=spread)
+        return ReferenceImage(
+            values, bound, none, none[..., 0], none[..., 0], 0, 0.0, airlight_se=spread
+        )
 
     monkeypatch.setattr(sampled, "reference_of_pixels", of_pixels)
     some = sampled.sampled_reference(mi.load_dict(tiny_scene(size=(40, 32))))
@@ -181,7 +197,8 @@ def test_pixels_that_have_a_reference_keep_their_places_and_others_are_none(monk
     assert some["mask"].sum() == 40 * 32 // 16
     expected = np.where(some["mask"], number, 0)[..., None] * np.array([1.0, 2.0, 3.0])
     np.testing.assert_array_equal(some["airlight"], expected)
-    np.testing.assert_allclose(some["bound"], 0.5 * expected + 3 * 0.1 * expected)  # three standard errors
+    # three standard errors
+    np.testing.assert_allclose(some["bound"], 0.5 * expected + 3 * 0.1 * expected)
 
 
 @pytest.mark.slow
@@ -202,10 +219,15 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
         monkeypatch.setattr(sampled, "_PLAN", replace(sampled._PLAN, seed=seed))
         some = sampled.sampled_reference(loaded.scene)
         difference = np.abs(some["airlight"][reference.mask] - finer.airlight[0])
-        beyond.append((difference > some["bound"][reference.mask] + 3 * finer.airlight_se[0]).mean())
-    # The bound is three standard errors of eight replicates, beyond which 2.0 % of Student's law lie. The pixels of a
-    # run share their points, the runs do not: four standard errors of the mean over runs.
-    assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(len(beyond))
+        beyond.append(
+            (difference > some["bound"][reference.mask] + 3 * finer.airlight_se[0]).mean()
+        )
+    # The bound is three standard errors of eight replicates, beyond which 2.0 % of Student's law
+    # lie. The pixels of a run share their points, the runs do not: four standard errors of the mean
+    # over runs.
+    assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(
+        len(beyond)
+    )
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
@@ -214,10 +236,15 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
     assert dict(left_out.parameters) == {"order": "exact", "media": "paper"}
     without_points = configurations_for(scene_with(area_lights=()), STANDARD)
-    assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
+    assert set(unbounded) - set(without_points) == {
+        given for given in STANDARD if "points" in dict(given.parameters)
+    }
     left = configurations_for(scene_with(shadows=False), STANDARD)
     assert 0 < len(left) < len(STANDARD)
-    assert all(not {"shadow", "map", "order"} & set(dict(configuration.parameters)) for configuration in left)
+    assert all(
+        not {"shadow", "map", "order"} & set(dict(configuration.parameters))
+        for configuration in left
+    )
     assert {configuration.method for configuration in left} == set(FOG_METHODS)
 
 
@@ -225,14 +252,17 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
     monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(10**9, "this machine has"))
     monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
-    check_work("x", [Work(36000, 1e9), Work(36000, 1e9)])  # an hour if two threads are ten times as fast
+    # an hour if two threads are ten times as fast
+    check_work("x", [Work(36000, 1e9), Work(36000, 1e9)])
     with pytest.raises(
         InputError,
         match=r"^x: would take about 10 hours at the speed of one machine, and more than an hour at 10 times that "
         r"speed; ask for less, or set AIRLIGHT_FORCE=1 to start it",
     ):
         check_work("x", [Work(37000), Work(36000)])
-    with pytest.raises(InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"):
+    with pytest.raises(
+        InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"
+    ):
         check_work("x", [Work(1, 2e9)])
     with pytest.raises(InputError, match=r"about 63\.[0-9]* years at .* speed and needs"):
         check_work("x", [Work(4e9, 2e9)])
@@ -242,13 +272,17 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
 
 
 def test_a_user_is_told_before_a_command_runs_for_minutes(variant, monkeypatch):
-    """Means over pixels take 48 to 1360 rays beside the centre's, each with 32 samples of every area light."""
+    """Means over pixels take 48 to 1360 rays beside the centre's, each with 32
+    samples of every area light.
+    """
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
     size, scale = (160, 120), 160 * 120 / 2
     assert check_work("x", [reference_work(size)]) == ()
     (words,) = check_work("x", [reference_work(size, pixel="area")])
     least, most = 49 * 100e-6 * scale, 1361 * 100e-6 * scale
-    assert words.startswith(f"x: between {least:.2g} seconds and {most / 60:.2g} minutes by its rays and samples")
+    assert words.startswith(
+        f"x: between {least:.2g} seconds and {most / 60:.2g} minutes by its rays and samples"
+    )
     of_lights = reference_work(size, lights=0, area_lights=2, pixel="area")
     assert of_lights.seconds == pytest.approx(49 * (100e-6 + 2 * 32 * 10e-6) * 2 * scale)
     # A time without a range is one number.
@@ -268,7 +302,9 @@ def test_a_user_is_told_before_a_command_runs_for_minutes(variant, monkeypatch):
 def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
-    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(16 * 10**9, "this machine has"))
+    monkeypatch.setattr(
+        expected_work, "usable_memory", lambda: Memory(16 * 10**9, "this machine has")
+    )
     assert run_command(command) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
@@ -282,7 +318,9 @@ CHECKS = Checks((8, 6), {"volpath": 0.5}, {"volpath": 8})
 
 @pytest.mark.slow
 def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
-    """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
+    """Two runs, one of them on a machine so busy that hours pass between two
+    batches: the same samples.
+    """
 
     def checked(**changes):
         study = replace(TINY, checks=replace(CHECKS, **changes))
@@ -305,11 +343,20 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
 def test_a_scene_of_half_has_half_the_width_in_all_its_images_and_more_paths_in_a_batch():
     checks = Checks(size=(48, 36), samples={"single-scatter": 128, "volpath": 16})
     study = Study(
-        "s", ("a", "b"), half=("b",), sizes=((40, 30),), measure=Measure(timed_size=(640, 480)), checks=checks
+        "s",
+        ("a", "b"),
+        half=("b",),
+        sizes=((40, 30),),
+        measure=Measure(timed_size=(640, 480)),
+        checks=checks,
     )
     assert study.of("a") == study
     halved = study.of("b")
-    assert (halved.sizes, halved.measure.timed_size, halved.checks.size) == (((20, 15),), study.timed_size, (24, 18))
+    assert (halved.sizes, halved.measure.timed_size, halved.checks.size) == (
+        ((20, 15),),
+        study.timed_size,
+        (24, 18),
+    )
     assert halved.checks.samples == {"single-scatter": 128, "volpath": 64}
 
 

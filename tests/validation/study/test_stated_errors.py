@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: what a method states of its own error holds where rounding and tables are at their worst, and not by far."""
+"""Claim: what a method states of its own error holds where rounding and tables are at
+their worst, and not by far.
+"""
 
 from types import SimpleNamespace
 
@@ -29,11 +31,14 @@ def turned():
     return mi.ScalarTransform4f().rotate([-0.879, -0.121, 0.461], 59.11)
 
 
-ACROSS, SKIMMING = (0.694, -0.712, 0.107), (0.99894, -0.0127, 0.0443)  # through two faces, and along one of them
+# through two faces, and along one of them
+ACROSS, SKIMMING = (0.694, -0.712, 0.107), (0.99894, -0.0127, 0.0443)
 
 
 def clipped_edge(along=ACROSS, fov=0.012):
-    """A camera that looks over the edge of a box of fog, 0.66 m away: its pixels are some micrometres apart."""
+    """A camera that looks over the edge of a box of fog, 0.66 m away: its pixels
+    are some micrometres apart.
+    """
     world, along = turned(), np.array(along) / np.linalg.norm(along)
     edge = HALF * (1, 1, 0)
     eye = [*(world @ mi.ScalarPoint3f(edge - 0.66 * along))]
@@ -51,7 +56,9 @@ def clipped_edge(along=ACROSS, fov=0.012):
 
 
 def chords(scene):
-    """Return what of each ray lies in the box, by crossings with the triangles of it, in float64 [m]."""
+    """Return what of each ray lies in the box, by crossings with the
+    triangles of it, in float64 [m].
+    """
     reference = read_reference(scene)
     parameters = mi.traverse(scene.shapes()[0])
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
@@ -70,14 +77,19 @@ def chords(scene):
 
 def errors(scene, method, **parameters):
     """Return reference and the error of an image, (pixels, 3) each [W/(m^2 sr)]."""
-    frame = np.asarray(render(scene, method, **parameters).airlight, dtype=np.float64).reshape(-1, 3)
+    frame = np.asarray(render(scene, method, **parameters).airlight, dtype=np.float64).reshape(
+        -1, 3
+    )
     reference = reference_image(scene).airlight.reshape(-1, 3)
     return reference, np.abs(frame - reference)
 
 
-@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
+@pytest.mark.claim(
+    "sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table"
+)
 def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth():
-    # random:3 has such pixels: a ray clips the edge of a medium, or a surface stands just behind its bound.
+    # random:3 has such pixels: a ray clips the edge of a medium, or a surface
+    # stands just behind its bound.
     scene = clipped_edge()
     reference, error = errors(scene, "shadow-planes")
     lit = np.flatnonzero(reference[:, 0] > 0)
@@ -87,12 +99,16 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
     scattered = ALBEDO * SIGMA_T * INTENSITY / (4 * np.pi * distance**2)
     assert reference[lit, 0] == pytest.approx(chords(scene)[lit] * scattered, rel=2e-3)
     worth = bounds.worth_of_ends(scene, lit)
-    assert (error[lit] > bounds.EXACT * reference[lit]).any()  # so what is promised of the pixel is no bound
+    # so what is promised of the pixel is no bound
+    assert (error[lit] > bounds.EXACT * reference[lit]).any()
     assert (error[lit] <= worth).all()
     assert error[lit].max() > 0.05 * worth.max()
-    # The most where rays leave, by the face that they meet at the smaller angle, behind the whole chord.
+    # The most where rays leave, by the face that they meet at the smaller
+    # angle, behind the whole chord.
     kept = np.exp(-SIGMA_T * chords(scene)[lit])
-    assert worth[:, 0] == pytest.approx(1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3)
+    assert worth[:, 0] == pytest.approx(
+        1.1 * bounds.END * 0.66 / ACROSS[0] * scattered * kept, rel=2e-3
+    )
 
 
 def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
@@ -104,8 +120,12 @@ def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
     assert run(cell, read, reference, whole=scene)[0].stated.outside > 0
 
 
-@pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
-@pytest.mark.parametrize(("words", "values"), [("murky", 129), ("murky", 513), ("hazy", 513), ("isotropic", 65)])
+@pytest.mark.claim(
+    "sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table"
+)
+@pytest.mark.parametrize(
+    ("words", "values"), [("murky", 129), ("murky", 513), ("hazy", 513), ("isotropic", 65)]
+)
 def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
     scene = mi.load_dict(
         {
@@ -128,11 +148,15 @@ def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
 def test_places_where_rounding_is_worst_are_at_equal_angles_about_a_light():
     """A lamp 3 m ahead and 4 m aside of the first ray, and behind the second, which never ends."""
     lamp = SimpleNamespace(position=np.array([4.0, 0.0, 3.0]))
-    reference = SimpleNamespace(origin=np.zeros(3), direction=np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]))
+    reference = SimpleNamespace(
+        origin=np.zeros(3), direction=np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    )
     places = bounds._angles_about(reference, lamp, np.array([6.0, np.inf]))
     angles = np.arctan2(places - [3.0, -3.0], 4.0)
     np.testing.assert_allclose(places[[0, -1], 0], [0.0, 6.0], atol=1e-12)
-    np.testing.assert_allclose(np.diff(angles, axis=0)[:, 0], np.ptp(angles[:, 0]) / (len(places) - 1))
+    np.testing.assert_allclose(
+        np.diff(angles, axis=0)[:, 0], np.ptp(angles[:, 0]) / (len(places) - 1)
+    )
     assert places[0, 1] == pytest.approx(0, abs=1e-12)
     assert np.isinf(places[-1, 1])  # no place is there
     assert np.isfinite(places[:-1]).all()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: times that are compared are of one run, in turns; an anchor says whether the machine changed meanwhile."""
+"""Claim: times that are compared are of one run, in turns; an anchor says whether the
+machine changed meanwhile.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -30,7 +32,9 @@ def test_times_are_medians_and_quartiles_without_the_warm_up(clock):
 
 
 def test_works_are_timed_in_turns(clock):
-    slow, fast = time_in_turns([clock.work("slow", 20), clock.work("fast", 5)], seconds=0.0, least=5)
+    slow, fast = time_in_turns(
+        [clock.work("slow", 20), clock.work("fast", 5)], seconds=0.0, least=5
+    )
     assert clock.calls == ["slow", "fast"] * 7  # two turns of warm-up
     assert (slow.repetitions, fast.repetitions) == (5, 5)
     assert (slow.median_ms, fast.median_ms) == pytest.approx((20, 5))
@@ -52,16 +56,23 @@ def test_a_piece_is_repeated_in_its_turn_for_its_part_of_the_time(clock):
 
 @pytest.mark.claim("times-of-one-run")
 def test_a_machine_that_gets_slower_changes_no_ratio_and_the_anchor_says_so(clock):
-    """From the middle on all takes three times as long: of two works one after the other one would seem slower."""
+    """From the middle on all takes three times as long: of two works one after the
+    other one would seem slower.
+    """
     clock.pace = lambda now: 1.0 if now < 1.0 else 3.0
-    first, second = time_in_turns([clock.work("a", 20), clock.work("b", 40)], seconds=2.4, least=4, warm_up=0)
+    first, second = time_in_turns(
+        [clock.work("a", 20), clock.work("b", 40)], seconds=2.4, least=4, warm_up=0
+    )
     assert second.median_ms / first.median_ms == pytest.approx(2, rel=0.1)
 
 
 def ends(rng, scale, repetitions=ANCHORS, spread=0.02):
     """Times of an anchor at the ends of rounds, which scatter by the normal law about `scale`."""
     scatter = 1 + spread * rng.standard_normal((len(scale), repetitions))
-    return [timing_of([Spent(1e-3 * ms) for ms in each]) for each in scatter * np.asarray(scale)[:, None]]
+    return [
+        timing_of([Spent(1e-3 * ms) for ms in each])
+        for each in scatter * np.asarray(scale)[:, None]
+    ]
 
 
 @pytest.mark.claim("times-of-one-run", tolerance="99 % of quiet runs are called steady")
@@ -77,7 +88,9 @@ def test_a_machine_that_does_not_change_is_called_steady():
 @pytest.mark.parametrize("slower", [1.1, 2.5])
 def test_a_change_beyond_the_quartiles_is_said(slower):
     rng = np.random.default_rng(20261128)
-    run = anchored("", 5, ends(rng, np.repeat([3.1, slower * 3.1], (7, 3))), timing_of([Spent(3.1e-3)]))
+    run = anchored(
+        "", 5, ends(rng, np.repeat([3.1, slower * 3.1], (7, 3))), timing_of([Spent(3.1e-3)])
+    )
     assert run.steady is False
     assert run.between == pytest.approx(slower, rel=0.03)
     assert run.within < 1.06
@@ -99,11 +112,15 @@ def test_a_slow_frame_is_timed_a_few_times(scene, monkeypatch, spent, turns):
     times = time_frame(renderer, seconds=0.0, slow=-1.0)
     assert {each.repetitions for each in times.measured.values()} == {turns}
     assert len(times.measured) == 7
-    assert all(0 < each.low_ms <= each.median_ms <= each.high_ms for each in times.measured.values())
+    assert all(
+        0 < each.low_ms <= each.median_ms <= each.high_ms for each in times.measured.values()
+    )
     assert times.frame.median_ms <= times.light_moved.median_ms <= times.objects_moved.median_ms
     assert times.colours_changed.median_ms <= times.light_moved_camera_cached.median_ms
     if turns == 1:
-        assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
+        assert times.frame.median_ms == pytest.approx(
+            times.surface.median_ms + times.airlight.median_ms
+        )
 
 
 @pytest.mark.claim("times-of-one-run")
@@ -124,7 +141,8 @@ def test_methods_take_turns_and_one_that_fails_in_a_turn_is_lost_alone(scene, mo
         return each
 
     monkeypatch.setattr(module, "whole_turn", failing)
-    for name in ("_PATIENCE", "_RECORDED"):  # a method that is slow beside other work is warmed up, and has all rounds
+    # a method that is slow beside other work is warmed up, and has all rounds
+    for name in ("_PATIENCE", "_RECORDED"):
         monkeypatch.setattr(module, name, np.inf)
     found = time_cells([*cells, None], lambda cell: scene)
     first, lost, last, nothing = found

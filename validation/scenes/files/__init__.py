@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scene files as people write them, made into what both readers take, once for every command.
 
-Mitsuba's parser gives nodes before anything is built. Here old media get extinction and albedo, instances are written
-out, lamps on flat quads become rectangles, and redundant references to media are left out; features that no command can
-take are refused in Mitsuba's own words. Changes are reported in notes, as warnings in Mitsuba's log.
+Mitsuba's parser gives nodes before anything is built. Here old media get extinction and albedo,
+instances are written out, lamps on flat quads become rectangles, and redundant references to media
+are left out; features that no command can take are refused in Mitsuba's own words. Changes are
+reported in notes, as warnings in Mitsuba's log.
 
 Read in this order:
 

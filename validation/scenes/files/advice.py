@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes in a scene file, by the names of its parts, and what to do about those that Mitsuba finds."""
+"""Mistakes in a scene file, by the names of its parts, and what to do about
+those that Mitsuba finds.
+"""
 
 import re
 from pathlib import Path
@@ -14,7 +16,10 @@ from airlight.validation.scenes.files.nodes import kind, of_kind, properties, re
 _PLACE = re.compile(r"\[[\w.]+(:\d+)?\]\s*")  # of Mitsuba's source, before its words
 #: What Mitsuba says, and what to do about it; the first that fits counts.
 _ADVICE = (
-    (r'could not parse [\w ]*value "[^"]*\d,\d', "expected decimal points, such as 0.12: a comma separates numbers"),
+    (
+        r'could not parse [\w ]*value "[^"]*\d,\d',
+        "expected decimal points, such as 0.12: a comma separates numbers",
+    ),
     (r"could not parse integer", "expected a whole number"),
     (
         r'could not parse floating point value "[-+]?[\d.]+"',
@@ -28,14 +33,32 @@ _ADVICE = (
     ),
     (r"specified multiple times", "leave one out"),
     (r"Could not map", "the file that it names is empty: write or copy it again"),
-    (r"invalid lookat", 'it looks along its own up, or at its own place; write another up, for example up="0, 1, 0"'),
-    (r"undefined parameter: \$(\w+)", r'give it a value in the file: <default name="\1" value="..."/>'),
+    (
+        r"invalid lookat",
+        'it looks along its own up, or at its own place; write another up, for example up="0, 1, 0"',
+    ),
+    (
+        r"undefined parameter: \$(\w+)",
+        r'give it a value in the file: <default name="\1" value="..."/>',
+    ),
     (r"duplicate ID", "expected ids that differ: rename one of both, or leave it out"),
-    (r'Plugin "\w+" not found', f"expected a plugin of Mitsuba {mi.__version__}: check the spelling, or replace it"),
-    (r"unreferenced propert", "expected properties that it has: check the spelling, or leave them out"),
+    (
+        r'Plugin "\w+" not found',
+        f"expected a plugin of Mitsuba {mi.__version__}: check the spelling, or replace it",
+    ),
+    (
+        r"unreferenced propert",
+        "expected properties that it has: check the spelling, or leave them out",
+    ),
     (r"missing version attribute", 'expected <scene version="3.0.0"> as the first element'),
-    (r"unsupported XML element", "expected elements of Mitsuba's format: check the spelling, or leave it out"),
-    (r"included file", "expected it beside the scene, or its path from there: copy it, or correct the name"),
+    (
+        r"unsupported XML element",
+        "expected elements of Mitsuba's format: check the spelling, or leave it out",
+    ),
+    (
+        r"included file",
+        "expected it beside the scene, or its path from there: copy it, or correct the name",
+    ),
     (r"Parsing of XML file", "expected well-formed XML: repair it there, or export it again"),
     (r"read \d+ out of \d+ bytes", "a file that it names ends too early: write or copy it again"),
     (r"Scale factors in the camera", "remove the scale from the camera's to_world"),
@@ -47,7 +70,9 @@ _COLOURS = re.compile("albedo|reflectance|color")
 
 
 def in_words(error: Exception) -> str:
-    """Return what Mitsuba says of a file that it cannot read, in one line, and what to do about it."""
+    """Return what Mitsuba says of a file that it cannot read, in one line,
+    and what to do about it.
+    """
     reason = " ".join(str(error).split())
     reason = re.sub(r".*Traceback .*?\w*Error: ", "", reason)  # what a plugin in Python said
     reason = re.sub(r' in property "_arg_\d+"', "", _PLACE.sub("", reason))
@@ -58,7 +83,9 @@ def in_words(error: Exception) -> str:
 
 
 def check_files(state: Any, path: Path) -> None:
-    """Refuse files that a scene names and that are not there, and grids that Mitsuba does not read."""
+    """Refuse files that a scene names and that are not there, and grids
+    that Mitsuba does not read.
+    """
     for index in used(state):
         props = properties(state, index)
         if "filename" not in props:
@@ -69,17 +96,21 @@ def check_files(state: Any, path: Path) -> None:
         place = Path(str(mi.file_resolver().resolve(file)))
         vdb = place.suffix.lower() in (".vdb", ".nvdb")
         if not place.is_file() and not (vdb and plugin == "gridvolume"):
-            missing = "does not exist" if place.is_absolute() else f"is not in {path.parent.resolve()}"
+            missing = (
+                "does not exist" if place.is_absolute() else f"is not in {path.parent.resolve()}"
+            )
             missing = "is a folder" if place.is_dir() else missing
             slashes = ", with '/' in place of backslashes" * ("\\" in file)
             raise InputError(
-                f"scene {path}: {name} names the file {file}, which {missing}; expected its path from the scene's "
+                f"scene {path}: {name} names the file {file}, which {missing}; expected its path "
+                "from the scene's "
                 f"folder{slashes}: copy it there, or correct the filename"
             )
         if plugin == "gridvolume" and (vdb or not _is_grid(place)):
             what = "OpenVDB" if vdb else "no grid of Mitsuba"
             raise InputError(
-                f"scene {path}: {name} names the file {file}, {what}, which is not read; expected a .vol file: read "
+                f"scene {path}: {name} names the file {file}, {what}, which is not read; expected "
+                "a .vol file: read "
                 "the values, (z, y, x), by a library of that format, and write them by "
                 f"mi.VolumeGrid(values).write('{place.stem}.vol')"
             )
@@ -103,13 +134,16 @@ def check_colours(state: Any) -> None:
                 continue
             bits = ": divide them by 255" if colour.max() > 2 and colour.min() >= 0 else ""
             raise InputError(
-                f"{_name(state, index)} has {key} {', '.join(f'{value:g}' for value in colour)}; expected values from "
+                f"{_name(state, index)} has {key} {', '.join(f'{value:g}' for value in colour)}; "
+                "expected values from "
                 f"0 to 1, of the light that arrives{bits}"
             )
 
 
 def _name(state: Any, index: int) -> str:
-    """Return what a user calls a node: its own id, or that of the shape, light or medium that it belongs to."""
+    """Return what a user calls a node: its own id, or that of the shape, light or
+    medium that it belongs to.
+    """
     props = properties(state, index)
     part = kind(state, index).lower()
     if props.id() and not props.id().startswith("_"):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The camera of a file: what no command takes, and what its clip planes cut from Mitsuba's own images.
+"""The camera of a file: what no command takes, and what its clip planes cut
+from Mitsuba's own images.
 
-Rays of Mitsuba's camera start at its near plane and end at its far plane. The medium between the pinhole and the near
-plane scatters light into the eye all the same, and a far plane is no wall: references and methods leave nothing out.
+Rays of Mitsuba's camera start at its near plane and end at its far plane. The medium between the
+pinhole and the near plane scatters light into the eye all the same, and a far plane is no wall:
+references and methods leave nothing out.
 """
 
 from typing import Any
@@ -14,7 +16,9 @@ from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 
 _USUAL_NEAR = 1e-2  # Mitsuba's own near plane [m], of which files say nothing
-_OPAQUE = 17.0  # an optical depth: what is left of light beyond it is lost in the rounding of float32, exp(-17) = 2^-24
+# an optical depth: what is left of light beyond it is lost in the rounding of
+# float32, exp(-17) = 2^-24
+_OPAQUE = 17.0
 
 
 def check_camera(props: Any) -> None:
@@ -22,7 +26,8 @@ def check_camera(props: Any) -> None:
     name = f"camera '{props.id()}'"
     if props.plugin_name() != "perspective":
         raise InputError(
-            f"{name} is of type '{props.plugin_name()}'; expected a sensor of type 'perspective', a pinhole: replace it"
+            f"{name} is of type '{props.plugin_name()}'; expected a sensor of type 'perspective', "
+            "a pinhole: replace it"
         )
     for axis in "xy":
         key = f"principal_point_offset_{axis}"
@@ -31,7 +36,9 @@ def check_camera(props: Any) -> None:
 
 
 def clip_notes(scene: Any) -> list[str]:
-    """Return a note where the clip planes of the camera take something away from Mitsuba's own image."""
+    """Return a note where the clip planes of the camera take something away
+    from Mitsuba's own image.
+    """
     if not scene.sensors():
         return []
     sensor = scene.sensors()[0]
@@ -43,14 +50,19 @@ def clip_notes(scene: Any) -> list[str]:
         ends = np.empty((0, 3))
     corners = np.array(np.meshgrid(*ends.T)).reshape(3, -1).T
     depth = (corners - matrix[:3, 3]) @ matrix[:3, 2]
-    # Optical depths of a medium around the camera; a box of fog around it ends within the box of all shapes.
+    # Optical depths of a medium around the camera; a box of fog around it ends
+    # within the box of all shapes.
     medium = sensor.get_medium()
-    unbounded = medium is not None and all(shape.interior_medium() != medium for shape in scene.shapes())
+    unbounded = medium is not None and all(
+        shape.interior_medium() != medium for shape in scene.shapes()
+    )
     before = beyond = ""
     parameters = mi.traverse(medium) if medium is not None else {}
     if "sigma_t.value.value" in parameters:
         sigma_t = float(np.min(parameters["sigma_t.value.value"]) * parameters["scale"])
-        before, beyond = (f" (an optical depth of {sigma_t * length:.3g})" for length in (near, far))
+        before, beyond = (
+            f" (an optical depth of {sigma_t * length:.3g})" for length in (near, far)
+        )
         unbounded &= sigma_t * far < _OPAQUE
     lacks = []
     if near > _USUAL_NEAR and (medium is not None or np.min(depth, initial=np.inf) < near):
@@ -60,6 +72,7 @@ def clip_notes(scene: Any) -> list[str]:
     if not lacks:
         return []
     return [
-        f"camera '{sensor.id()}': its clip planes are not used; Mitsuba's own image lacks {'; and '.join(lacks)}: to "
+        f"camera '{sensor.id()}': its clip planes are not used; Mitsuba's own image lacks "
+        f"{'; and '.join(lacks)}: to "
         "compare with it, move them there"
     ]

@@ -22,7 +22,9 @@ _OLD = ("sigma_s", "sigma_a")
 
 
 def give_extinction(state: Any) -> list[str]:
-    """Give homogeneous media extinction and albedo in place of scattering and absorption; return what was changed."""
+    """Give homogeneous media extinction and albedo in place of scattering and absorption;
+    return what was changed.
+    """
     notes = []
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
@@ -43,29 +45,42 @@ def give_extinction(state: Any) -> list[str]:
         _set_extinction(props, sigma_t)
         props["albedo"] = mi.ScalarColor3d(*albedo.tolist())
         notes.append(
-            f"medium '{props.id()}': {' and '.join(given)} are read as sigma_t {_words(sigma_t)} and albedo "
+            f"medium '{props.id()}': {' and '.join(given)} are read as sigma_t {_words(sigma_t)} "
+            "and albedo "
             f"{_words(albedo)}"
         )
     return notes
 
 
 def _set_extinction(props: Any, sigma_t: Array) -> None:
-    """Set an extinction, (3,): Mitsuba takes it for a reflectance, from 0 to 1; what is above goes into the scale."""
+    """Set an extinction, (3,): Mitsuba takes it for a reflectance, from 0 to 1; what is
+    above goes into the scale.
+    """
     if not np.all(np.isfinite(sigma_t)):
         given = ", ".join(f"{value:g}" for value in sigma_t)
-        raise InputError(f"medium '{props.id()}': sigma_t is {given}; expected finite numbers [1/m]")
+        raise InputError(
+            f"medium '{props.id()}': sigma_t is {given}; expected finite numbers [1/m]"
+        )
     above = max(1.0, float(sigma_t.max()))
     props["scale"] = float(props.get("scale", 1.0)) * above
     props["sigma_t"] = mi.ScalarColor3d(*(sigma_t / above).tolist())
 
 
 def _make_homogeneous(state: Any, props: Any) -> None:
-    """Make a heterogeneous medium homogeneous whose extinction is the same everywhere; an old one calls it density."""
+    """Make a heterogeneous medium homogeneous whose extinction is the same everywhere; an
+    old one calls it density.
+    """
     if props.plugin_name() == "heterogeneous" and "density" in props and "sigma_t" not in props:
         props["sigma_t"] = props["density"]
         del props["density"]
-    volumes = [properties(state, at).plugin_name() for key, at in references(props) if key == "sigma_t"]
-    if props.plugin_name() == "heterogeneous" and "sigma_t" in props and volumes in ([], ["constvolume"]):
+    volumes = [
+        properties(state, at).plugin_name() for key, at in references(props) if key == "sigma_t"
+    ]
+    if (
+        props.plugin_name() == "heterogeneous"
+        and "sigma_t" in props
+        and volumes in ([], ["constvolume"])
+    ):
         props.set_plugin_name("homogeneous")
         for key in ("majorant_resolution_factor", "majorant_grid", "majorant_factor"):
             if key in props:
@@ -75,8 +90,9 @@ def _make_homogeneous(state: Any, props: Any) -> None:
 def grey_densities(state: Any) -> None:
     """Say of media whose density is height fog or a grid that they are grey.
 
-    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), m the largest density and d what is
-    left of the way to the light, and takes 0 for it where the exponential underflows: suns went out from far away.
+    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), m the largest
+    density and d what is left of the way to the light, and takes 0 for it where the exponential
+    underflows: suns went out from far away.
     """
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
@@ -97,19 +113,30 @@ def mirrored_grids(state: Any) -> list[str]:
             volume.mark_queried("to_world", False)
             if mirrored:
                 notes.append(
-                    f"medium '{properties(state, index).id()}': a negative scale in the to_world of its grid mirrors it"
+                    f"medium '{properties(state, index).id()}': a negative scale in the to_world "
+                    "of its grid mirrors it"
                 )
     return notes
 
 
 def pass_where_no_material(state: Any) -> None:
-    """Give shapes of files before version 2 that bound a medium and have no material the material `null`."""
+    """Give shapes of files before version 2 that bound a medium and have no
+    material the material `null`.
+    """
     for index in of_kind(state, "Shape"):
         node = state.nodes[index]
         kinds = {kind(state, at) for _, at in references(node.props)}
-        if "Medium" in kinds and not kinds & {"BSDF", "Emitter"} and state.versions[node.file_index].major_version < 2:
+        if (
+            "Medium" in kinds
+            and not kinds & {"BSDF", "Emitter"}
+            and state.versions[node.file_index].major_version < 2
+        ):
             null = mi.parser.SceneNode()
-            null.type, null.props, null.file_index = mi.ObjectType.BSDF, mi.Properties("null"), node.file_index
+            null.type, null.props, null.file_index = (
+                mi.ObjectType.BSDF,
+                mi.Properties("null"),
+                node.file_index,
+            )
             node.props["no_material"] = mi.Properties.ResolvedReference(len(state.nodes))
             state.nodes.append(null)
 
@@ -119,21 +146,30 @@ def _refuse_names(props: Any) -> None:
     name = f"medium '{props.id()}'"
     if "material" in props:
         raise InputError(
-            f"{name} names the material '{props['material']}'; expected its sigma_t [1/m] and albedo in numbers"
+            f"{name} names the material '{props['material']}'; expected its sigma_t [1/m] and "
+            "albedo in numbers"
         )
     if "density" in props:
         raise InputError(
-            f"{name} has a density, which a homogeneous medium has not; expected sigma_t [1/m] and albedo: multiply "
+            f"{name} has a density, which a homogeneous medium has not; expected sigma_t [1/m] and "
+            "albedo: multiply "
             "sigma_t by the density and remove it"
         )
 
 
 def _extinction(props: Any) -> tuple[Array, Array]:
-    """Return extinction and albedo of which two of scattering, absorption and extinction are given."""
-    known = {key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None}
+    """Return extinction and albedo of which two of scattering, absorption
+    and extinction are given.
+    """
+    known = {
+        key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None
+    }
     if "albedo" in props or len(known) != 2:
         given = ", ".join(key for key in (*_OLD, "sigma_t", "albedo") if key in props)
-        raise InputError(f"medium '{props.id()}' has {given}; expected sigma_t and albedo, or sigma_s and sigma_a")
+        raise InputError(
+            f"medium '{props.id()}' has {given}; expected sigma_t and albedo, or sigma_s and "
+            "sigma_a"
+        )
     extinction = known["sigma_t"] if "sigma_t" in known else known["sigma_s"] + known["sigma_a"]
     scattering = known["sigma_s"] if "sigma_s" in known else extinction - known["sigma_a"]
     return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
@@ -144,7 +180,8 @@ def _numbers(props: Any, key: str) -> Array | None:
     if key not in props:
         return None
     value = props[key]
-    if type(value).__name__ == "Spectrum" and value.is_uniform():  # not `mi.Spectrum`, an array of the variant
+    # not `mi.Spectrum`, an array of the variant
+    if type(value).__name__ == "Spectrum" and value.is_uniform():
         value = value.values
     try:
         numbers = np.array(value, dtype=np.float64).reshape(-1)
@@ -152,7 +189,8 @@ def _numbers(props: Any, key: str) -> Array | None:
         numbers = np.zeros(0)
     if numbers.size not in (1, 3):
         raise InputError(
-            f"medium '{props.id()}': {key} is no number and no 'rgb'; expected sigma_t = sigma_s + sigma_a [1/m] and "
+            f"medium '{props.id()}': {key} is no number and no 'rgb'; expected sigma_t = sigma_s + "
+            "sigma_a [1/m] and "
             "albedo = sigma_s / sigma_t in numbers"
         )
     return np.array(np.broadcast_to(numbers, 3))

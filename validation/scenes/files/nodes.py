@@ -15,7 +15,9 @@ def properties(state: Any, index: int) -> Any:
 
 
 def references(props: Any) -> Iterator[tuple[str, int]]:
-    """Yield the nodes that properties refer to, by key; Mitsuba does not count it as use of them."""
+    """Yield the nodes that properties refer to, by key; Mitsuba does not
+    count it as use of them.
+    """
     for key in list(props.keys()):
         if props.type(key) == mi.Properties.Type.ResolvedReference:
             index = props[key].index()
@@ -30,16 +32,22 @@ def kind(state: Any, index: int) -> str:
 
 def child(state: Any, index: int, wanted: str) -> int | None:
     """Return the number of the first node of a kind that a node refers to."""
-    return next((at for _, at in references(properties(state, index)) if kind(state, at) == wanted), None)
+    return next(
+        (at for _, at in references(properties(state, index)) if kind(state, at) == wanted), None
+    )
 
 
 def used(state: Any) -> list[int]:
-    """Return the numbers of the nodes that the scene holds, each after the first that refers to it."""
+    """Return the numbers of the nodes that the scene holds, each after the
+    first that refers to it.
+    """
     return reached(state, 0)
 
 
 def reached(state: Any, index: int) -> list[int]:
-    """Return the numbers of a node and of the nodes below it, each after the first that refers to it."""
+    """Return the numbers of a node and of the nodes below it, each after the
+    first that refers to it.
+    """
     found: dict[int, None] = {index: None}
     waiting = [index]
     while waiting:

@@ -37,7 +37,12 @@ _TAKEN = {
     "PhaseFunction": ("isotropic", "hg", "rayleigh", "tabphase"),
 }
 _WORDS = {"Emitter": "light", "Medium": "medium", "PhaseFunction": "phase function"}
-_COLOURS = {"point": "intensity", "spot": "intensity", "directional": "irradiance", "area": "radiance"}
+_COLOURS = {
+    "point": "intensity",
+    "spot": "intensity",
+    "directional": "irradiance",
+    "area": "radiance",
+}
 _TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "volume")
 _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
@@ -45,7 +50,8 @@ _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_
 def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> Any:
     """Read a scene file with what Mitsuba has in place of a scene where it holds none.
 
-    Isotropic media get the mean cosines that `lobes` has for their ids. Features that no command can take are refused.
+    Isotropic media get the mean cosines that `lobes` has for their ids. Features that no
+    command can take are refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
     resolver = mi.file_resolver()
@@ -56,16 +62,19 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
         return _built(config, _parsed(config, path), path, lobes)
     except InputError:
         raise
-    except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
+    # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
+    except Exception as error:
         raise InputError(f"scene {path}: Mitsuba cannot read it: {in_words(error)}") from error
     finally:
         mi.set_file_resolver(resolver)
 
 
 def _parsed(config: Any, path: Path) -> Any:
-    """Return the nodes of a file, with the names that Mitsuba 3 gives to everything, and references as numbers.
+    """Return the nodes of a file, with the names that Mitsuba 3 gives to everything,
+    and references as numbers.
 
-    Meshes are not merged, as `mi.load_file` would: shapes keep their names, and two bodies of a medium stay two.
+    Meshes are not merged, as `mi.load_file` would: shapes keep their names, and two
+    bodies of a medium stay two.
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     if "<lookAt" in text:  # of version 0.5, which Mitsuba's own upgrade leaves out
@@ -88,9 +97,14 @@ def _built(config: Any, state: Any, path: Path, lobes: Mapping[str, float]) -> A
     digest = description_digest(state)
     with temporary_folder() as folder:
         notes = cylinders_as_meshes(state, folder)
-        scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
+        # which takes the nodes apart
+        scene = mi.parser.instantiate(config, mi.parser.ParserState(state))
         rooms = rooms_as_boxes(state, scene.shapes())
-        changed = [bool(rooms), lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
+        changed = [
+            bool(rooms),
+            lamps_as_rectangles(state, scene.shapes()),
+            leave_out_media(state, scene),
+        ]
         scene = mi.parser.instantiate(config, state) if any(changed) else scene
     for note in [*notes, *rooms, *touching(scene), *clip_notes(scene)]:
         mi.Log(mi.LogLevel.Warn, note)
@@ -113,7 +127,9 @@ def _mend(state: Any, path: Path) -> None:
 
 
 def _leave_out_rendering(state: Any) -> None:
-    """Leave out integrators, samplers and filters: no method uses them, and old files name some that are no more."""
+    """Leave out integrators, samplers and filters: no method uses them, and old files
+    name some that are no more.
+    """
     for node in state.nodes:
         for key, at in references(node.props):
             if kind(state, at) in ("Integrator", "Sampler"):
@@ -133,10 +149,14 @@ def check_kinds(state: Any) -> None:
         for index in of_kind(state, part):
             props = properties(state, index)
             if props.plugin_name() not in taken:
-                name = f"{_WORDS[part]} '{props.id()}'" if props.id() else f"a {_WORDS[part]} of the scene"
+                name = (
+                    f"{_WORDS[part]} '{props.id()}'"
+                    if props.id()
+                    else f"a {_WORDS[part]} of the scene"
+                )
                 raise InputError(
-                    f"{name} is of type '{props.plugin_name()}'; expected one of {', '.join(taken)}: replace it"
-                    + " or remove it" * (part == "Emitter")
+                    f"{name} is of type '{props.plugin_name()}'; expected one of "
+                    f"{', '.join(taken)}: replace it" + " or remove it" * (part == "Emitter")
                 )
     for index in of_kind(state, "Emitter"):
         _check_light(state, index)
@@ -153,6 +173,7 @@ def _check_light(state: Any, index: int) -> None:
         textured = properties(state, at).plugin_name() in _TEXTURES
         if key == "texture" or (key == wanted and textured):
             raise InputError(
-                f"{name}, of type '{props.plugin_name()}', has a texture as {key}; expected one colour: remove the "
+                f"{name}, of type '{props.plugin_name()}', has a texture as {key}; expected one "
+                "colour: remove the "
                 "texture, or give its mean as 'rgb'"
             )

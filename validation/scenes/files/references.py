@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""References of opaque shapes to media: left out where they are redundant, refused where they contradict.
+"""References of opaque shapes to media: left out where they are redundant,
+refused where they contradict.
 
-Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps. The camera and the
-bounds of media determine the medium at every place; a wall or a lamp adds nothing.
+Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps.
+The camera and the bounds of media determine the medium at every place; a wall or a lamp adds
+nothing.
 """
 
 from collections.abc import Sequence
@@ -28,11 +30,17 @@ def leave_out_media(state: Any, scene: Any) -> bool:
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
     for shape in scene.shapes():
         material = child(state, nodes[shape.id()], "BSDF") if shape.id() in nodes else None
-        if material is not None and _media(shape) and not _is_opaque(shape) and shape.bsdf().class_name() != "Null":
+        if (
+            material is not None
+            and _media(shape)
+            and not _is_opaque(shape)
+            and shape.bsdf().class_name() != "Null"
+        ):
             word = properties(state, material).plugin_name()
             raise InputError(
                 f"shape '{shape.id()}' bounds a medium and has the material '{word}'; "
-                "expected 'null', which lets light pass straight on: replace the material, or remove the media"
+                "expected 'null', which lets light pass straight on: replace the material, or "
+                "remove the media"
             )
     shapes = [
         shape
@@ -42,7 +50,9 @@ def leave_out_media(state: Any, scene: Any) -> bool:
     if not shapes or not scene.sensors():
         return False
     others = [shape for shape in scene.shapes() if all(shape.id() != each.id() for each in shapes)]
-    bounds = [shape for shape in others if shape.interior_medium() is not None and not _is_opaque(shape)]
+    bounds = [
+        shape for shape in others if shape.interior_medium() is not None and not _is_opaque(shape)
+    ]
     if not any(shape.class_name() in _OPEN for shape in bounds):
         space = _Space(scene.sensors()[0], bounds)
         for shape in shapes:
@@ -52,19 +62,25 @@ def leave_out_media(state: Any, scene: Any) -> bool:
         for key, at in references(props):
             if kind(state, at) == "Medium":
                 del props[key]
-        # Without a medium Mitsuba would take away nothing; a lamp without a material is black as before.
+        # Without a medium Mitsuba would take away nothing; a lamp without a
+        # material is black as before.
         assert child(state, nodes[shape.id()], "Medium") is None
     return True
 
 
 def touching(scene: Any) -> list[str]:
-    """Return notes on opaque shapes that lie in the bounds of media, of which rays that go on beyond a bound miss some.
+    """Return notes on opaque shapes that lie in the bounds of media, of which rays that go on
+    beyond a bound miss some.
 
-    Mitsuba's own integrators, and the estimators by random samples, lose such surfaces in part; methods and quadrature
-    do not.
+    Mitsuba's own integrators, and the estimators by random samples, lose such surfaces in part;
+    methods and quadrature do not.
     """
     opaque = [shape for shape in scene.shapes() if _is_opaque(shape)]
-    bounds = [shape for shape in scene.shapes() if shape.interior_medium() is not None and not _is_opaque(shape)]
+    bounds = [
+        shape
+        for shape in scene.shapes()
+        if shape.interior_medium() is not None and not _is_opaque(shape)
+    ]
     if not opaque or not bounds:
         return []
     bodies = scene_of(bounds)
@@ -72,17 +88,23 @@ def touching(scene: Any) -> list[str]:
     near = _TOUCHES * (1 + np.abs(points).max(axis=1, keepdims=True))
     start, reach = mi.Point3f((points - near * normals).T), mi.Float(2 * near[:, 0])
     hit = bodies.ray_intersect(mi.Ray3f(start, mi.Vector3f(normals.T), reach, 0.0, []))
-    parallel = np.abs(np.array(hit.n, dtype=np.float64).reshape(3, -1).T * normals).sum(axis=1) > 1 - _TOUCHES
+    parallel = (
+        np.abs(np.array(hit.n, dtype=np.float64).reshape(3, -1).T * normals).sum(axis=1)
+        > 1 - _TOUCHES
+    )
     found = (np.array(hit.is_valid()) & parallel).reshape(len(opaque), -1)
     return [
-        f"shape '{shape.id()}' lies in the bound of a medium: Mitsuba's integrators lose a part of it; move the bound"
+        f"shape '{shape.id()}' lies in the bound of a medium: Mitsuba's integrators lose a part of "
+        "it; move the bound"
         for shape, met in zip(opaque, found, strict=True)
         if met.any()
     ]
 
 
 def _media(shape: Any) -> list[tuple[str, Any, int]]:
-    """Return the media that a shape references: which side, Mitsuba's medium, and the sign of the normal there."""
+    """Return the media that a shape references: which side, Mitsuba's medium, and the
+    sign of the normal there.
+    """
     sides = (("interior", shape.interior_medium(), -1), ("exterior", shape.exterior_medium(), 1))
     return [side for side in sides if side[1] is not None]
 
@@ -125,6 +147,7 @@ class _Space:
                 if there != medium:
                     found = f"medium '{there.id()}'" if there is not None else "no medium"
                     raise InputError(
-                        f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as {side}, where there "
+                        f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as "
+                        f"{side}, where there "
                         f"is {found}; expected no medium on it, or the one that it stands in"
                     )

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shapes of files made into shapes that all readers know.
 
-Instances are written out, lamps on boxes become rectangles, and windows of rooms full of fog the boxes of that fog.
-Cylinders become meshes: every method and estimator then has the same triangles, whose shadows are exact.
+Instances are written out, lamps on boxes become rectangles, and windows of rooms full of fog the
+boxes of that fog. Cylinders become meshes: every method and estimator then has the same triangles,
+whose shadows are exact.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,7 +20,8 @@ from airlight.validation.scenes.files.nodes import kind, of_kind, properties, re
 
 _FOOT, _HEAD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # of Mitsuba's cylinder
 
-_FLAT = 1e-5  # of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
+# of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
+_FLAT = 1e-5
 _MOST = 64  # rectangles of a lamp
 _BEYOND = 1e-4  # of a room's size: how far its box of fog reaches beyond the walls
 _SIDES = 256  # of the mesh of a cylinder: it differs from it by 8e-5 of the radius
@@ -27,11 +29,15 @@ _POINTS = 16  # of a shape, at which it is looked at
 
 
 def write_out_instances(state: Any) -> None:
-    """Put shapes in the place of instances of shape groups, and of merged ones: the same image, with shapes all know.
+    """Put shapes in the place of instances of shape groups, and of merged ones: the same
+    image, with shapes all know.
 
-    A group of one shape gives a shape with the name of the instance, others add the names of the group's shapes.
+    A group of one shape gives a shape with the name of the instance, others add the
+    names of the group's shapes.
     """
-    written = [copy for _, index in references(properties(state, 0)) for copy in _copies(state, index)]
+    written = [
+        copy for _, index in references(properties(state, 0)) for copy in _copies(state, index)
+    ]
     for node in written:  # by now nothing holds a node: to append one may move them all
         state.nodes.append(node)
     scene = properties(state, 0)
@@ -43,17 +49,30 @@ def write_out_instances(state: Any) -> None:
 
 
 def _copies(state: Any, index: int) -> Iterator[Any]:
-    """Yield the shapes of an instance, or of a merge, as nodes of their own; none of other shapes."""
+    """Yield the shapes of an instance, or of a merge, as nodes of their
+    own; none of other shapes.
+    """
     instance = properties(state, index)
     if instance.plugin_name() == "merge":
         yield from (
-            mi.parser.SceneNode(state.nodes[at]) for _, at in references(instance) if kind(state, at) == "Shape"
+            mi.parser.SceneNode(state.nodes[at])
+            for _, at in references(instance)
+            if kind(state, at) == "Shape"
         )
     if instance.plugin_name() != "instance":
         return
-    group = next((at for _, at in references(instance) if properties(state, at).plugin_name() == "shapegroup"), None)
+    group = next(
+        (
+            at
+            for _, at in references(instance)
+            if properties(state, at).plugin_name() == "shapegroup"
+        ),
+        None,
+    )
     if group is None:
-        raise InputError(f"shape '{instance.id()}' is an instance of no shape group; expected a reference to one")
+        raise InputError(
+            f"shape '{instance.id()}' is an instance of no shape group; expected a reference to one"
+        )
     place = instance.get("to_world", mi.ScalarAffineTransform4d())
     parts = [at for _, at in references(properties(state, group)) if kind(state, at) == "Shape"]
     for part in parts:
@@ -64,13 +83,18 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
 
 
 def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
-    """Put meshes in the place of cylinders, written into a folder for Mitsuba to read; return notes that say so."""
+    """Put meshes in the place of cylinders, written into a folder for Mitsuba to read;
+    return notes that say so.
+    """
     notes = []
     for index in list(of_kind(state, "Shape")):
         old = properties(state, index)
         if old.plugin_name() != "cylinder":
             continue
-        first, last = (np.array(old.get(name, end), dtype=np.float64) for name, end in (("p0", _FOOT), ("p1", _HEAD)))
+        first, last = (
+            np.array(old.get(name, end), dtype=np.float64)
+            for name, end in (("p0", _FOOT), ("p1", _HEAD))
+        )
         path = folder / f"cylinder-{index}.ply"
         _write_cylinder(path, first, last, float(old.get("radius", 1.0)))
         new = mi.Properties("ply")
@@ -82,7 +106,9 @@ def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
         for key, at in list(references(old)):
             new[key] = mi.Properties.ResolvedReference(at)
         state.nodes[index].props = new
-        notes.append(f"shape '{old.id()}' is a cylinder: it is a mesh of {_SIDES} sides for all that follows")
+        notes.append(
+            f"shape '{old.id()}' is a cylinder: it is a mesh of {_SIDES} sides for all that follows"
+        )
     return notes
 
 
@@ -93,11 +119,16 @@ def _write_cylinder(path: Path, first: Array, last: Array, radius: float) -> Non
     across /= np.linalg.norm(across)
     turn = 2 * np.pi * np.arange(_SIDES)[:, None] / _SIDES
     normal = np.cos(turn) * across + np.sin(turn) * np.cross(axis / np.linalg.norm(axis), across)
-    corners = np.concatenate([np.concatenate([end + radius * normal, normal], axis=1) for end in (first, last)])
+    corners = np.concatenate(
+        [np.concatenate([end + radius * normal, normal], axis=1) for end in (first, last)]
+    )
     side = np.arange(_SIDES)
     after = (side + 1) % _SIDES
     faces = np.concatenate(
-        [np.stack([side, after, side + _SIDES], axis=1), np.stack([after, after + _SIDES, side + _SIDES], axis=1)]
+        [
+            np.stack([side, after, side + _SIDES], axis=1),
+            np.stack([after, after + _SIDES, side + _SIDES], axis=1),
+        ]
     )
     names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\n{names}"
@@ -108,7 +139,8 @@ def _write_cylinder(path: Path, first: Array, last: Array, radius: float) -> Non
 
 
 def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
-    """Make lamps on meshes rectangles where their triangles are halves of some; return whether there were any.
+    """Make lamps on meshes rectangles where their triangles are halves of some;
+    return whether there were any.
 
     A lamp of one rectangle keeps its name; to others a number is added.
     """
@@ -121,7 +153,9 @@ def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
 
 
 def _rectangles(shape: Any) -> list[Array]:
-    """Return the transforms that make Mitsuba's rectangles the mesh of a lamp; none where its triangles are others."""
+    """Return the transforms that make Mitsuba's rectangles the mesh of a lamp; none where
+    its triangles are others.
+    """
     parameters = mi.traverse(shape)
     if "faces" not in parameters:
         return []
@@ -130,10 +164,15 @@ def _rectangles(shape: Any) -> list[Array]:
     used, same = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
     halves: dict[tuple[int, int], list[list[int]]] = {}
     for face in same.reshape(-1, 3).tolist():
-        # The side that both halves of a rectangle share is the longest of each; last is the corner across from it.
+        # The side that both halves of a rectangle share is the longest of each; last is
+        # the corner across from it.
         sides = [(face[i], face[(i + 1) % 3], face[(i + 2) % 3]) for i in range(3)]
-        first, second, last = max(sides, key=lambda side: float(np.linalg.norm(used[side[0]] - used[side[1]])))
-        halves.setdefault((min(first, second), max(first, second)), []).append([first, second, last])
+        first, second, last = max(
+            sides, key=lambda side: float(np.linalg.norm(used[side[0]] - used[side[1]]))
+        )
+        halves.setdefault((min(first, second), max(first, second)), []).append(
+            [first, second, last]
+        )
     side = -1.0 if shape.has_flipped_normals() else 1.0
     matrices = [_rectangle(used, pair, side) for pair in halves.values()]
     found = [matrix for matrix in matrices if matrix is not None]
@@ -147,7 +186,8 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
     if len(pair) != 2:
         return None
     first, second, start = corners[pair[0]]
-    across, up = 0.5 * (first - start), 0.5 * (second - start)  # counter-clockwise from the side of the normal
+    # counter-clockwise from the side of the normal
+    across, up = 0.5 * (first - start), 0.5 * (second - start)
     size = float(np.linalg.norm(first - second))
     closes = np.linalg.norm(first + second - start - corners[pair[1][2]]) <= _FLAT * size
     if not closes or abs(across @ up) > _FLAT * size**2 or pair[0][:2] != pair[1][1::-1]:
@@ -155,7 +195,9 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
     across, up = (across, up) if side > 0 else (up, across)
     normal = np.cross(across, up)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack([across, up, normal / np.linalg.norm(normal), 0.5 * (first + second)])
+    matrix[:3] = np.column_stack(
+        [across, up, normal / np.linalg.norm(normal), 0.5 * (first + second)]
+    )
     return matrix
 
 
@@ -164,12 +206,16 @@ def samples(shape: Any) -> tuple[Any, Any]:
     number = np.arange(_POINTS)
     place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
     sample = shape.sample_position(0.0, place)
-    points, normals = (np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n))
+    points, normals = (
+        np.array(value, dtype=np.float64).reshape(3, -1).T for value in (sample.p, sample.n)
+    )
     return points, np.broadcast_to(normals, points.shape)
 
 
 def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
-    """Return whether points that Mitsuba samples on a lamp lie on rectangles, with the normals of these."""
+    """Return whether points that Mitsuba samples on a lamp lie on rectangles,
+    with the normals of these.
+    """
     points, normals = samples(shape)
     size = max(float(np.linalg.norm(matrix[:3, :2])) for matrix in matrices)
     found = np.zeros(_POINTS, dtype=bool)
@@ -195,22 +241,29 @@ def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
             rectangle[key] = mi.Properties.ResolvedReference(at)
         if number:
             state.nodes.append(mi.parser.SceneNode(state.nodes[index]))
-            properties(state, 0)[f"{name}_{number}"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
+            properties(state, 0)[f"{name}_{number}"] = mi.Properties.ResolvedReference(
+                len(state.nodes) - 1
+            )
         state.nodes[len(state.nodes) - 1 if number else index].props = rectangle
 
 
 def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
     """Make windows of rooms full of fog the boxes of that fog, and return notes on them.
 
-    A window is a rectangle without a material that bounds a medium on one side, where opaque rectangles are the other
-    five faces of a box. The box reaches a little beyond these: a surface in a bound is lost to rays in part.
+    A window is a rectangle without a material that bounds a medium on one side, where opaque
+    rectangles are the other five faces of a box. The box reaches a little beyond these: a surface
+    in a bound is lost to rays in part.
     """
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
     known = [shape for shape in shapes if shape.id() in nodes and shape.class_name() == "Rectangle"]
     walls = [_corners(_matrix(shape)) for shape in known if not _is_null(shape)]
     notes = []
     for shape in known:
-        inside = [medium for medium in (shape.interior_medium(), shape.exterior_medium()) if medium is not None]
+        inside = [
+            medium
+            for medium in (shape.interior_medium(), shape.exterior_medium())
+            if medium is not None
+        ]
         if not _is_null(shape) or len(inside) != 1:
             continue
         room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
@@ -220,9 +273,13 @@ def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
         box.set_id(shape.id())
         box["to_world"] = mi.ScalarAffineTransform4d(room)
         for key, at in references(properties(state, nodes[shape.id()])):
-            box["interior" if kind(state, at) == "Medium" else key] = mi.Properties.ResolvedReference(at)
+            box["interior" if kind(state, at) == "Medium" else key] = (
+                mi.Properties.ResolvedReference(at)
+            )
         state.nodes[nodes[shape.id()]].props = box
-        notes.append(f"shape '{shape.id()}' and the walls about its medium are read as a box of that medium")
+        notes.append(
+            f"shape '{shape.id()}' and the walls about its medium are read as a box of that medium"
+        )
     return notes
 
 
@@ -241,7 +298,9 @@ def _corners(matrix: Array) -> Array:
 
 
 def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
-    """Return the transform that makes Mitsuba's cube the room behind a window, None where walls are missing."""
+    """Return the transform that makes Mitsuba's cube the room behind a window, None
+    where walls are missing.
+    """
     front = _corners(window)
     normal = np.cross(window[:3, 0], window[:3, 1])
     if not np.any(normal):  # it has no area, which its reader refuses
@@ -254,7 +313,9 @@ def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
         return any(gap <= _FLAT * size for gap in gaps)
 
     depths = {float((wall.mean(axis=0) - window[:3, 3]) @ inward) for wall in walls}
-    depth = next((each for each in depths if each > _FLAT * size and stands(front + each * inward)), None)
+    depth = next(
+        (each for each in depths if each > _FLAT * size and stands(front + each * inward)), None
+    )
     if depth is None:
         return None
     back = front + depth * inward

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The text of a scene file, looked at before Mitsuba reads it.
 
-Mitsuba says of every file that is no XML that it found no element in it, takes an empty number for 0, and ends the
-process at elements that are nested too deeply, since its reader calls itself for each.
+Mitsuba says of every file that is no XML that it found no element in it, takes an empty number for
+0, and ends the process at elements that are nested too deeply, since its reader calls itself for
+each.
 """
 
 from pathlib import Path
@@ -13,7 +14,11 @@ from airlight.errors import InputError
 _DEEPEST = 200  # elements in one another; a scene has about ten
 #: How files begin that people give in place of a scene, what they are, and what to do.
 _OTHERS = (
-    (b"\x76\x2f\x31\x01", "an EXR image", "to judge it give the scene first: airlight compare SCENE IMAGE"),
+    (
+        b"\x76\x2f\x31\x01",
+        "an EXR image",
+        "to judge it give the scene first: airlight compare SCENE IMAGE",
+    ),
     (b"\x89PNG", "a PNG image", "give the scene that it shows"),
     (b"glTF", "a glTF file", "export the scene for Mitsuba 3"),
     (b"BLENDER", "a file of Blender", "export the scene from there by its add-on for Mitsuba 3"),
@@ -21,8 +26,20 @@ _OTHERS = (
     (b"\x1f\x8b", "a compressed file", "unpack it"),
     (b"PK", "a ZIP archive", "unpack it"),
 )
-_MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")  # of the byte order, before UTF-8 and both kinds of UTF-16
-_NUMBERS = {"float", "integer", "point", "vector", "rgb", "rotate", "scale", "translate", "lookat", "matrix"}
+# of the byte order, before UTF-8 and both kinds of UTF-16
+_MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
+_NUMBERS = {
+    "float",
+    "integer",
+    "point",
+    "vector",
+    "rgb",
+    "rotate",
+    "scale",
+    "translate",
+    "lookat",
+    "matrix",
+}
 _WORDS = {"name", "id"}  # attributes of these that are no numbers
 
 
@@ -31,13 +48,18 @@ def check_text(path: Path) -> None:
     text = path.read_bytes()
     where = f"scene {path}"
     if not text.strip():
-        raise InputError(f"{where}: the file is empty; expected a Mitsuba XML file: export it again")
-    what, way = next(((what, way) for start, what, way in _OTHERS if text.startswith(start)), ("", ""))
+        raise InputError(
+            f"{where}: the file is empty; expected a Mitsuba XML file: export it again"
+        )
+    what, way = next(
+        ((what, way) for start, what, way in _OTHERS if text.startswith(start)), ("", "")
+    )
     if what:
         raise InputError(f"{where}: the file is {what}; expected a Mitsuba XML file: {way}")
     if not text.startswith(_MARKS) and not text.lstrip().startswith(b"<"):
         raise InputError(
-            f"{where}: the file is no XML, it begins with {text.lstrip()[:16]!r}; expected a Mitsuba XML file: export "
+            f"{where}: the file is no XML, it begins with {text.lstrip()[:16]!r}; expected a "
+            "Mitsuba XML file: export "
             "the scene for Mitsuba 3"
         )
     _check_elements(text, where)
@@ -54,7 +76,8 @@ def _check_elements(text: bytes, where: str) -> None:
         for key, value in attributes.items():
             if name.lower() in _NUMBERS and key not in _WORDS and not value.strip():
                 raise InputError(
-                    f"{where}: {key} of <{name}> in line {parser.CurrentLineNumber} is empty; expected a number: write "
+                    f"{where}: {key} of <{name}> in line {parser.CurrentLineNumber} is empty; "
+                    "expected a number: write "
                     "it, or remove the element"
                 )
 
@@ -66,14 +89,18 @@ def _check_elements(text: bytes, where: str) -> None:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        # Mitsuba takes some files that are not well-formed, and says best what is wrong with the others.
+        # Mitsuba takes some files that are not well-formed, and says best what
+        # is wrong with the others.
         if not text.startswith(_MARKS) and not _decodes(text):
             raise InputError(
-                f"{where}: line {error.lineno} has bytes that are no UTF-8; expected the encoding that the first line "
+                f"{where}: line {error.lineno} has bytes that are no UTF-8; expected the encoding "
+                "that the first line "
                 "names, UTF-8 without one: save it as UTF-8"
             ) from None
     if deepest > _DEEPEST:
-        raise InputError(f"{where}: its elements are nested {deepest} deep; expected at most {_DEEPEST}")
+        raise InputError(
+            f"{where}: its elements are nested {deepest} deep; expected at most {_DEEPEST}"
+        )
 
 
 def _decodes(text: bytes) -> bool:

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The design: scene SEED is point SEED of one scrambled Halton sequence, whose beginning covers the ranges evenly.
+"""The design: scene SEED is point SEED of one scrambled Halton sequence, whose beginning
+covers the ranges evenly.
 
-Scene-wide choices (the optical depth, how many lights, the kind of each) are coordinates of the point. Repeated
-choices, such as the places of occluders, come from a random generator that is seeded with SEED. The scrambling (random
-permutations of digits, Owen 2017) is the same for all seeds; without it neighbouring coordinates of such a sequence are
-correlated.
+Scene-wide choices (the optical depth, how many lights, the kind of each) are coordinates of the
+point. Repeated choices, such as the places of occluders, come from a random generator that is
+seeded with SEED. The scrambling (random permutations of digits, Owen 2017) is the same for all
+seeds; without it neighbouring coordinates of such a sequence are correlated.
 
-`ranges.toml` covers the methods' whole field; a user's file overrides it. A pair is a range, a table of numbers are the
-weights of a choice.
+`ranges.toml` covers the methods' whole field; a user's file overrides it. A pair is a range, a
+table of numbers are the weights of a choice.
 """
 
 import math
@@ -25,7 +26,8 @@ from airlight.errors import InputError
 from airlight.validation.arrays import Array
 from airlight.validation.readers import Reader, read_named, read_number, read_table, read_toml
 
-FILE = Path(__file__).with_name("ranges.toml")  #: of ranges as they are drawn without a file of one's own
+#: of ranges as they are drawn without a file of one's own
+FILE = Path(__file__).with_name("ranges.toml")
 
 Ranges = dict[str, Any]
 
@@ -75,9 +77,13 @@ class Draws:
         return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name=name) - 0.5), int(high))
 
     def few(self, low: float, high: float, *, name: str = "") -> int:
-        """Return a whole number from `low` to `high`, of which small ones come more often than by `count`."""
+        """Return a whole number from `low` to `high`, of which small ones come
+        more often than by `count`.
+        """
         span = math.log((high + 1.5) / (low + 0.5))
-        return min(math.floor((low + 0.5) * math.exp(span * self.fraction(name) ** 2) - 0.5), int(high))
+        return min(
+            math.floor((low + 0.5) * math.exp(span * self.fraction(name) ** 2) - 0.5), int(high)
+        )
 
     def pick(self, weights: Mapping[str, float], name: str = "") -> str:
         """Return one of several words by their weights."""
@@ -105,11 +111,15 @@ def point(seed: int) -> Mapping[str, float]:
     from scipy.stats import qmc
 
     if not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"random scene: got the seed {seed}, expected a whole number from 0 to {LARGEST_SEED}")
+        raise InputError(
+            f"random scene: got the seed {seed}, expected a whole number from 0 to {LARGEST_SEED}"
+        )
     sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))
     sequence.fast_forward(seed)
     values = sequence.random(1)[0]
-    return dict(zip(COORDINATES, (float(min(max(value, 1e-9), 1 - 1e-9)) for value in values), strict=True))
+    return dict(
+        zip(COORDINATES, (float(min(max(value, 1e-9), 1 - 1e-9)) for value in values), strict=True)
+    )
 
 
 @cache
@@ -132,12 +142,15 @@ def read_ranges(path: Path) -> Ranges:
 def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     """Return the usual ranges with what a table says in their place.
 
-    Unknown names, ranges that are empty or beyond what can be drawn, and weights of which none is above 0 are refused.
+    Unknown names, ranges that are empty or beyond what can be drawn, and weights of which
+    none is above 0 are refused.
     """
     usual, limits = _defaults()
     readers: dict[str, Reader] = {"meshes": _folder}
     readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
-    readers |= {name: partial(_weights, names=tuple(usual[name])) for name in usual if name not in readers}
+    readers |= {
+        name: partial(_weights, names=tuple(usual[name])) for name in usual if name not in readers
+    }
     try:
         return usual | read_named("", table, readers)
     except InputError as error:
@@ -166,7 +179,7 @@ def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, floa
     return {name: float(weights.get(name, 0.0)) for name in names}
 
 
-# Names --------------------------------------------------------------------------------------------------------------
+# Names --------------------------------------------------------------------------------------------
 
 
 def is_random(name: str) -> bool:
@@ -176,15 +189,21 @@ def is_random(name: str) -> bool:
 
 def random_name(seed: int | str, ranges: Path | None = None) -> str:
     """Return the name of a random scene, which may be drawn from a file of ranges."""
-    return f"{PREFIX}{seed}" + (f",ranges={quote(str(ranges.resolve()), safe=_SAFE)}" if ranges else "")
+    return f"{PREFIX}{seed}" + (
+        f",ranges={quote(str(ranges.resolve()), safe=_SAFE)}" if ranges else ""
+    )
 
 
 def random_parts(name: str) -> tuple[int, Path | None]:
     """Return the seed in a name, and the file of ranges that it goes on with."""
     seed, comma, option = name.removeprefix(PREFIX).partition(",")
     if not (seed.isascii() and seed.isdecimal()):
-        raise InputError(f"scene: got {name!r}, expected {PREFIX}SEED, a whole number, for example {PREFIX}7")
+        raise InputError(
+            f"scene: got {name!r}, expected {PREFIX}SEED, a whole number, for example {PREFIX}7"
+        )
     key, _, value = option.partition("=")
     if comma and (key != "ranges" or not value or "," in value):
-        raise InputError(f"scene: got {option!r} in {name!r}, expected ranges=FILE.toml after the seed")
+        raise InputError(
+            f"scene: got {option!r} in {name!r}, expected ranges=FILE.toml after the seed"
+        )
     return int(seed), Path(unquote(value)) if comma else None

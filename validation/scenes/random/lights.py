@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights: kinds, places, sizes, and how bright they are.
 
-A light that nothing would be seen of, behind ten optical depths of fog, is drawn again or moved towards what the camera
-sees: a tenth of the scenes would be black else.
+A light that nothing would be seen of, behind ten optical depths of fog, is drawn again or moved
+towards what the camera sees: a tenth of the scenes would be black else.
 """
 
 import math
@@ -31,7 +31,8 @@ class Light:
     position: Array  #: of a directional light a point on its way
     target: Array  #: a point at which it shines
     colour: Array  #: intensity, irradiance, or radiance
-    brightness: float  #: of the airlight that it makes in the middle of the image without shadows [W/(m^2 sr)]
+    #: of the airlight that it makes in the middle of the image without shadows [W/(m^2 sr)]
+    brightness: float
     size: tuple[float, ...] = ()  #: radius, or half of both sides
     cutoff: float = 0.0  #: of a spot, half angle [degrees]
     beam: float = 0.0  #: of a spot, half angle of full intensity [degrees]
@@ -45,8 +46,8 @@ class Light:
     def placed(self, scale: float, centre: Array) -> "Light":
         """Return the light in a stage of a radius and a centre [m].
 
-        Extinction is over a length, so a stage twice as large scatters as much, and its light comes from twice as far:
-        intensity [W/sr] grows with the square, radiance and irradiance stay.
+        Extinction is over a length, so a stage twice as large scatters as much, and its light comes
+        from twice as far: intensity [W/sr] grows with the square, radiance and irradiance stay.
         """
         return replace(
             self,
@@ -57,20 +58,30 @@ class Light:
         )
 
 
-def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, target: Array) -> list[Light]:
+def draw_lights(
+    draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, target: Array
+) -> list[Light]:
     """Return the lights of a scene; their brightness is that on the rays of the camera."""
     rays = view_rays(camera, target)
     unbounded = any(medium.bounds == "unbounded" for medium in media)
     kinds = ranges["light_kinds"] | ({"directional": 0.0} if unbounded else {})
     kinds = kinds if any(kinds.values()) else {"point": 1.0}
     return [
-        _light(draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, rays)
+        _light(
+            draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, rays
+        )
         for number in range(1, draws.few(*ranges["lights"], name="lights") + 1)
     ]
 
 
 def _light(
-    draws: Draws, ranges: Ranges, kind: str, number: int, media: list[Medium], camera: Array, rays: Array
+    draws: Draws,
+    ranges: Ranges,
+    kind: str,
+    number: int,
+    media: list[Medium],
+    camera: Array,
+    rays: Array,
 ) -> Light:
     stream = draws.of(f"light-{number}")
     size = _size(draws, stream, ranges, kind, number)
@@ -81,11 +92,15 @@ def _light(
         first = draws if attempt == 0 else stream
         elevation = math.asin(
             math.sin(math.radians(-17.0))
-            + (1 + math.sin(math.radians(17.0))) * first.fraction(f"light_elevation-{number}") * 0.99
+            + (1 + math.sin(math.radians(17.0)))
+            * first.fraction(f"light_elevation-{number}")
+            * 0.99
         )
         azimuth = first.between(0, 2 * math.pi, name=f"light_azimuth-{number}")
         across = math.cos(elevation)
-        direction = np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
+        direction = np.array(
+            [across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)]
+        )
         if kind == "directional":
             # Light from below the floor would reach nothing.
             direction[2] = 0.17 + abs(direction[2])
@@ -95,22 +110,43 @@ def _light(
             position = _nearer(media, camera, ahead, (distance + ball) * direction)
         target = (ahead if attempt % 2 == 0 else np.zeros(3)) + 0.29 * stream.in_ball()
         unit = unit_airlight(media, camera, rays, position, directional=kind == "directional")
-        if np.linalg.norm(position - camera) > ball + _CLEAR and unit > 0 and math.log(unit) > -_DEEPEST - 9:
+        if (
+            np.linalg.norm(position - camera) > ball + _CLEAR
+            and unit > 0
+            and math.log(unit) > -_DEEPEST - 9
+        ):
             break
     colour = np.array([stream.between(0.53, 1.0) for _ in range(3)])
-    brightness = draws.logarithmic(*ranges["brightness"], name=f"brightness-{number}") / (1 + 0.5 * (number - 1))
+    brightness = draws.logarithmic(*ranges["brightness"], name=f"brightness-{number}") / (
+        1 + 0.5 * (number - 1)
+    )
     strength = brightness / max(unit, 1e-7)
     cutoff = beam = 0.0
     if kind == "spot":
         # A narrow cone that begins near by would light next to nothing.
         least = math.degrees(math.atan(_LEAST_CONE / float(np.linalg.norm(target - position))))
-        cutoff = max(draws.logarithmic(*ranges["cutoff"], name=f"cutoff-{number}"), min(least, ranges["cutoff"][1]))
+        cutoff = max(
+            draws.logarithmic(*ranges["cutoff"], name=f"cutoff-{number}"),
+            min(least, ranges["cutoff"][1]),
+        )
         fraction = draws.fraction(f"beam-{number}")
         beam = cutoff * (1.0 if fraction > 0.6 else 0.07 + 1.4 * fraction)
     if kind in AREA_KINDS:
-        strength /= 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2  # the projected area
+        # the projected area
+        strength /= 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2
     black = draws.pick(ranges["light_materials"], f"light_material-{number}") == "black"
-    return Light(f"light-{number}", kind, position, target, strength * colour, brightness, size, cutoff, beam, black)
+    return Light(
+        f"light-{number}",
+        kind,
+        position,
+        target,
+        strength * colour,
+        brightness,
+        size,
+        cutoff,
+        beam,
+        black,
+    )
 
 
 def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -> tuple[float, ...]:
@@ -121,7 +157,9 @@ def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -
 
 
 def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
-    """Return a point on the axis of the camera, the middle of the stage or where the optical depth is about 2."""
+    """Return a point on the axis of the camera, the middle of the stage or where the
+    optical depth is about 2.
+    """
     far = float(np.linalg.norm(camera))
     for fraction in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
         point = camera + fraction * far * axis
@@ -131,7 +169,9 @@ def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
 
 
 def _nearer(media: list[Medium], camera: Array, ahead: Array, position: Array) -> Array:
-    """Return a position from which enough light arrives, moved towards a point ahead where needed."""
+    """Return a position from which enough light arrives, moved towards a
+    point ahead where needed.
+    """
     for fraction in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
         moved = ahead + fraction * (position - ahead)
         way = depths(media, moved, ahead).mean() + depths(media, ahead, camera).mean()

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Media of random scenes, an unbounded one, bounded ones or both, and how bright a light makes them without shadows.
+"""Media of random scenes, an unbounded one, bounded ones or both, and how bright a light
+makes them without shadows.
 
-Bounds are convex bodies within a ball. The radius of a ball inside each body is known: a camera that is to be
-in a medium is put into this ball. The balls around bounds are disjoint.
+Bounds are convex bodies within a ball. The radius of a ball inside each body is known: a camera
+that is to be in a medium is put into this ball. The balls around bounds are disjoint.
 
-The brightness of a light is drawn for any optical depth and distance: its intensity follows from the effect of a unit
-intensity. Shadows and bounds are approximated there; only the exposure of the image depends on them.
+The brightness of a light is drawn for any optical depth and distance: its intensity follows from
+the effect of a unit intensity. Shadows and bounds are approximated there; only the exposure of the
+image depends on them.
 """
 
 import math
@@ -19,7 +21,12 @@ from airlight.validation.properties.view import optical_depths
 from airlight.validation.scenes.random.design import Draws, Ranges
 
 #: By kind, the radius of a ball that holds the body of half sizes 1, and of one within it.
-_BALLS = {"sphere": (1.0, 1.0), "ellipsoid": (1.0, 0.93), "gem": (1.0, 0.91), "box": (math.sqrt(3), 1.0)}
+_BALLS = {
+    "sphere": (1.0, 1.0),
+    "ellipsoid": (1.0, 0.93),
+    "gem": (1.0, 0.91),
+    "box": (math.sqrt(3), 1.0),
+}
 _TRIES = 12
 _STEPS = 96
 _NEAR = 0.07  # light spreads from a ball of this radius at least, in radii of the stage
@@ -35,7 +42,8 @@ class Medium:
     grey: bool  #: whether the three are one
     albedo: Array
     phase: str  #: words of the phase function, such as 'isotropic', 'hg:0.31' and 'hazy'
-    optical_depth: float  #: of the way from the camera to behind the stage, or through the middle of the bounds
+    #: of the way from the camera to behind the stage, or through the middle of the bounds
+    optical_depth: float
     holds_camera: bool
     centre: Array = field(default_factory=lambda: np.zeros(3))
     half: Array = field(default_factory=lambda: np.zeros(3))  #: of its sizes along its own axes
@@ -60,7 +68,9 @@ def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
     media = []
     if kind != "bounded":
         depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
-        filling = _filling(draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1))
+        filling = _filling(
+            draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1)
+        )
         media.append(Medium("unbounded", "unbounded", *filling, depth, True))
     if kind != "unbounded":
         fewest, most = ranges["bounded_media"]
@@ -69,8 +79,12 @@ def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
     return media
 
 
-def _filling(draws: Draws, stream: Draws, ranges: Ranges, mean: float) -> tuple[Array, bool, Array, str]:
-    """Return extinction, whether it is one, albedo and phase function; `draws` is the point, or the stream again."""
+def _filling(
+    draws: Draws, stream: Draws, ranges: Ranges, mean: float
+) -> tuple[Array, bool, Array, str]:
+    """Return extinction, whether it is one, albedo and phase function; `draws` is the
+    point, or the stream again.
+    """
     grey = draws.pick(ranges["extinctions"], "extinctions") == "one"
     spread = stream.between(*ranges["colour_spread"])
     offsets = np.array([stream.between(-1, 1) for _ in range(3)])
@@ -86,7 +100,9 @@ def _filling(draws: Draws, stream: Draws, ranges: Ranges, mean: float) -> tuple[
     return sigma, grey, albedo, phase
 
 
-def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside: bool, first: bool) -> list[Medium]:
+def _bounded(
+    draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside: bool, first: bool
+) -> list[Medium]:
     media: list[Medium] = []
     balls: list[tuple[Array, float]] = []
     for number in range(count):
@@ -101,19 +117,30 @@ def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside:
             holds_camera = inside and number == 0
             if holds_camera:
                 centre = (1 - stream.between(0.23, 0.67)) * camera + 0.31 * stream.in_ball()
-                size = max(size, float(np.linalg.norm(centre - camera)) * stream.between(1.17, 2.1) / within)
+                size = max(
+                    size,
+                    float(np.linalg.norm(centre - camera)) * stream.between(1.17, 2.1) / within,
+                )
             elif number == 0:
                 centre = 0.37 * stream.in_ball()
             else:
                 centre, size = 1.9 * stream.in_ball(), 0.47 * size
-            stretch = np.array([stream.between(1.0, 1.37) for _ in range(3)]) if kind != "sphere" else np.ones(3)
+            stretch = (
+                np.array([stream.between(1.0, 1.37) for _ in range(3)])
+                if kind != "sphere"
+                else np.ones(3)
+            )
             half = size * stretch
             if not holds_camera:
                 # The camera stays outside of the ball around it.
-                most = (float(np.linalg.norm(camera - centre)) - 0.11) / (around * float(half.max()))
+                most = (float(np.linalg.norm(camera - centre)) - 0.11) / (
+                    around * float(half.max())
+                )
                 half = half * min(1.0, most)
             ball = around * float(half.max())
-            if ball > 0.05 and all(np.linalg.norm(centre - other) > ball + radius + 0.01 for other, radius in balls):
+            if ball > 0.05 and all(
+                np.linalg.norm(centre - other) > ball + radius + 0.01 for other, radius in balls
+            ):
                 break
         else:
             continue
@@ -127,14 +154,22 @@ def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside:
 
 
 def depths(media: list[Medium], start: Array, end: Array) -> Array:
-    """Return the optical depths of segments by channel, (..., 3), with balls in place of the bounds."""
-    balls = [(medium.centre, medium.ball, medium.sigma_t) for medium in media if medium.bounds != "unbounded"]
+    """Return the optical depths of segments by channel, (..., 3), with
+    balls in place of the bounds.
+    """
+    balls = [
+        (medium.centre, medium.ball, medium.sigma_t)
+        for medium in media
+        if medium.bounds != "unbounded"
+    ]
     around = [medium.sigma_t for medium in media if medium.bounds == "unbounded"]
     return optical_depths(balls, around[0] if around else 0.0, start, end)
 
 
 def view_rays(camera: Array, target: Array) -> Array:
-    """Return the directions of five rays about the middle of the image, which is the first, (5, 3)."""
+    """Return the directions of five rays about the middle of the image,
+    which is the first, (5, 3).
+    """
     forward = (target - camera) / np.linalg.norm(target - camera)
     left = np.cross(forward, [0.0, 0.0, 1.0])
     left /= np.linalg.norm(left)
@@ -143,8 +178,11 @@ def view_rays(camera: Array, target: Array) -> Array:
     return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
-def unit_airlight(media: list[Medium], camera: Array, directions: Array, light: Array, *, directional: bool) -> float:
-    """Return the largest airlight of a light of unit intensity over rays of the camera and channels.
+def unit_airlight(
+    media: list[Medium], camera: Array, directions: Array, light: Array, *, directional: bool
+) -> float:
+    """Return the largest airlight of a light of unit intensity over rays of
+    the camera and channels.
 
     A directional light, of unit irradiance, does not spread; it comes from a point very far away.
     """
@@ -161,7 +199,9 @@ def unit_airlight(media: list[Medium], camera: Array, directions: Array, light: 
     taken = np.zeros(distance.shape, dtype=bool)
     for medium in sorted(media, key=lambda each: each.bounds == "unbounded"):
         inside = (
-            np.linalg.norm(points - medium.centre, axis=-1) < medium.ball if medium.bounds != "unbounded" else ~taken
+            np.linalg.norm(points - medium.centre, axis=-1) < medium.ball
+            if medium.bounds != "unbounded"
+            else ~taken
         )
         inside &= ~taken
         taken |= inside

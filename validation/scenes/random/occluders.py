@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Occluders: what casts shadows, and the floor, wall or room that receives them.
 
-All lie within a ball, and no ball holds a light or the camera. But a cage is about a light, and the ground is drawn
-around all else.
+All lie within a ball, and no ball holds a light or the camera. But a cage is about a light, and the
+ground is drawn around all else.
 """
 
 import math
@@ -57,22 +57,30 @@ class Occluder:
     def placed(self, scale: float, centre: Array) -> "Occluder":
         """Return the occluder in a stage of a radius and a centre [m]."""
         mesh = placed(scaled(self.mesh, scale), centre)
-        return replace(self, mesh=mesh, position=centre + scale * self.position, radius=scale * self.radius)
+        return replace(
+            self, mesh=mesh, position=centre + scale * self.position, radius=scale * self.radius
+        )
 
 
 def _placed(
     kind: str, mesh: Mesh, position: Array, radius: float, turn: tuple[Array, float], colour: Array
 ) -> Occluder:
     """Return an occluder of a mesh within the unit ball; `turn`: axis and angle [degrees]."""
-    return Occluder(kind, placed(scaled(mesh, radius), position, rotation(*turn)), position, radius, colour)
+    return Occluder(
+        kind, placed(scaled(mesh, radius), position, rotation(*turn)), position, radius, colour
+    )
 
 
 def draw_occluders(
     draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], *, in_shadow: bool
 ) -> list[Occluder]:
-    """Return the occluders of a scene, and perhaps a plate that keeps the first light from the camera."""
+    """Return the occluders of a scene, and perhaps a plate that keeps the
+    first light from the camera.
+    """
     files = _files(ranges["meshes"])
-    kinds = {kind: weight for kind, weight in ranges["occluder_kinds"].items() if kind != "mesh" or files}
+    kinds = {
+        kind: weight for kind, weight in ranges["occluder_kinds"].items() if kind != "mesh" or files
+    }
     kinds = kinds if any(kinds.values()) else {"box": 1.0}
     occluders = [_shade(draws.of("shade"), camera, lights[0])] if in_shadow else []
     if draws.pick(ranges["cages"], "cages") == "yes":
@@ -93,7 +101,9 @@ def draw_occluders(
     return occluders
 
 
-def _place(stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequence[Light]) -> tuple[Array, float]:
+def _place(
+    stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequence[Light]
+) -> tuple[Array, float]:
     """Return a place for an occluder: in the stage, or for a screen before a light too."""
     low, high = ranges["occluder_size"]
     radius = min(max(size * stream.logarithmic(0.41, 2.43), low), high)
@@ -101,7 +111,9 @@ def _place(stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequen
         light = lights[int(stream.fraction() * len(lights))]
         toward = light.position / np.linalg.norm(light.position)
         away = min(float(np.linalg.norm(light.position)), 2.3)
-        return stream.between(0.29, 0.83) * away * toward + 0.23 * stream.in_ball(), min(2.1 * radius, 0.9)
+        return stream.between(0.29, 0.83) * away * toward + 0.23 * stream.in_ball(), min(
+            2.1 * radius, 0.9
+        )
     position = stream.in_ball() * np.array([1.0, 1.0, 0.71])
     return position, radius
 
@@ -109,10 +121,14 @@ def _place(stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequen
 def _is_clear(position: Array, radius: float, camera: Array, lights: Sequence[Light]) -> bool:
     if np.linalg.norm(position - camera) < radius + _CAMERA:
         return False
-    return all(np.linalg.norm(position - light.position) > radius + light.ball + _LIGHT for light in lights)
+    return all(
+        np.linalg.norm(position - light.position) > radius + light.ball + _LIGHT for light in lights
+    )
 
 
-def _occluder(stream: Draws, kind: str, position: Array, radius: float, files: Sequence[Path]) -> Occluder:
+def _occluder(
+    stream: Draws, kind: str, position: Array, radius: float, files: Sequence[Path]
+) -> Occluder:
     reflectance = np.array([stream.between(0.07, 0.83) for _ in range(3)])
     upright = kind in ("fence", "vase", "pierced")
     axis = stream.vector() + (np.array([0.0, 0.0, 4.0]) if upright else 0)
@@ -141,7 +157,11 @@ def _solid(stream: Draws, kind: str, files: Sequence[Path]) -> Mesh:
             tube = stream.between(0.09, 0.37)
             return torus(1 - tube, tube, (stream.count(17, 53), stream.count(7, 19)))
         case "star":
-            points, inner, height = stream.count(3, 9), stream.between(0.31, 0.73), stream.logarithmic(0.05, 0.9)
+            points, inner, height = (
+                stream.count(3, 9),
+                stream.between(0.31, 0.73),
+                stream.logarithmic(0.05, 0.9),
+            )
             across = math.sqrt(1 - height**2)
             return placed(prism(star(inner * across, across, points), 2 * height), (0, 0, -height))
         case "vase":
@@ -170,11 +190,20 @@ def _rectangle(half: ArrayLike, cells: tuple[int, int] = (1, 1)) -> Mesh:
 
 def _fence(stream: Draws) -> Mesh:
     """Return upright bars side by side, each turned about itself."""
-    bars, width, height = stream.count(3, 17), stream.between(0.13, 0.71), stream.between(0.37, 0.71)
-    thickness, turn = stream.logarithmic(0.007, 0.11), rotation((0, 0, 1), stream.between(-67.0, 67.0))
+    bars, width, height = (
+        stream.count(3, 17),
+        stream.between(0.13, 0.71),
+        stream.between(0.37, 0.71),
+    )
+    thickness, turn = (
+        stream.logarithmic(0.007, 0.11),
+        rotation((0, 0, 1), stream.between(-67.0, 67.0)),
+    )
     pitch = 2 * 0.67 / bars
     bar = box((width * pitch, 2 * thickness, 2 * height))
-    return joined([placed(bar, ((number + 0.5) * pitch - 0.67, 0.0, 0.0), turn) for number in range(bars)])
+    return joined(
+        [placed(bar, ((number + 0.5) * pitch - 0.67, 0.0, 0.0), turn) for number in range(bars)]
+    )
 
 
 def _pierced(stream: Draws) -> Mesh:
@@ -194,9 +223,13 @@ def _pierced(stream: Draws) -> Mesh:
 def _files(folder: str) -> list[Path]:
     if not folder:
         return []
-    files = sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in (".obj", ".ply"))
+    files = sorted(
+        path for path in Path(folder).iterdir() if path.suffix.lower() in (".obj", ".ply")
+    )
     if not files:
-        raise InputError(f"meshes: {folder} holds no .obj or .ply file; expected a folder of meshes")
+        raise InputError(
+            f"meshes: {folder} holds no .obj or .ply file; expected a folder of meshes"
+        )
     return files
 
 
@@ -204,7 +237,8 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return a plate between the camera and a light, across the way."""
     way = light.position - camera
     length = float(np.linalg.norm(way))
-    # Nearer to the camera than a directional light is, and beyond what an area light reaches around.
+    # Nearer to the camera than a directional light is, and beyond what an
+    # area light reaches around.
     distance = min(stream.between(0.31, 0.57) * length, stream.between(0.9, 1.7))
     room = min(distance, length - distance - light.ball)
     needed = 1.3 * light.ball * distance / length
@@ -225,13 +259,24 @@ def _cage(stream: Draws, camera: Array, light: Light) -> Occluder:
     bars, thickness = stream.count(5, 13), stream.between(0.029, 0.097)
     bar = lathe([thickness, thickness], [-0.61, 0.61], 5)
     angles = 2 * np.pi * np.arange(bars) / bars
-    mesh = joined([placed(bar, (0.71 * np.cos(angle), 0.71 * np.sin(angle), 0.0)) for angle in angles])
+    mesh = joined(
+        [placed(bar, (0.71 * np.cos(angle), 0.71 * np.sin(angle), 0.0)) for angle in angles]
+    )
     reflectance = np.array([stream.between(0.07, 0.61) for _ in range(3)])
-    return _placed("cage", mesh, light.position, radius, (stream.vector(), stream.between(3.0, 357.0)), reflectance)
+    return _placed(
+        "cage",
+        mesh,
+        light.position,
+        radius,
+        (stream.vector(), stream.between(3.0, 357.0)),
+        reflectance,
+    )
 
 
 def turning(start: Array, end: Array) -> tuple[Array, float]:
-    """Return the axis and the angle [degrees] of the rotation that turns one unit vector into another."""
+    """Return the axis and the angle [degrees] of the rotation that turns one
+    unit vector into another.
+    """
     axis = np.cross(start, end)
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
@@ -240,7 +285,11 @@ def turning(start: Array, end: Array) -> tuple[Array, float]:
 
 
 def draw_ground(
-    draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], occluders: Sequence[Occluder]
+    draws: Draws,
+    ranges: Ranges,
+    camera: Array,
+    lights: Sequence[Light],
+    occluders: Sequence[Occluder],
 ) -> list[Occluder]:
     """Return a floor, a floor and a wall, a room around all, or nothing."""
     stream = draws.of("ground")
@@ -259,7 +308,9 @@ def draw_ground(
     normal = tilt / np.linalg.norm(tilt)
     ground = [_plane(stream, "floor", normal, balls)]
     if kind == "floor-and-wall":
-        toward = camera * np.array([1.0, 1.0, 0.0]) + 0.6 * np.linalg.norm(camera) * stream.vector() * [1.0, 1.0, 0.07]
+        toward = camera * np.array([1.0, 1.0, 0.0]) + 0.6 * np.linalg.norm(
+            camera
+        ) * stream.vector() * [1.0, 1.0, 0.07]
         if directional:
             # It must not stand between a light from infinity and the stage.
             ways = np.array([light.position / np.linalg.norm(light.position) for light in lights])
@@ -268,7 +319,9 @@ def draw_ground(
     return ground
 
 
-def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array, float]]) -> Occluder:
+def _plane(
+    stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array, float]]
+) -> Occluder:
     """Return a rectangle below all balls as its normal has it."""
     lowest = min(float(position @ normal) - radius for position, radius in balls)
     lowest = min(lowest, -0.43) - stream.between(0.003, 0.11)
@@ -280,16 +333,24 @@ def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array,
 
 
 def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Occluder:
-    """Return a closed room, seen from inside, around all balls; its floor is level except for a few degrees."""
-    low = np.min([position - radius for position, radius in balls], axis=0) - stream.between(0.11, 0.31)
-    high = np.max([position + radius for position, radius in balls], axis=0) + stream.between(0.11, 0.31)
+    """Return a closed room, seen from inside, around all balls; its floor is level
+    except for a few degrees.
+    """
+    low = np.min([position - radius for position, radius in balls], axis=0) - stream.between(
+        0.11, 0.31
+    )
+    high = np.max([position + radius for position, radius in balls], axis=0) + stream.between(
+        0.11, 0.31
+    )
     half = 0.5 * (high - low) * 1.13
     radius = float(np.linalg.norm(half))
     axis = stream.vector()
     reflectance = np.array([stream.between(0.11, 0.61) for _ in range(3)])
     vertices, faces = box(2 * half / radius)
     turn = axis, stream.between(0.3, 2.3)
-    return _placed("room", (vertices, faces[:, ::-1]), 0.5 * (low + high), radius, turn, reflectance)
+    return _placed(
+        "room", (vertices, faces[:, ::-1]), 0.5 * (low + high), radius, turn, reflectance
+    )
 
 
 def _user_mesh(path: Path) -> Mesh:
@@ -297,10 +358,14 @@ def _user_mesh(path: Path) -> Mesh:
     try:
         shape = mi.load_dict({"type": path.suffix.lower()[1:], "filename": str(path)})
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input
-        raise InputError(f"meshes: Mitsuba cannot read {path}: {' '.join(str(error).split())}") from error
+        raise InputError(
+            f"meshes: Mitsuba cannot read {path}: {' '.join(str(error).split())}"
+        ) from error
     vertices, faces = mesh_triangles(shape)
     if not len(faces) or not np.isfinite(vertices).all():
-        raise InputError(f"meshes: {path} has no triangles or numbers that are not finite; expected a mesh")
+        raise InputError(
+            f"meshes: {path} has no triangles or numbers that are not finite; expected a mesh"
+        )
     used = vertices[np.unique(faces)]
     middle = 0.5 * (used.min(axis=0) + used.max(axis=0))
     size = float(np.linalg.norm(used - middle, axis=1).max())

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes drawn from a seed, under the name `random:SEED`.
 
-A name may go on: `random:7,ranges=FILE.toml` draws from other ranges, and takes the .obj and .ply files of a folder
-that they name as occluders too; commas and per cent signs of a path are written as in a URL. A scene in which too
-little light reaches the view is drawn again.
+A name may go on: `random:7,ranges=FILE.toml` draws from other ranges, and takes the .obj and .ply
+files of a folder that they name as occluders too; commas and per cent signs of a path are written
+as in a URL. A scene in which too little light reaches the view is drawn again.
 
-All is drawn in radii of a stage about the origin, then scaled and moved to an arbitrary place, once.
+All is drawn in radii of a stage about the origin, then scaled and moved to
+an arbitrary place, once.
 """
 
 import math
@@ -20,8 +21,21 @@ from airlight.validation.arrays import Array
 from airlight.validation.columns import plain
 from airlight.validation.properties.view import LightPlace, distance, lit_points
 from airlight.validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
-from airlight.validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
-from airlight.validation.scenes.random.design import Draws, Ranges, random_parts, ranges_from, read_ranges
+from airlight.validation.scenes.parts import (
+    camera,
+    fog,
+    light,
+    medium_boundary,
+    mitsuba_mesh,
+    phase_function,
+)
+from airlight.validation.scenes.random.design import (
+    Draws,
+    Ranges,
+    random_parts,
+    ranges_from,
+    read_ranges,
+)
 from airlight.validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
 from airlight.validation.scenes.random.media import Medium, draw_media
 from airlight.validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
@@ -29,12 +43,15 @@ from airlight.validation.scenes.registry import Animation, SceneRecord
 
 _ATTEMPTS = 17
 _TABLE = 513  # values of a tabulated phase function
-_ACROSS, _UP, _ALONG = 7, 5, 3  # rays of the camera, and points on each, at which light is looked for
+# rays of the camera, and points on each, at which light is looked for
+_ACROSS, _UP, _ALONG = 7, 5, 3
 
 
 @dataclass(frozen=True)
 class RandomScene:
-    """A scene that was drawn. It is drawn in radii of the stage, the ball that the camera looks at, and scaled once."""
+    """A scene that was drawn. It is drawn in radii of the stage, the ball that the camera
+    looks at, and scaled once.
+    """
 
     seed: int
     attempt: int  #: how many draws before this one let too little light through
@@ -49,7 +66,8 @@ class RandomScene:
     lights: tuple[Light, ...]
     occluders: tuple[Occluder, ...]
     lit: float = 0.0  #: fraction of points in view that a light reaches
-    near: float = 0.0  #: fraction of rays that meet a surface before half of the way to the middle of the stage
+    #: fraction of rays that meet a surface before half of the way to the middle of the stage
+    near: float = 0.0
 
     @property
     def enough(self) -> bool:
@@ -62,12 +80,18 @@ def random_record(name: str) -> SceneRecord:
     drawn, shapes = _lit(*_parse(name))
     x, y, z = drawn.centre.tolist()
     return SceneRecord(
-        name, lambda: _build(drawn, shapes), _purpose(drawn), "none: drawn from its seed", Animation(about=(x, y, z))
+        name,
+        lambda: _build(drawn, shapes),
+        _purpose(drawn),
+        "none: drawn from its seed",
+        Animation(about=(x, y, z)),
     )
 
 
 def drawn_values(name: str) -> dict[str, Any]:
-    """Return the drawn values of a random scene, as plain data without meshes; lengths are in metres."""
+    """Return the drawn values of a random scene, as plain data without
+    meshes; lengths are in metres.
+    """
     drawn: dict[str, Any] = plain(_lit(*_parse(name))[0])
     return drawn
 
@@ -77,11 +101,13 @@ def _parse(name: str) -> tuple[int, Ranges]:
     return seed, read_ranges(file) if file else ranges_from({})
 
 
-# Drawing --------------------------------------------------------------------------------------------------------------
+# Drawing ------------------------------------------------------------------------------------------
 
 
 def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, Any]]:
-    """Return the first draw that lets enough light through, or the best, with the Mitsuba shapes of its occluders."""
+    """Return the first draw that lets enough light through, or the best, with the Mitsuba
+    shapes of its occluders.
+    """
     draws = []
     for attempt in range(_ATTEMPTS):
         drawn = draw_scene(seed, ranges, attempt)
@@ -94,7 +120,9 @@ def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, Any]]:
 
 
 def draw_scene(seed: int, ranges: Ranges, attempt: int = 0) -> RandomScene:
-    """Return the scene of a seed; for another attempt its point is the same, and places and shapes are others."""
+    """Return the scene of a seed; for another attempt its point is the same, and
+    places and shapes are others.
+    """
     draws = Draws(seed, attempt)
     scale = draws.logarithmic(*ranges["scale"], name="scale")
     origin, target, fov = _draw_view(draws, ranges)
@@ -134,18 +162,24 @@ def _draw_view(draws: Draws, ranges: Ranges) -> tuple[Array, Array, float]:
     elevation = math.radians(draws.between(*ranges["camera_elevation"], name="camera_elevation"))
     azimuth = stream.between(0, 2 * math.pi)
     across = math.cos(elevation)
-    origin = distance * np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
+    origin = distance * np.array(
+        [across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)]
+    )
     return origin, 0.37 * stream.in_ball(), draws.between(*ranges["fov"], name="fov")
 
 
 def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
-    """Return the scene with what light reaches past the occluders, an `mi.Scene`, in an image of 4 to 3."""
+    """Return the scene with what light reaches past the occluders, an
+    `mi.Scene`, in an image of 4 to 3.
+    """
     directions = _directions(drawn)
     away = float(np.linalg.norm(drawn.origin - drawn.centre))
     hit = distance(occluders, np.broadcast_to(drawn.origin, directions.shape), directions)
     free = np.minimum(hit, away + drawn.scale)
     fraction = (np.arange(_ALONG) + 0.5) / _ALONG
-    points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(-1, 3)
+    points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(
+        -1, 3
+    )
     lights = [_place(each) for each in drawn.lights]
     lit = np.any([lit_points(occluders, each, points) for each in lights], axis=0)
     return replace(drawn, lit=float(lit.mean()), near=float((free < 0.5 * away).mean()))
@@ -164,23 +198,28 @@ def _directions(drawn: RandomScene) -> Array:
 
 
 def _place(drawn: Light) -> LightPlace:
-    """Return where a light is, or of a spot or flat light where it shines too; a sphere in its middle."""
+    """Return where a light is, or of a spot or flat light where it shines
+    too; a sphere in its middle.
+    """
     axis = (drawn.target - drawn.position) / np.linalg.norm(drawn.target - drawn.position)
     cos_cutoff = math.cos(math.radians(drawn.cutoff)) if drawn.kind == "spot" else 0.0
     directed = drawn.kind in ("spot", "rectangle", "disk")
     return LightPlace("point", drawn.position, 0.0, axis if directed else None, cos_cutoff)
 
 
-# Building -------------------------------------------------------------------------------------------------------------
+# Building -----------------------------------------------------------------------------------------
 
 
 def _purpose(drawn: RandomScene) -> str:
     kinds = [each.kind for each in drawn.lights]
     lights = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-    media = ", ".join(f"{medium.bounds} of optical depth {medium.optical_depth:.3g}" for medium in drawn.media)
+    media = ", ".join(
+        f"{medium.bounds} of optical depth {medium.optical_depth:.3g}" for medium in drawn.media
+    )
     where = "shadow" if drawn.in_shadow else "light"
     return (
-        f"Drawn from the seed {drawn.seed}: lights: {lights}; media: {media}; {len(drawn.occluders)} occluders; the "
+        f"Drawn from the seed {drawn.seed}: lights: {lights}; media: {media}; "
+        f"{len(drawn.occluders)} occluders; the "
         f"camera in {where}, in {drawn.inside}."
     )
 
@@ -188,7 +227,9 @@ def _purpose(drawn: RandomScene) -> str:
 def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
     fillings = {medium.name: _filling(medium) for medium in drawn.media}
     around = fillings.get("unbounded")
-    sensor = camera(drawn.origin.tolist(), drawn.target.tolist(), fov=drawn.fov, size=(800, 600), in_fog=False)
+    sensor = camera(
+        drawn.origin.tolist(), drawn.target.tolist(), fov=drawn.fov, size=(800, 600), in_fog=False
+    )
     sensor |= {"near_clip": 1e-5 * drawn.scale, "far_clip": 1e5 * drawn.scale}
     own = fillings.get(drawn.inside, around)
     return {
@@ -207,7 +248,9 @@ def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
 def _filling(medium: Medium) -> Any:
     sigma_t = medium.sigma_t.tolist()
     described = fog(
-        sigma_t[0] if medium.grey else sigma_t, medium.albedo.tolist(), phase_function(medium.phase, _TABLE)
+        sigma_t[0] if medium.grey else sigma_t,
+        medium.albedo.tolist(),
+        phase_function(medium.phase, _TABLE),
     )
     return mi.load_dict(described | {"id": f"{medium.name}-medium"})
 
@@ -220,7 +263,12 @@ def _boundary(medium: Medium, filling: Any, around: Any) -> Any:
     if medium.bounds == "sphere":
         outside = {} if around is None else {"exterior": around}
         ball = _ball(medium.centre, medium.half[0])
-        return {"type": "sphere", "to_world": ball, "bsdf": {"type": "null"}, "interior": filling} | outside
+        return {
+            "type": "sphere",
+            "to_world": ball,
+            "bsdf": {"type": "null"},
+            "interior": filling,
+        } | outside
     mesh = {"box": box((2.0, 2.0, 2.0)), "gem": gem(9, 4), "ellipsoid": icosphere(1)}[medium.bounds]
     mesh = placed(scaled(mesh, medium.half), medium.centre, rotation(*medium.turn))
     return medium_boundary(medium.name, mesh, filling, around)
@@ -235,7 +283,8 @@ def _light(drawn: Light) -> dict[str, Any]:
     if drawn.kind in AREA_KINDS:
         size = drawn.size if len(drawn.size) == 2 else drawn.size[0]
         lamp = light(drawn.kind, colour, **where, size=size, opaque=drawn.black)
-        if drawn.kind == "sphere":  # Mitsuba takes the rounding of the turn of a large one for shear, and warns
+        # Mitsuba takes the rounding of the turn of a large one for shear, and warns
+        if drawn.kind == "sphere":
             lamp["to_world"] = _ball(drawn.position, drawn.size[0])
         return lamp
     upright = abs(direction[2]) < 0.99 * np.linalg.norm(direction)
@@ -246,8 +295,16 @@ def _light(drawn: Light) -> dict[str, Any]:
 def _shape(occluder: Occluder) -> Any:
     if occluder.kind != "ball":
         return mitsuba_mesh(occluder.name, occluder.mesh, occluder.reflectance.tolist())
-    diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": occluder.reflectance.tolist()}}
+    diffuse = {
+        "type": "diffuse",
+        "reflectance": {"type": "rgb", "value": occluder.reflectance.tolist()},
+    }
     ball = _ball(occluder.position, occluder.radius)
     return mi.load_dict(
-        {"type": "sphere", "id": occluder.name, "to_world": ball, "bsdf": {"type": "twosided", "bsdf": diffuse}}
+        {
+            "type": "sphere",
+            "id": occluder.name,
+            "to_world": ball,
+            "bsdf": {"type": "twosided", "bsdf": diffuse},
+        }
     )

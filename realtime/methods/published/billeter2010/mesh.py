@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light volume as a closed mesh: the displaced grid of a shadow map, joined to the light.
 
-Billeter, Sintorn, Assarsson 2010, section 4, after McCool 2000. Each corner (u, v) of a texel, or of a larger quad of
-an adaptive tessellation, is a vertex at light + k / s, k = axis + u across + v up, with s the inverse planar depth
-(`realtime.shadow_maps.inverse_depth_field`). In homogeneous coordinates that is
+Billeter, Sintorn, Assarsson 2010, section 4, after McCool 2000. Each corner (u, v) of a texel, or
+of a larger quad of an adaptive tessellation, is a vertex at light + k / s, k = axis + u across + v
+up, with s the inverse planar depth (`realtime.shadow_maps.inverse_depth_field`). In homogeneous
+coordinates that is
 
     (light s + k, s),
 
-which needs no division and holds vertices at infinity, s = 0. The grid of a spot ends at the border of its face; there
-it is joined to the light itself, (light, 1). The six grids of a cube are welded along their common edges, where their
-heights are the same numbers, and close by themselves.
+which needs no division and holds vertices at infinity, s = 0. The grid of a spot ends at the border
+of its face; there it is joined to the light itself, (light, 1). The six grids of a cube are welded
+along their common edges, where their heights are the same numbers, and close by themselves.
 
-Triangles are counter-clockwise in (u, v), so as the light sees them: their normals point away from it and out of the
-volume. Faces of a cube that look along a negative axis are mirrored: there the triangles are turned over.
+Triangles are counter-clockwise in (u, v), so as the light sees them: their normals point away from
+it and out of the volume. Faces of a cube that look along a negative axis are mirrored: there the
+triangles are turned over.
 """
 
 from dataclasses import dataclass
@@ -25,7 +27,8 @@ from airlight.realtime.methods.published.billeter2010.tessellation import divide
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
-#: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.
+#: Departure of an adaptive mesh from the shadow map that is allowed by
+#: default, relative to the depth.
 THRESHOLD = 1e-3
 
 
@@ -33,20 +36,26 @@ THRESHOLD = 1e-3
 class VolumeMesh:
     """A closed mesh around the space that a light reaches."""
 
-    vertices: Any  #: (n, 4), homogeneous: the point is [:3] / [3] in world space [m]; [3] >= 0, 0 at infinity
-    triangles: Any  #: (m, 3) numbers of vertices; (v1 - v0) x (v2 - v0) points out of the lit volume
+    #: (n, 4), homogeneous: the point is [:3] / [3] in world space [m]; [3] >= 0, 0 at infinity
+    vertices: Any
+    #: (m, 3) numbers of vertices; (v1 - v0) x (v2 - v0) points out of the lit volume
+    triangles: Any
 
 
 def volume_mesh(
-    shadow_map: ShadowMap, light: Light, *, tessellation: str = "static", threshold: float = THRESHOLD
+    shadow_map: ShadowMap,
+    light: Light,
+    *,
+    tessellation: str = "static",
+    threshold: float = THRESHOLD,
 ) -> VolumeMesh:
     """Return the mesh around what a light reaches.
 
-    `shadow_map`: shadow map of the light; `light`: a point or spot light; `tessellation`: ``static``: two triangles a
-    texel; ``adaptive``: larger ones where the map is flat (see
-    `realtime.methods.published.billeter2010.tessellation`); `threshold`: for ``adaptive``: departure from the map that
-    is allowed, relative to the depth. Raises InputError if `tessellation` or `threshold` is none, or a surface touches
-    the light.
+    `shadow_map`: shadow map of the light; `light`: a point or spot light; `tessellation`:
+    ``static``: two triangles a texel; ``adaptive``: larger ones where the map is flat (see
+    `realtime.methods.published.billeter2010.tessellation`); `threshold`: for ``adaptive``:
+    departure from the map that is allowed, relative to the depth. Raises InputError if
+    `tessellation` or `threshold` is none, or a surface touches the light.
     """
     if tessellation not in ("static", "adaptive"):
         raise InputError(f"tessellation: got {tessellation!r}, expected static or adaptive")
@@ -57,10 +66,11 @@ def volume_mesh(
 
 
 def memory_needed(faces: int, size: int) -> int:
-    """Return about how much a static mesh takes at its making, an upper bound of an adaptive one [bytes].
+    """Return about how much a static mesh takes at its making, an upper bound of
+    an adaptive one [bytes].
 
-    Each texel has one vertex (four doubles), two triangles (six 32 bit integers), a height with the copy of its
-    distance, and its numbers (one of 32, one of 64 bits).
+    Each texel has one vertex (four doubles), two triangles (six 32 bit integers), a height with the
+    copy of its distance, and its numbers (one of 32, one of 64 bits).
     """
     return faces * (size + 1) ** 2 * (4 * 8 + 6 * 4 + 2 * 4 + 4 + 8)
 
@@ -69,7 +79,9 @@ def _heights(shadow_map: ShadowMap):
     side = shadow_map.size + 1
     height = np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
     if not np.all(np.isfinite(height)):
-        raise InputError("light: a surface touches it, so that it has no light volume; move it off the surface")
+        raise InputError(
+            "light: a surface touches it, so that it has no light volume; move it off the surface"
+        )
     return height
 
 
@@ -81,7 +93,10 @@ def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
     corner_numbers = np.empty((cells + (4 * size if faces == 1 else 0), 3), np.int32)
     if faces == 1:
         corner_numbers[cells:] = _sides(size, number, apex=len(kept))
-    grid, number = corner_numbers[:cells].reshape(faces, size, size, 2, 3), number.reshape(height.shape)
+    grid, number = (
+        corner_numbers[:cells].reshape(faces, size, size, 2, 3),
+        number.reshape(height.shape),
+    )
     steps = ((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))  # (row, column)
     for face in range(faces):
         for which, three in enumerate(steps):
@@ -91,7 +106,9 @@ def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
 
 
 def adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
-    """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
+    """Return the mesh of triangles between corners of texels: those that are
+    used become its vertices.
+    """
     faces, size = shadow_map.faces, shadow_map.size
     used = np.zeros(height.size, bool)
     used[corners] = True
@@ -106,7 +123,9 @@ def adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> Volum
 
 
 def _numbering(faces: int, size: int, used):
-    """Return the numbers of the vertices at all corners, and the corners that they are taken from."""
+    """Return the numbers of the vertices at all corners, and the corners
+    that they are taken from.
+    """
     if faces == 6:
         twin, original = _welds(size)
         used[original[used[twin]]] = True
@@ -126,7 +145,9 @@ def _sides(size: int, number, *, apex: int):
 
 
 def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
-    """Return the homogeneous coordinates of corners of texels, in ascending order, and of a spot's light."""
+    """Return the homogeneous coordinates of corners of texels, in ascending
+    order, and of a spot's light.
+    """
     side = shadow_map.size + 1
     place = np.array(light.position, dtype=float).ravel()
     result = np.empty((len(kept) + (1 if shadow_map.projection.basis else 0), 4))
@@ -159,7 +180,9 @@ def _border(size: int):
     """Return the corners on the border of a face, counter-clockwise in (u, v)."""
     along = np.arange(size)
     side = size + 1
-    return np.concatenate([along, along * side + size, size * side + size - along, (size - along) * side])
+    return np.concatenate(
+        [along, along * side + size, size * side + size - along, (size - along) * side]
+    )
 
 
 def _welds(size: int):

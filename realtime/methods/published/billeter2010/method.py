@@ -1,27 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light volumes as published: the boundary becomes triangles, each is drawn over the pixels that it covers.
+"""Light volumes as published: the boundary becomes triangles, each is drawn over
+the pixels that it covers.
 
-With Gamma(x) the airlight from the camera to x (eq. 1), the airlight of a ray is the signed sum of eq. 3,
+With Gamma(x) the airlight from the camera to x (eq. 1), the airlight of a ray is
+the signed sum of eq. 3,
 
     L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
 
-in any order: terms are added up as they come (`realtime.methods.published.billeter2010.raster`). The
-`static` mesh is the height field of the shadow map itself, an `adaptive` one has fewer triangles where
-the map is flat (`realtime.methods.published.billeter2010.tessellation`). `light-volumes` crosses the
-same height field ray by ray, without triangles.
+in any order: terms are added up as they come (`realtime.methods.published.billeter2010.raster`).
+The `static` mesh is the height field of the shadow map itself, an `adaptive` one has fewer
+triangles where the map is flat (`realtime.methods.published.billeter2010.tessellation`).
+`light-volumes` crosses the same height field ray by ray, without triangles.
 """
 
 from dataclasses import dataclass
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.methods.interface.method import Method
-from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD, memory_needed, volume_mesh
+from airlight.realtime.methods.published.billeter2010.mesh import (
+    THRESHOLD,
+    memory_needed,
+    volume_mesh,
+)
 from airlight.realtime.methods.published.billeter2010.raster import mesh_airlight
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.shadow_maps.projection import light_faces
-from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
+from airlight.realtime.shadow_maps.shadow_map import (
+    cast_shadow_map,
+    check_maps,
+    map_memory,
+    map_size,
+)
 
 _VERTEX = 8 * 8  # bytes to draw one: four doubles for each as it is, and four for it in the image
 
@@ -30,13 +41,14 @@ _VERTEX = 8 * 8  # bytes to draw one: four doubles for each as it is, and four f
 class LightVolumes2010(Method):
     """The airlight in light volumes, as published.
 
-    Valid in one medium without bounds, for point and spot lights and any shapes that rays can be cast against. Exact
-    with respect to the shadow map: what it misses of the scene falls as the size of a texel.
+    Valid in one medium without bounds, for point and spot lights and any shapes that rays can be
+    cast against. Exact with respect to the shadow map: what it misses of the scene falls as the
+    size of a texel.
 
     References
     ----------
-    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
-    Graphics.
+    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*,
+    High Performance Graphics.
     """
 
     name = "light-volumes-2010"
@@ -59,19 +71,26 @@ class LightVolumes2010(Method):
     )
 
     def check(self, scene):
-        """Refuse media other than a homogeneous one without bounds, and more memory than the machine has."""
+        """Refuse media other than a homogeneous one without bounds, and more
+        memory than the machine has.
+        """
         if not isinstance(scene.medium, Homogeneous) or scene.medium.bounded_media:
             raise InputError(
-                f"method {self.name}: expected one homogeneous medium that fills all space, and the scene has another; "
+                f"method {self.name}: expected one homogeneous medium that fills all space, and "
+                "the scene has another; "
                 "use light-volumes"
             )
         if scene.features.shadows:
-            check_maps(scene.lights, self.map, sum(_memory_of(light, self.map) for light in scene.lights))
+            check_maps(
+                scene.lights, self.map, sum(_memory_of(light, self.map) for light in scene.lights)
+            )
 
     def prepare(self, scene, light):
         """Return the mesh of a light."""
         shadow_map = cast_shadow_map(scene.geometry, light, self.map)
-        return volume_mesh(shadow_map, light, tessellation=self.tessellation, threshold=self.threshold)
+        return volume_mesh(
+            shadow_map, light, tessellation=self.tessellation, threshold=self.threshold
+        )
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray."""
@@ -86,6 +105,8 @@ class LightVolumes2010(Method):
 
 
 def _memory_of(light: Light, size: int) -> int:
-    """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
+    """Return about how much the volume of a light takes, an upper bound
+    where it is adaptive [bytes].
+    """
     faces = light_faces(light)
     return map_memory(light, size) + memory_needed(faces, size) + faces * (size + 1) ** 2 * _VERTEX

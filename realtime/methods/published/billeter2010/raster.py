@@ -1,41 +1,44 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every triangle of a light volume against every pixel that it covers.
 
-A light volume is drawn (Billeter, Sintorn, Assarsson 2010, section 3) by its crossings with the ray of every pixel, in
-any order: `realtime.methods.published.billeter2010.raster` adds them up.
+A light volume is drawn (Billeter, Sintorn, Assarsson 2010, section 3) by its crossings with the ray
+of every pixel, in any order: `realtime.methods.published.billeter2010.raster` adds them up.
 
-Scan conversion in homogeneous coordinates. A vertex (P w, w) becomes (a, b, z, w): with the depth z along the view and
-the point in the image at column a/z, row b/z. Nothing is divided before it must be, so a vertex at infinity (w = 0) is
-like any other and no near plane cuts triangles behind the camera (Olano, Greer 1997). The row j is a plane through the
-pinhole, b - j z = 0. With f = b - j z at the ends of an edge, f <= 0 at B and f > 0 at A, the edge crosses that plane
-at
+Scan conversion in homogeneous coordinates. A vertex (P w, w) becomes (a, b, z, w): with the depth z
+along the view and the point in the image at column a/z, row b/z. Nothing is divided before it must
+be, so a vertex at infinity (w = 0) is like any other and no near plane cuts triangles behind the
+camera (Olano, Greer 1997). The row j is a plane through the pinhole, b - j z = 0. With f = b - j z
+at the ends of an edge, f <= 0 at B and f > 0 at A, the edge crosses that plane at
 
     C = f_A B - f_B A,       a combination with weights of 0 or more,
 
-in the image (z_C > 0) at the column a_C/z_C, or behind the camera. The two crossed edges of a triangle so bound its
-pixels in that row: those with left <= column < right. Where one of the ends is behind the camera, the segment leaves
-the image to the side on which it passes z = 0, and the span is a half line.
+in the image (z_C > 0) at the column a_C/z_C, or behind the camera. The two crossed edges of a
+triangle so bound its pixels in that row: those with left <= column < right. Where one of the ends
+is behind the camera, the segment leaves the image to the side on which it passes z = 0, and the
+span is a half line.
 
-Why it is watertight: fma(-j, z, b) has the sign of b - j z itself, and B and A are ordered by that sign, not by
-triangle. The two triangles of an edge therefore find the same bits for its column. In one row the segments of a closed
-mesh join into closed polygons, directed from the edge that goes up the image to the one that goes down. Every pixel
-that such a polygon passes to the right it passes to the left as well: the signs of the crossings before a camera
-outside the volume add up to exactly 0, before one inside it to exactly 1.
+Why it is watertight: fma(-j, z, b) has the sign of b - j z itself, and B and A are ordered by that
+sign, not by triangle. The two triangles of an edge therefore find the same bits for its column. In
+one row the segments of a closed mesh join into closed polygons, directed from the edge that goes up
+the image to the one that goes down. Every pixel that such a polygon passes to the right it passes
+to the left as well: the signs of the crossings before a camera outside the volume add up to exactly
+0, before one inside it to exactly 1.
 
-Over a triangle w/z, the inverse depth, is linear in the image, and so it is along a span: it is found at the span's
-first and last pixel, as a combination of both ends with weights of 0 or more, and interpolated between the two. No
-determinant is divided by, and slivers do no harm.
+Over a triangle w/z, the inverse depth, is linear in the image, and so it is along a span: it is
+found at the span's first and last pixel, as a combination of both ends with weights of 0 or more,
+and interpolated between the two. No determinant is divided by, and slivers do no harm.
 
 References
 ----------
 Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, HPG 2010. Olano, Greer
 1997, *Triangle scan conversion using 2D homogeneous coordinates*, Graphics Hardware.
 
-**The airlight of a light volume:** a signed sum over the crossings of camera rays with its boundary.
+**The airlight of a light volume:** a signed sum over the crossings of
+camera rays with its boundary.
 
-With J(x) the airlight of a lit ray up to x, a ray has the airlight sum_k s_k J(x_k), s = +1 where it leaves the light
-and -1 where it enters it (Billeter, Sintorn, Assarsson 2010, eq. 3). The order does not matter. The visible surface is
-at D, and crossings behind it count as crossings at D.
+With J(x) the airlight of a lit ray up to x, a ray has the airlight sum_k s_k J(x_k), s = +1 where
+it leaves the light and -1 where it enters it (Billeter, Sintorn, Assarsson 2010, eq. 3). The order
+does not matter. The visible surface is at D, and crossings behind it count as crossings at D.
 """
 
 from collections.abc import Iterable, Iterator
@@ -76,19 +79,25 @@ class _Spans:
     step: Any  #: change of the inverse depth from pixel to pixel [1/m]
 
 
-def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Crossings]:
+def signed_crossings(
+    mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH
+) -> Iterator[Crossings]:
     """Yield the crossings of the rays through all pixels with the triangles of a mesh.
 
-    `mesh`: the mesh; vertices at infinity are as good as any; `camera`: the camera; pixels are points at the centres of
-    squares; `batch`: triangles, rows of triangles, and crossings that are held at a time.
+    `mesh`: the mesh; vertices at infinity are as good as any; `camera`: the camera; pixels are
+    points at the centres of squares; `batch`: triangles, rows of triangles, and crossings that are
+    held at a time.
 
-    Valid for any mesh. For a closed one the signs of the crossings of each pixel add up to 0, or to 1 where the camera
-    is inside and normals point out; all that can go wrong is which, with a camera on the mesh. The yielded arrays are
-    not evaluated: what the caller does with them becomes one kernel with the expansion of the spans.
+    Valid for any mesh. For a closed one the signs of the crossings of each pixel add up to 0, or to
+    1 where the camera is inside and normals point out; all that can go wrong is which, with a
+    camera on the mesh. The yielded arrays are not evaluated: what the caller does with them becomes
+    one kernel with the expansion of the spans.
     """
     screen = _project(mesh.vertices, camera)
     for begin in range(0, len(mesh.triangles), batch):
-        corners = mi.UInt32(np.ascontiguousarray(mesh.triangles[begin : begin + batch], dtype=np.uint32).ravel())
+        corners = mi.UInt32(
+            np.ascontiguousarray(mesh.triangles[begin : begin + batch], dtype=np.uint32).ravel()
+        )
         triangle, first, rows = _rows(screen, corners, camera)
         for owner, rank in _expand(rows, batch):
             spans = _spans(screen, corners, camera, (triangle, first), owner, rank)
@@ -97,7 +106,9 @@ def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) ->
 
 
 def _opaque(values):
-    """Return a vector of which no kernel knows the value, so that none is compiled again when it changes."""
+    """Return a vector of which no kernel knows the value, so that none is
+    compiled again when it changes.
+    """
     return mi.Vector3d(*(dr.opaque(mi.Float64, float(component)) for component in values))
 
 
@@ -105,7 +116,10 @@ def _project(vertices, camera: Camera):
     """Return (a, b, z, w) of all vertices, one after the other, in float64."""
     host = read_camera(camera)
     depth, left, up = np.linalg.inv(host.basis)
-    to_column, to_row = 0.5 * (camera.width - 1) * depth - left, 0.5 * (camera.height - 1) * depth - up
+    to_column, to_row = (
+        0.5 * (camera.width - 1) * depth - left,
+        0.5 * (camera.height - 1) * depth - up,
+    )
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     number = dr.arange(mi.UInt32, len(vertices))
     vertex = dr.gather(mi.Vector4d, mi.Float64(vertices.ravel()), number)
@@ -124,7 +138,9 @@ def _corners(screen, corners, triangle):
 
 
 def _rows(screen, corners, camera: Camera):
-    """Return the triangles that may cover pixels, the first row of each, and how many rows it may cover."""
+    """Return the triangles that may cover pixels, the first row of each, and
+    how many rows it may cover.
+    """
     vertices = _corners(screen, corners, dr.arange(mi.UInt32, dr.width(corners) // 3))
     depth = [v.z for v in vertices]
     column0, column1 = _pixel_range([v.x for v in vertices], depth, camera.width)
@@ -136,17 +152,22 @@ def _rows(screen, corners, camera: Camera):
 
 
 def _pixel_range(values, depth, size: int):
-    """Return first and end of the whole numbers that the part of triangles before the camera covers, or a few more.
+    """Return first and end of the whole numbers that the part of triangles before the
+    camera covers, or a few more.
 
-    `values` over `depth` are coordinates in the image. A slack of 1e-6 pixel is far above rounding: what is left out
-    here covers no pixel by the exact rule either.
+    `values` over `depth` are coordinates in the image. A slack of 1e-6 pixel is far above rounding:
+    what is left out here covers no pixel by the exact rule either.
     """
     low, high = mi.Float64(dr.inf), mi.Float64(-dr.inf)
     for value, z in zip(values, depth):
         at = value / z
-        low, high = dr.select(z > 0, dr.minimum(low, at), low), dr.select(z > 0, dr.maximum(high, at), high)
+        low, high = (
+            dr.select(z > 0, dr.minimum(low, at), low),
+            dr.select(z > 0, dr.maximum(high, at), high),
+        )
     for k, m in ((0, 1), (1, 2), (2, 0)):
-        # Where an edge passes z = 0 it leaves the image on the side of its value there, or on both if that is unclear.
+        # Where an edge passes z = 0 it leaves the image on the side of its value there, or on
+        # both if that is unclear.
         cut = (depth[k] > 0) ^ (depth[m] > 0)
         from_k, from_m = values[k] * dr.abs(depth[m]), values[m] * dr.abs(depth[k])
         doubt = 1e-12 * (dr.abs(from_k) + dr.abs(from_m))
@@ -157,7 +178,9 @@ def _pixel_range(values, depth, size: int):
 
 
 def _expand(count, limit: int):
-    """Yield (number, rank) for all ranks below count[number], number by number, at most about `limit` at a time."""
+    """Yield (number, rank) for all ranks below count[number], number by number, at most
+    about `limit` at a time.
+    """
     if dr.width(count) == 0:
         return
     used = dr.compress(count > 0)
@@ -181,7 +204,10 @@ def _spans(screen, corners, camera: Camera, row_ranges, owner, rank) -> _Spans:
     triangle, first = (dr.gather(mi.UInt32, values, owner) for values in row_ranges)
     row = first + rank
     down, up = _row_segment(_corners(screen, corners, triangle), mi.Float64(row))
-    columns = [_first_right_of(leading, trailing, camera.width) for leading, trailing in ((down, up), (up, down))]
+    columns = [
+        _first_right_of(leading, trailing, camera.width)
+        for leading, trailing in ((down, up), (up, down))
+    ]
     begin, end = dr.minimum(*columns), dr.maximum(*columns)
     count = dr.select((down.z > 0) | (up.z > 0), end - begin, 0)
     up_is_left = columns[1] < columns[0]
@@ -198,7 +224,9 @@ def _spans(screen, corners, camera: Camera, row_ranges, owner, rank) -> _Spans:
 
 
 def _row_segment(vertices, row):
-    """Return where triangles cross the plane of a row: on the edges that go down and up the image; z = 0 if nowhere."""
+    """Return where triangles cross the plane of a row: on the edges that go down and up the
+    image; z = 0 if nowhere.
+    """
     side = [dr.fma(-row, v.z, v.y) for v in vertices]
     below = [f > 0 for f in side]
     # The vertex that is alone on its side of the row is at the end of both edges.
@@ -216,8 +244,13 @@ def _row_segment(vertices, row):
     crossed = (below[0] != below[1]) | (below[1] != below[2])
 
     def cross(end):
-        above, under = (dr.select(is_below, x, y) for x, y in ((end[0], single[0]), (single[0], end[0])))
-        weight, other_weight = dr.select(is_below, single[1], end[1]), -dr.select(is_below, end[1], single[1])
+        above, under = (
+            dr.select(is_below, x, y) for x, y in ((end[0], single[0]), (single[0], end[0]))
+        )
+        weight, other_weight = (
+            dr.select(is_below, single[1], end[1]),
+            -dr.select(is_below, end[1], single[1]),
+        )
         return dr.select(crossed, dr.fma(above, weight, under * other_weight), mi.Vector4d(0))
 
     leaving, arriving = cross(other), cross(third)
@@ -225,7 +258,9 @@ def _row_segment(vertices, row):
 
 
 def _first_right_of(point, other, width: int):
-    """Return the first column right of or at one end of a segment in the plane of a row, from 0 to `width`."""
+    """Return the first column right of or at one end of a segment in the plane of
+    a row, from 0 to `width`.
+    """
     # An end behind the camera is as far to the side as the segment passes z = 0.
     edge = dr.select(other.x * -point.z + point.x * other.z >= 0, mi.Float64(dr.inf), -dr.inf)
     return mi.Int32(dr.clip(dr.ceil(dr.select(point.z > 0, point.x / point.z, edge)), 0, width))
@@ -243,28 +278,37 @@ def _inverse_depth(left, right, column):
 
 
 def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
-    """Return the crossings of pixels: the span of each, and how many pixels come before it there."""
+    """Return the crossings of pixels: the span of each, and how many
+    pixels come before it there.
+    """
     pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
-    first, change, sign = (dr.gather(mi.Float64, column, span) for column in (spans.inverse, spans.step, spans.sign))
+    first, change, sign = (
+        dr.gather(mi.Float64, column, span) for column in (spans.inverse, spans.step, spans.sign)
+    )
     inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)
     return Crossings(pixel, dr.norm(ray_directions(camera, pixel)[1]) / inverse, sign)
 
 
-def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, lane: Any = None) -> Any:
+def crossing_sum(
+    batches: Iterable[Crossings], airlight: LitRays, distance, *, lane: Any = None
+) -> Any:
     """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
 
-    `batches`: from `realtime.methods.published.billeter2010.raster.signed_crossings`; `airlight`, `distance`: the rays
-    with the light, whose cone clips every crossing, and the distances to the visible surface [m]; `lane`: by pixel
-    number its entry among the rays; None where they are in the order of the image.
+    `batches`: from `realtime.methods.published.billeter2010.raster.signed_crossings`; `airlight`,
+    `distance`: the rays with the light, whose cone clips every crossing, and the distances to the
+    visible surface [m]; `lane`: by pixel number its entry among the rays; None where they are in
+    the order of the image.
 
-    Valid for a closed mesh. With eq. 3 as it stands, every crossing beyond the light has the large airlight about the
-    light, and what rounding leaves of it where they cancel is visible. As J(0, x) = J(0, D) - J(x, D), the sum is also
+    Valid for a closed mesh. With eq. 3 as it stands, every crossing beyond the light has the large
+    airlight about the light, and what rounding leaves of it where they cancel is visible. As J(0,
+    x) = J(0, D) - J(x, D), the sum is also
 
         n J(0, D) + sum_{x_k < foot} s_k J(0, x_k) - sum_{foot <= x_k < D} s_k J(x_k, D),
 
-    with n the sum of the signs of the crossings at or beyond the foot, or at the surface: a whole number, 1 where the
-    point next to the light is lit and 0 where it is not. No other term contains the airlight about the light, and
-    crossings at the surface cost nothing. Terms have the precision of the rays and are added up in float64.
+    with n the sum of the signs of the crossings at or beyond the foot, or at the surface: a whole
+    number, 1 where the point next to the light is lit and 0 where it is not. No other term contains
+    the airlight about the light, and crossings at the surface cost nothing. Terms have the
+    precision of the rays and are added up in float64.
     """
     Float, geometry = type(distance), airlight.geometry
     zero = airlight.nothing(1)
@@ -272,9 +316,12 @@ def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, l
     beyond = dr.zeros(mi.Float64, dr.width(distance))
 
     def add(index, x0, x1, sign):
-        dr.eval(index, x0, x1, sign)  # All calls then share one kernel; compiling it takes longer than running it.
+        # All calls then share one kernel; compiling it takes longer than running it.
+        dr.eval(index, x0, x1, sign)
         columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
-        rays = RayGeometry(*(None if column is None else dr.gather(Float, column, index) for column in columns))
+        rays = RayGeometry(
+            *(None if column is None else dr.gather(Float, column, index) for column in columns)
+        )
         term = replace(airlight, geometry=rays).airlight(x0, x1)
         dr.scatter_add(total, type(total)(term) * sign, index)
         dr.eval(total)
@@ -303,11 +350,11 @@ def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, l
 def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel):
     """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
 
-    `view`: the frame; its rays are those of all pixels of its camera; `light`: the light; `mesh`: its light volume,
-    closed; `kernel`: an airlight kernel.
+    `view`: the frame; its rays are those of all pixels of its camera; `light`: the light; `mesh`:
+    its light volume, closed; `kernel`: an airlight kernel.
 
-    Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
-    function.
+    Valid for homogeneous media that fill all space. The number of crossings is counted on the way:
+    not for a frozen function.
 
     Billeter, Sintorn, Assarsson 2010, eq. 3.
     """

@@ -1,34 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Adaptive tessellation of a height field: large quads where it is flat, texels at its edges.
 
-Billeter, Sintorn, Assarsson 2010, section 4.1: a Laplacian filter finds edges, a hierarchy says which quads hold one,
-neighbours are made to differ by at most one level, and a quad is triangulated by which of its sides are divided.
+Billeter, Sintorn, Assarsson 2010, section 4.1: a Laplacian filter finds edges, a hierarchy says
+which quads hold one, neighbours are made to differ by at most one level, and a quad is triangulated
+by which of its sides are divided.
 
-The filter. A quad of h x h texels, h even, that is divided into four gets five new corners: the middles of its sides
-and of its diagonal. There it departs from the two triangles of the undivided quad by half a second difference,
+The filter. A quad of h x h texels, h even, that is divided into four gets five new corners: the
+middles of its sides and of its diagonal. There it departs from the two triangles of the undivided
+quad by half a second difference,
 
     e = | s(a) + s(b) - 2 s(middle) | / 2,     a, b the ends of the side or of the diagonal,
 
-which is h^2 / 8 times the second derivative. The quad holds an edge if e > threshold s(middle) at one of the five.
-These are the terms of the Laplacian of the inverse depth s, but taken
+which is h^2 / 8 times the second derivative. The quad holds an edge if e > threshold s(middle) at
+one of the five. These are the terms of the Laplacian of the inverse depth s, but taken
 
-- of s and not of the depth: the mesh is linear in s, planes have no second difference however they are seen;
-- one by one: their sum vanishes at a saddle, s = u^2 - v^2 or u v, where the mesh is as wrong as anywhere;
-- at the spacing of every level, not of the texels alone: below a threshold at the texels, a smooth curvature would add
-  up to 4^k times as much over quads of 2^k texels;
-- relative to the local height, not to the range of a face: e / s is the relative error of the depth, so the same
-  angle at the light wherever the surface is, and one near object does not hide what lies far behind it. Where s = 0,
-  at infinity, any difference is an edge.
+- of s and not of the depth: the mesh is linear in s, planes have no second
+  difference however they are seen;
+- one by one: their sum vanishes at a saddle, s = u^2 - v^2 or u v, where the mesh
+  is as wrong as anywhere;
+- at the spacing of every level, not of the texels alone: below a threshold at the texels, a smooth
+  curvature would add up to 4^k times as much over quads of 2^k texels;
+- relative to the local height, not to the range of a face: e / s is the relative error of the
+  depth, so the same angle at the light wherever the surface is, and one near object does not hide
+  what lies far behind it. Where s = 0, at infinity, any difference is an edge.
 
-As each corner is examined in the quad that would introduce it, a tessellation is wrong nowhere by more than a small
-multiple of the threshold: the errors of a corner and of the corners it was interpolated from add up. A plain Laplacian
-of the depth at the texels, with as many triangles, 227 000 for six maps of 512^2 of the colonnade, leaves 5.8 times the
-error of the depth (root mean square) and 1.3 times that of the airlight (`airlight paper billeter`).
+As each corner is examined in the quad that would introduce it, a tessellation is wrong nowhere by
+more than a small multiple of the threshold: the errors of a corner and of the corners it was
+interpolated from add up. A plain Laplacian of the depth at the texels, with as many triangles, 227
+000 for six maps of 512^2 of the colonnade, leaves 5.8 times the error of the depth (root mean
+square) and 1.3 times that of the airlight (`airlight paper billeter`).
 
-Levels: a node of level l has N / 2^l texels on a side; level 0 is a face, level log2 N the texels. `divided[l]` has one
-flag for each node of each face, (faces, 2^l, 2^l), row by row, and nodes that do not exist have the flag unset. Heights
-are arrays (faces, N + 1, N + 1) at the corners of the texels; one face is a square, six are a cube as in
-`realtime.shadow_maps.shadow_map`.
+Levels: a node of level l has N / 2^l texels on a side; level 0 is a face, level log2 N the texels.
+`divided[l]` has one flag for each node of each face, (faces, 2^l, 2^l), row by row, and nodes that
+do not exist have the flag unset. Heights are arrays (faces, N + 1, N + 1) at the corners of the
+texels; one face is a square, six are a cube as in `realtime.shadow_maps.shadow_map`.
 """
 
 from itertools import pairwise
@@ -38,15 +43,16 @@ import numpy as np
 
 from airlight.realtime.errors import InputError
 
-#: The corners and the middles of the sides of a quad, counter-clockwise, as (column, row) in halves of a side.
+#: The corners and the middles of the sides of a quad, counter-clockwise, as (column,
+#: row) in halves of a side.
 RING = ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 def configuration(sides: int) -> list[tuple[int, int, int]]:
     """Return the triangles of a quad, counter-clockwise, as indices into `RING`.
 
-    A fan from the first middle there is, which lies on no line with the rest of the ring, or without one from the
-    corner (0, 0): 2 triangles, and one more for each divided side.
+    A fan from the first middle there is, which lies on no line with the rest of the ring, or
+    without one from the corner (0, 0): 2 triangles, and one more for each divided side.
 
     `sides`: which sides are divided, one bit each: 1 lower, 2 right, 4 upper, 8 left.
     """
@@ -59,12 +65,14 @@ def configuration(sides: int) -> list[tuple[int, int, int]]:
 def edges(height, threshold: float) -> list[Any]:
     """Return the nodes of each level that hold an edge at the spacing of that level.
 
-    `height`: array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative; `threshold`:
-    largest departure that is no edge, relative to the height [1]. Raises InputError if `threshold` is not a positive
-    number.
+    `height`: array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative;
+    `threshold`: largest departure that is no edge, relative to the height [1]. Raises InputError if
+    `threshold` is not a positive number.
     """
     if not 0 < threshold < np.inf:
-        raise InputError(f"threshold: got {threshold!r}, expected a positive number, for instance 0.001")
+        raise InputError(
+            f"threshold: got {threshold!r}, expected a positive number, for instance 0.001"
+        )
     size = height.shape[1] - 1
     marks_by_level = []
     for level in range(size.bit_length() - 1):
@@ -84,14 +92,18 @@ def _marks(s, threshold: float):
     along_rows = departs(s[::2, :-1:2], s[::2, 2::2], s[::2, 1::2])
     along_columns = departs(s[:-1:2, ::2], s[2::2, ::2], s[1::2, ::2])
     diagonal = departs(s[:-1:2, :-1:2], s[2::2, 2::2], s[1::2, 1::2])
-    return along_rows[:-1] | along_rows[1:] | along_columns[:, :-1] | along_columns[:, 1:] | diagonal
+    return (
+        along_rows[:-1] | along_rows[1:] | along_columns[:, :-1] | along_columns[:, 1:] | diagonal
+    )
 
 
 def divide(edge: list[Any]) -> list[Any]:
-    """Return which nodes are divided: those with an edge in or below them, and what neighbours then need.
+    """Return which nodes are divided: those with an edge in or below them, and
+    what neighbours then need.
 
-    From fine to coarse: where a node is divided, it and the four nodes across its sides must exist, so their parents
-    are divided. Then the quads on both sides of an edge of the mesh differ by at most one level.
+    From fine to coarse: where a node is divided, it and the four nodes across its sides must exist,
+    so their parents are divided. Then the quads on both sides of an edge of the mesh differ by at
+    most one level.
     """
     divided = list(edge)
     for level in reversed(range(1, len(edge))):
@@ -99,30 +111,44 @@ def divide(edge: list[Any]) -> list[Any]:
         for across in _across(divided[level]):
             exists |= across
         divided[level - 1] = divided[level - 1] | (
-            exists[:, ::2, ::2] | exists[:, ::2, 1::2] | exists[:, 1::2, ::2] | exists[:, 1::2, 1::2]
+            exists[:, ::2, ::2]
+            | exists[:, ::2, 1::2]
+            | exists[:, 1::2, ::2]
+            | exists[:, 1::2, 1::2]
         )
     return divided
 
 
 def _across(flags):
-    """Return the flags of the nodes across the lower, right, upper and left sides; beyond a square they are unset."""
+    """Return the flags of the nodes across the lower, right, upper and left sides; beyond
+    a square they are unset.
+    """
     lower, right, upper, left = (np.zeros_like(flags) for _ in range(4))
     lower[:, 1:], upper[:, :-1] = flags[:, :-1], flags[:, 1:]
     left[:, :, 1:], right[:, :, :-1] = flags[:, :, :-1], flags[:, :, 1:]
     if len(flags) == 6:
-        # Axis k has across and up along the axes k + 1 and k + 2, counted cyclically. Hence the side u = +-1 of face
-        # (k, sign) is the side v = sign of face (k + 1, +-1), and its side v = +-1 is the side u = sign of face (k + 2,
-        # +-1); what runs along the side is the same coordinate on both.
+        # Axis k has across and up along the axes k + 1 and k + 2, counted cyclically. Hence the
+        # side u = +-1 of face (k, sign) is the side v = sign of face (k + 1, +-1), and its side v =
+        # +-1 is the side u = sign of face (k + 2, +-1); what runs along the side is the same
+        # coordinate on both.
         for face in range(6):
             axis, border = face >> 1, -1 if face & 1 == 0 else 0
             to_right, to_upper = 2 * ((axis + 1) % 3), 2 * ((axis + 2) % 3)
-            right[face, :, -1], left[face, :, 0] = flags[to_right, border], flags[to_right + 1, border]
-            upper[face, -1], lower[face, 0] = flags[to_upper, :, border], flags[to_upper + 1, :, border]
+            right[face, :, -1], left[face, :, 0] = (
+                flags[to_right, border],
+                flags[to_right + 1, border],
+            )
+            upper[face, -1], lower[face, 0] = (
+                flags[to_upper, :, border],
+                flags[to_upper + 1, :, border],
+            )
     return lower, right, upper, left
 
 
 def quads(divided: list[Any]):
-    """Yield the quads of the mesh level by level: their level, flat numbers and sides that are divided."""
+    """Yield the quads of the mesh level by level: their level, flat numbers
+    and sides that are divided.
+    """
     faces = len(divided[0])
     exists = np.ones((faces, 1, 1), bool)
     for level, flags in enumerate(divided):
@@ -139,8 +165,8 @@ def quads(divided: list[Any]):
 def triangles(divided: list[Any]):
     """Return the triangles of the quads, (m, 3) numbers of corners face by face and row by row.
 
-    `divided` is that of `divide`. Triangles are counter-clockwise in (column, row), and no corner lies inside a side
-    of one.
+    `divided` is that of `divide`. Triangles are counter-clockwise in (column, row), and no corner
+    lies inside a side of one.
     """
     size = 2 ** len(divided)
     parts = []
@@ -150,7 +176,10 @@ def triangles(divided: list[Any]):
             if len(chosen):
                 first, step = _first_corner(chosen, level, size)
                 fan = np.array(
-                    [[_ring_offset(k, step, size) for k in triangle] for triangle in configuration(sides_now)]
+                    [
+                        [_ring_offset(k, step, size) for k in triangle]
+                        for triangle in configuration(sides_now)
+                    ]
                 )
                 parts.append((first[:, None, None] + fan.astype(np.int32)).reshape(-1, 3))
     return np.concatenate(parts)
@@ -165,5 +194,7 @@ def _first_corner(numbers, level: int, size: int):
 
 
 def _ring_offset(k: int, step: int, size: int) -> int:
-    """Return by how much the number of a corner of the ring exceeds that of the quad's corner (0, 0)."""
+    """Return by how much the number of a corner of the ring exceeds that of
+    the quad's corner (0, 0).
+    """
     return (RING[k][1] * step // 2) * (size + 1) + RING[k][0] * step // 2

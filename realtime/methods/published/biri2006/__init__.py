@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow planes as Biri, Arques and Michelin 2006 draw them: Gamma at every plane, with a stencil and a frame buffer.
+"""Shadow planes as Biri, Arques and Michelin 2006 draw them: Gamma at every plane, with a
+stencil and a frame buffer.
 
 Silhouettes, their planes and the wedges are those of `realtime.methods.shadow_planes`.
 

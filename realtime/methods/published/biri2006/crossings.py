@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gamma added up over the crossings of shadow planes one by one, as the paper does it.
 
-The stencil starts with the layers over the visible surface. Planes come towards the camera (order=paper): one that
-faces the camera, beyond which there is shadow, adds its Gamma if the stencil is one and takes its layers off; one that
-faces away subtracts its Gamma if the stencil is zero and puts its layers on (Biri 2006, section 5.1.5). From the camera
-on (order=exact) the same rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
+The stencil starts with the layers over the visible surface. Planes come towards the camera
+(order=paper): one that faces the camera, beyond which there is shadow, adds its Gamma if the
+stencil is one and takes its layers off; one that faces away subtracts its Gamma if the stencil is
+zero and puts its layers on (Biri 2006, section 5.1.5). From the camera on (order=exact) the same
+rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
 subtracts. Without an order every plane counts.
 
-**Bounded media** (5.2). A ray is drawn in each medium by itself: its end is the exit from the medium or the surface
-before that, whose Gamma is added if it is lit, and the entry, a back facing triangle of the bounds in the paper, is
-drawn in the order of the planes. It subtracts its Gamma if the stencil is zero, and sets the stencil to 255: planes
-closer to the camera do not pass. For order=paper an entry therefore counts by the cosine of the angle at the light
-between the camera and itself, planes of a larger cosine are left out, and it comes last. The paper asks for small
-triangles, whose middles stand for them in the order: here they are points. Otherwise planes behind it count.
+**Bounded media** (5.2). A ray is drawn in each medium by itself: its end is the exit from the
+medium or the surface before that, whose Gamma is added if it is lit, and the entry, a back facing
+triangle of the bounds in the paper, is drawn in the order of the planes. It subtracts its Gamma if
+the stencil is zero, and sets the stencil to 255: planes closer to the camera do not pass. For
+order=paper an entry therefore counts by the cosine of the angle at the light between the camera and
+itself, planes of a larger cosine are left out, and it comes last. The paper asks for small
+triangles, whose middles stand for them in the order: here they are points. Otherwise planes behind
+it count.
 
 **The frame buffer** holds the frame, not one sum: `start` is its content before.
 """
@@ -72,11 +75,12 @@ def sum_crossings(
 ):
     """Add up Gamma over the crossings of every ray.
 
-    `planes`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a bounded medium [m];
-    `gammas`: functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface;
-    `order`: 'exact', 'paper' or 'none'; `buffer`: what keeps the sum; None for float; `start`: what is in the buffer
-    before, or None; `entry`: where rays enter a bounded medium, or None. Returns `total`: the radiance; `lit`: whether
-    the light reaches the end.
+    `planes`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a
+    bounded medium [m]; `gammas`: functions (plane, ray, x) and (x) that give the radiance of Gamma
+    at a crossing and at the surface; `order`: 'exact', 'paper' or 'none'; `buffer`: what keeps the
+    sum; None for float; `start`: what is in the buffer before, or None; `entry`: where rays enter a
+    bounded medium, or None. Returns `total`: the radiance; `lit`: whether the light reaches the
+    end.
     """
     index = planes.index
     at_plane, at_surface = gammas
@@ -106,13 +110,17 @@ def sum_crossings(
             body=lambda draw: (_next(planes, ray, ray_end, draw, order, key),),
             labels=("draw",),
         )
-        x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
+        x = dr.minimum(
+            index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance
+        )
         value = at_plane(draw.number, ray, x)
         draw.total = dr.select(draw.factor == 0, draw.total, keep(draw.total + draw.factor * value))
         draw.factor = Float(0)
         return (draw,)
 
-    (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.count, body=body, labels=("draw",))
+    (draw,) = dr.while_loop(
+        state=(draw,), cond=lambda draw: draw.place < ray.count, body=body, labels=("draw",)
+    )
     if entry is None:
         return draw.total, lit
     enters: Any = mi.Bool(True)
@@ -129,7 +137,9 @@ def reaches(index: PlaneIndex, ray: RayPlanes, distance):
 
 
 def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
-    """Return the key of an entry: planes with a larger one count. It is -cos in the paper's order, else D/x."""
+    """Return the key of an entry: planes with a larger one count. It is -cos in the
+    paper's order, else D/x.
+    """
     if order != "paper":
         return index.distance / entry.distance
     # The entry is x w from the camera, which is at D on the z axis.
@@ -139,9 +149,13 @@ def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
     return -along * dr.rsqrt(dr.fma(along, along, beside * beside))
 
 
-def _next(planes: PaperPlanes, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
+def _next(
+    planes: PaperPlanes, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key
+) -> _Draw:
     """Read the next plane of the list."""
-    quotient, crossed, gain, number = read_plane(planes.index, ray, draw.place, draw.place < ray.count)
+    quotient, crossed, gain, number = read_plane(
+        planes.index, ray, draw.place, draw.place < ray.count
+    )
     crossed &= quotient > ray_end
     counts = crossed
     if entry_key is not None and order == "paper":

@@ -1,46 +1,53 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gamma at the vertices of meshes, interpolated: the evaluation of the paper.
 
-A shadow plane is meshed by rows of vertices on the two half lines that bound it, at the distances ratio^k times that of
-the silhouette vertex from the light: finely near the light, coarsely far away, and undivided along the edge (Biri 2006,
-section 5.1.5). Between the rows k and k + 1 the point (1 - t) u a + t u b, with a and b the ends of the edge, lies in a
-quadrilateral that a graphics card draws as two triangles; in the coordinates p = (1 - t) u, q = t u their corners are
+A shadow plane is meshed by rows of vertices on the two half lines that bound it, at the distances
+ratio^k times that of the silhouette vertex from the light: finely near the light, coarsely far
+away, and undivided along the edge (Biri 2006, section 5.1.5). Between the rows k and k + 1 the
+point (1 - t) u a + t u b, with a and b the ends of the edge, lies in a quadrilateral that a
+graphics card draws as two triangles; in the coordinates p = (1 - t) u, q = t u their corners are
 
     (r_k, 0), (0, r_k), (r_k+1, 0)      and      (r_k+1, 0), (0, r_k), (0, r_k+1).
 
-Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u it is too large by up to (ratio + 1)^2/(4
-ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios are wise. The planes of a cone begin
-NEARNESS of the camera's distance from the light (`realtime.methods.published.biri2006.planes`); by the same ratio they
-need log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the planes of
-occluders.
+Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u it is too large by up
+to (ratio + 1)^2/(4 ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios
+are wise. The planes of a cone begin NEARNESS of the camera's distance from the light
+(`realtime.methods.published.biri2006.planes`); by the same ratio they need
+log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the
+planes of occluders.
 
-Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma between the vertices of their triangles
-(5.1.3).
+Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma between the vertices of
+their triangles (5.1.3).
 
 **In bounded media**, medium by medium (Biri 2006, sections 4.2 and 5.2).
 
-"When several participating media exist, stages 3 to 5 need to be computed for each one of them." In the medium m, which
-a ray enters at A and leaves at F, with the end E at F or at the surface before that,
+"When several participating media exist, stages 3 to 5 need to be computed for each one of them." In
+the medium m, which a ray enters at A and leaves at F, with the end E at F or at the surface before
+that,
 
     L_m = sum over lit [a, b] in [A, E] of Gamma_m(b) - Gamma_m(a),
 
-where Gamma_m(P) integrates from the camera in the paper, with the exponent continued before A, and Gamma_m(A) is
-subtracted where the ray enters (4.2). Before A the exponent grows, so that Gamma_m is a multiple of what is to be left
-of it, and so is the error of its interpolation. Here all Gamma_m begin at A, and Gamma_m(A) is 0: without vertices and
-rounding that is the same. The passes are
+where Gamma_m(P) integrates from the camera in the paper, with the exponent continued before A, and
+Gamma_m(A) is subtracted where the ray enters (4.2). Before A the exponent grows, so that Gamma_m is
+a multiple of what is to be left of it, and so is the error of its interpolation. Here all Gamma_m
+begin at A, and Gamma_m(A) is 0: without vertices and rounding that is the same. The passes are
 
 * stage 3: add Gamma_m(E) if E is lit; "the lit areas of objects and of the medium boundary";
-* stages 4 and 5: the planes before E, and at A the bounds (`realtime.methods.published.biri2006.crossings`).
+* stages 4 and 5: the planes before E, and at A the bounds
+  (`realtime.methods.published.biri2006.crossings`).
 
-Gamma_m is evaluated at the vertices of planes and surfaces, each with the x_n of its own ray, "computed on the fly".
-The ray of a vertex may miss the medium. The paper does not say what x_n is then; for a sphere x_n is the foot of its
-middle on a ray that touches it, so this is taken, which is continuous there. On the bounds, whose triangles must be
-small, Gamma is that of the point itself.
+Gamma_m is evaluated at the vertices of planes and surfaces, each with the x_n of its own ray,
+"computed on the fly". The ray of a vertex may miss the medium. The paper does not say what x_n is
+then; for a sphere x_n is the foot of its middle on a ray that touches it, so this is taken, which
+is continuous there. On the bounds, whose triangles must be small, Gamma is that of the point
+itself.
 
-The exact form, ``media=exact``, has no Gamma beyond the medium: there it begins at A and keeps its value from F on,
-with kinks at the bounds that no vertex knows of. Nodes that stand in for a polynomial begin at A, too.
+The exact form, ``media=exact``, has no Gamma beyond the medium: there it begins at A and keeps its
+value from F on, with kinks at the bounds that no vertex knows of. Nodes that stand in for a
+polynomial begin at A, too.
 
-The transmittance between the medium and the camera is a factor of the ray; the paper does not mention it.
+The transmittance between the medium and the camera is a factor of the ray; the
+paper does not mention it.
 """
 
 import math
@@ -73,15 +80,17 @@ def gamma_at(view: View, light: Light, point, *, kernel):
     offset = point - view.origin
     distance = dr.norm(offset)
     rays = view.medium.rays(view.origin, offset / distance)
-    airlight = view.medium.lit(rays, light, ray_geometry(rays.origin, rays.direction, light), kernel)
+    airlight = view.medium.lit(
+        rays, light, ray_geometry(rays.origin, rays.direction, light), kernel
+    )
     return airlight.radiance(airlight.gamma(distance))
 
 
 def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
-    `planes`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of occluders; `cone`: whether
-    planes of a cone are among them.
+    `planes`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of
+    occluders; `cone`: whether planes of a cone are among them.
     """
     further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
     occluders_rows, rows = rows, rows + further
@@ -91,7 +100,9 @@ def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, co
     row, end = lane % rows, lane // rows
     if further:
         row = dr.minimum(row, _last_row(planes, end // 2, occluders_rows, rows))
-    corner = Vector(*(dr.gather(Float, planes.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
+    corner = Vector(
+        *(dr.gather(Float, planes.ends, end * 3 + k) for k in range(3))
+    ) * RATIO ** Float(row)
     x_axis, y_axis, z_axis = (Vector(axis) for axis in index.axes)
     point = light.position + x_axis * corner.x + y_axis * corner.y + z_axis * corner.z
     values = gamma(point)
@@ -99,7 +110,10 @@ def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, co
     Color = type(values)
 
     def at(number, ray, x):
-        a, b = ([dr.gather(Float, planes.ends, (number * 2 + side) * 3 + k) for k in range(2)] for side in (0, 1))
+        a, b = (
+            [dr.gather(Float, planes.ends, (number * 2 + side) * 3 + k) for k in range(2)]
+            for side in (0, 1)
+        )
         # The crossing (x wx, x wy) in the plane of the projections of a and b.
         cross = dr.fma(a[0], b[1], -a[1] * b[0])
         p = x * dr.fma(ray.x, b[1], -ray.y * b[0]) / cross
@@ -113,8 +127,13 @@ def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, co
         near = RATIO ** Float(cell)
         far = RATIO * near
         p, q = u * (1 - t), u * t
-        corner = [dr.gather(Color, values, (number * 2 + side) * rows + cell + k) for side in (0, 1) for k in (0, 1)]
-        # Barycentric coordinates in the nearer triangle (a_k, b_k, a_k+1), else in (a_k+1, b_k, b_k+1).
+        corner = [
+            dr.gather(Color, values, (number * 2 + side) * rows + cell + k)
+            for side in (0, 1)
+            for k in (0, 1)
+        ]
+        # Barycentric coordinates in the nearer triangle (a_k, b_k, a_k+1),
+        # else in (a_k+1, b_k, b_k+1).
         of_b = q / near
         of_a_far = (p - near * (1 - of_b)) / (far - near)
         nearer = corner[0] * (1 - of_b - of_a_far) + corner[2] * of_b + corner[1] * of_a_far
@@ -130,22 +149,28 @@ def _last_row(planes: PaperPlanes, plane, rows: int, rows_of_cone: int):
     """Return the last row of planes: those of a cone begin where no occluder is."""
     Float = type(planes.index.distance)
     first = [dr.gather(Float, planes.ends, plane * 6 + k) for k in range(3)]
-    of_cone = sum(dr.square(part) for part in first) < dr.square(10 * NEARNESS * planes.index.distance)
+    of_cone = sum(dr.square(part) for part in first) < dr.square(
+        10 * NEARNESS * planes.index.distance
+    )
     return dr.select(of_cone, mi.UInt32(rows_of_cone - 1), mi.UInt32(rows - 1))
 
 
 def surface_gamma(triangle, gamma: Gamma, otherwise):
-    """Return Gamma at visible triangles, interpolated between their vertices, or what it is where none is seen."""
+    """Return Gamma at visible triangles, interpolated between their vertices, or what
+    it is where none is seen.
+    """
     corners, weights, seen = triangle
-    total = sum(dr.select(seen, weight, 0) * gamma(corner) for corner, weight in zip(corners, weights))
+    total = sum(
+        dr.select(seen, weight, 0) * gamma(corner) for corner, weight in zip(corners, weights)
+    )
     return dr.select(seen, total, otherwise)
 
 
 def visible_triangle(view: View):
     """Return the triangles that the rays of a view hit first.
 
-    Returns `corners`: three positions [m]; `weights`: barycentric coordinates of the hit in them; `seen`: whether a
-    triangle is hit.
+    Returns `corners`: three positions [m]; `weights`: barycentric coordinates of the hit in them;
+    `seen`: whether a triangle is hit.
     """
     ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
     hit = view.scene.ray_intersect_preliminary(ray, coherent=True)
@@ -153,7 +178,10 @@ def visible_triangle(view: View):
     seen = hit.is_valid() & hit.shape.is_mesh()
     mesh = dr.select(seen, mesh, dr.zeros(mi.MeshPtr))
     face = mesh.face_indices(hit.prim_index, seen)
-    corners = [type(view.direction)(mesh.vertex_position(vertex, seen)) for vertex in (face.x, face.y, face.z)]
+    corners = [
+        type(view.direction)(mesh.vertex_position(vertex, seen))
+        for vertex in (face.x, face.y, face.z)
+    ]
     Float = type(view.direction.x)
     u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
     return corners, (1 - u - v, u, v), seen
@@ -166,7 +194,8 @@ def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
     """
     if not medium.clear or not all(light.w for light in lights):
         raise InputError(
-            "evaluation=vertex: needs bounded media in vacuum, and lights that have a place; use evaluation=pixel"
+            "evaluation=vertex: needs bounded media in vacuum, and lights that have a place; use "
+            "evaluation=pixel"
         )
 
 
@@ -184,9 +213,10 @@ def sum_in_media(
 ):
     """Return the radiance of one light in all bounded media, with Gamma at vertices [W/(m^2 sr)].
 
-    `view`, `media`: the frame, and its rays in the media, with the light; `planes`, `rays`: the planes and the rays;
-    `rows`, `cone`: see `realtime.methods.published.biri2006.mesh.mesh_gamma`; `order`, `buffer`: see
-    `realtime.methods.published.biri2006.crossings.sum_crossings`; `start`: what is in the buffer before, or 0.
+    `view`, `media`: the frame, and its rays in the media, with the light; `planes`, `rays`: the
+    planes and the rays; `rows`, `cone`: see `realtime.methods.published.biri2006.mesh.mesh_gamma`;
+    `order`, `buffer`: see `realtime.methods.published.biri2006.crossings.sum_crossings`; `start`:
+    what is in the buffer before, or 0.
     """
     triangle = visible_triangle(view)
     Color, total = type(view.medium.albedo), start
@@ -195,7 +225,9 @@ def sum_in_media(
         end = dr.minimum(piece.end, view.distance)
         meets = dr.isfinite(piece.begin) & (end > piece.begin)
         begin, end = dr.select(meets, piece.begin, 0), dr.select(meets, end, 0)
-        factor = dr.select(meets, Color(*(dr.exp(-dr.select(meets, depth, 0)) for depth in piece.before)), 0)
+        factor = dr.select(
+            meets, Color(*(dr.exp(-dr.select(meets, depth, 0)) for depth in piece.before)), 0
+        )
         own = replace(media, pieces=(_alone(media, piece, begin),))
 
         def at(x, own=own, factor=factor, meets=meets):
@@ -217,12 +249,16 @@ def sum_in_media(
 
         entry = Entry(begin, at(begin))
         gammas = at_plane, at_end
-        total, _ = sum_crossings(planes, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry)
+        total, _ = sum_crossings(
+            planes, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry
+        )
     return total
 
 
 def _alone(media: BoundedRays, piece: Piece, begin) -> Piece:
-    """Return a piece without what absorbs before it; the published forms continue it without end."""
+    """Return a piece without what absorbs before it; the published forms
+    continue it without end.
+    """
     none = tuple(type(begin)(0) for _ in piece.before)
     end = piece.end if not isinstance(media, ConstantRays) else type(begin)(dr.inf)
     return replace(piece, begin=begin, end=end, before=none)

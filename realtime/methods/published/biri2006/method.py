@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow planes as published: Gamma on every plane, added or subtracted.
 
-With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments [a_i, b_i]
-has the airlight
+With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments
+[a_i, b_i] has the airlight
 
     L = sum_i Gamma(b_i) - Gamma(a_i)                                                      (section 4.2).
 
-The paper evaluates Gamma on every plane, with a stencil buffer to leave out planes that are themselves
-in shadow. `order` chooses how that is decided:
+The paper evaluates Gamma on every plane, with a stencil buffer to leave out planes that are
+themselves in shadow. `order` chooses how that is decided:
 
-* `paper` draws all planes in one order, towards the camera by the cosine between the axis from light to
-  camera and the middle of the edge (5.1.4), with the stencil rule of 5.1.5. (Section 5 has the front
-  facing planes increment the stencil, section 5.1.5 has the back facing ones add: the latter is right.)
+* `paper` draws all planes in one order, towards the camera by the cosine between the axis from
+  light to camera and the middle of the edge (5.1.4), with the stencil rule of 5.1.5. (Section 5 has
+  the front facing planes increment the stencil, section 5.1.5 has the back facing ones add: the
+  latter is right.)
 * `none` counts every plane: the artefact of Fig. 4.
-* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. That integrates each
-  lit segment; here its ends are two Gammas, whose difference loses digits where a segment is short.
+* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. That integrates
+  each lit segment; here its ends are two Gammas, whose difference loses digits where a segment is
+  short.
 
 Each of the other parameters adds one thing that the paper has: a polynomial comes with the kernel
 `taylor`.
@@ -54,13 +56,14 @@ from airlight.realtime.scene.read_scene import Scene
 class ShadowPlanes2006(Method):
     """The airlight between shadow planes, as published.
 
-    Valid for all lights and occluders that are triangle meshes; occluders that are not closed are right with
-    order=exact. With buffer=8bit the in-scattered radiance is what the buffer holds less the lit surfaces.
+    Valid for all lights and occluders that are triangle meshes; occluders that are not closed are
+    right with order=exact. With buffer=8bit the in-scattered radiance is what the buffer holds less
+    the lit surfaces.
 
     References
     ----------
-    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
-    WSCG 14.
+    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric
+    shadows*, Journal of WSCG 14.
     """
 
     name = "shadow-planes-2006"
@@ -70,45 +73,56 @@ class ShadowPlanes2006(Method):
     provides_visibility = True
 
     order: str = parameter(
-        "paper", "how shadow within shadow is decided, see below", choices=("paper", "none", "exact")
+        "paper",
+        "how shadow within shadow is decided, see below",
+        choices=("paper", "none", "exact"),
     )
     evaluation: str = parameter(
         "pixel",
-        "Gamma at every crossing, or at the vertices of a mesh of each plane and of the surfaces, interpolated, as "
+        "Gamma at every crossing, or at the vertices of a mesh of each plane and of the surfaces, "
+        "interpolated, as "
         "published",
         choices=("pixel", "vertex"),
     )
     buffer: str = parameter(
         "float",
-        "the paper's frame buffer: 255 steps up to `white` for surfaces and all lights, rounded and clamped after each "
+        "the paper's frame buffer: 255 steps up to `white` for surfaces and all lights, rounded "
+        "and clamped after each "
         "pass",
         choices=("float", "8bit"),
     )
     white: float = parameter(
-        1.0, "the radiance that fills the 8-bit buffer; brighter values are cut off", above=0, unit="W/(m^2 sr)"
+        1.0,
+        "the radiance that fills the 8-bit buffer; brighter values are cut off",
+        above=0,
+        unit="W/(m^2 sr)",
     )
     rows: int = parameter(
         16,
-        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond the last Gamma is "
+        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond the "
+        "last Gamma is "
         "constant",
         least=2,
     )
     ambient: float = parameter(
         0.0,
-        "radiance of a constant light field in the medium, the paper's stand-in for multiple scattering, which adds "
+        "radiance of a constant light field in the medium, the paper's stand-in for multiple "
+        "scattering, which adds "
         "albedo ambient (1 - exp(-sigma_t x)); the reference has none",
         least=0,
         unit="W/(m^2 sr)",
     )
     media: str = parameter(
         "exact",
-        "bounded media: the true depth on both segments, or the constant R of section 4.2 as meant or as printed, by "
+        "bounded media: the true depth on both segments, or the constant R of section 4.2 as meant "
+        "or as printed, by "
         "the polynomial of the kernel where it has one",
         choices=FORMS,
     )
     cone: int = parameter(
         0,
-        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, and planes bound no "
+        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, "
+        "and planes bound no "
         "light",
         least=3,
         most=4096,
@@ -147,7 +161,9 @@ class ShadowPlanes2006(Method):
             check_vertices(scene.medium, scene.lights)
 
     def airlight(self, view, light, state, kernel):
-        """Return the airlight of every ray between shadow planes, and whether the light reaches the visible surface."""
+        """Return the airlight of every ray between shadow planes, and whether the light
+        reaches the visible surface.
+        """
         if state is None:
             rays = self._lit(view, light, kernel)
             return rays.radiance(rays.gamma(view.distance)), True
@@ -166,7 +182,11 @@ class ShadowPlanes2006(Method):
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
-        return ("buffer", {"buffer": "float"}), ("resolution", {"evaluation": "pixel"}), ("order", {"order": "exact"})
+        return (
+            ("buffer", {"buffer": "float"}),
+            ("resolution", {"evaluation": "pixel"}),
+            ("order", {"order": "exact"}),
+        )
 
     def _lit(self, view: View, light: Light, kernel) -> LitRays:
         """Return the rays with one light, in bounded media by the form that is asked for."""
@@ -190,13 +210,16 @@ class ShadowPlanes2006(Method):
                 rays = ray_planes(planes.index, view.aim, view.distance)
                 reached = reaches(planes.index, rays, view.distance)
             # The lit surfaces are drawn first.
-            surface = Color(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
+            surface = (
+                Color(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
+            )
             surfaces += surface
             total = buffer.stored(total + surface)
             # Ambient fog belongs to no light, and is drawn once.
             if number == 0 and self.ambient:
                 total = buffer.stored(total + self._ambient_fog(view))
-            # The airlight: up to the surfaces where nothing casts a shadow, otherwise plane after plane.
+            # The airlight: up to the surfaces where nothing casts a shadow,
+            # otherwise plane after plane.
             if planes is None:
                 total = buffer.stored(total + self.airlight(view, light, None, kernel)[0])
             else:
@@ -204,8 +227,12 @@ class ShadowPlanes2006(Method):
             lit.append(reached)
         return Layers(total - surfaces, tuple(lit))
 
-    def _drawn(self, view: View, light: Light, planes: PaperPlanes, kernel, *, buffer=None, start=None):
-        """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
+    def _drawn(
+        self, view: View, light: Light, planes: PaperPlanes, kernel, *, buffer=None, start=None
+    ):
+        """Add up the Gammas of one light, in a buffer or not, and say
+        whether it reaches the surface.
+        """
         index = planes.index
         rays = ray_planes(index, view.aim, view.distance)
         # Planes take the place of a cone whose intensity does not fall within it.
@@ -229,10 +256,14 @@ class ShadowPlanes2006(Method):
         if self.order == "exact" and self.evaluation == "pixel" and buffer is None:
             return _differences(view, planes, rays, airlight)
         gammas = self._gammas(view, planes, airlight, cone=cone)
-        return sum_crossings(planes, rays, view.distance, gammas, order=self.order, buffer=buffer, start=start)
+        return sum_crossings(
+            planes, rays, view.distance, gammas, order=self.order, buffer=buffer, start=start
+        )
 
     def _gammas(self, view: View, planes: PaperPlanes, airlight: LitRays, *, cone: bool):
-        """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
+        """Return the functions that give the radiance of Gamma at a
+        crossing, and at the surface.
+        """
 
         def at(x):
             return airlight.radiance(airlight.gamma(x))
@@ -247,19 +278,25 @@ class ShadowPlanes2006(Method):
 
 
 def _differences(view: View, planes: PaperPlanes, rays: RayPlanes, airlight: LitRays):
-    """Sum the differences of Gamma over the lit segments of one light, whatever the order of the list."""
+    """Sum the differences of Gamma over the lit segments of one light,
+    whatever the order of the list.
+    """
 
     def difference(a, b):
         return airlight.gamma(b) - airlight.gamma(a)
 
     zero = airlight.nothing(dr.width(view.distance))
-    total, reached = sum_lit_intervals(planes.index, rays, airlight.segment(view.distance), difference, zero)
+    total, reached = sum_lit_intervals(
+        planes.index, rays, airlight.segment(view.distance), difference, zero
+    )
     return airlight.radiance(total), reached
 
 
 @dataclass(frozen=True)
 class PaperPreparation:
-    """The occluders of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
+    """The occluders of a scene; called with the scene as it is now, returns the
+    shadow planes of its lights.
+    """
 
     occluders: Occluders
     cone: int  #: edges of the cone of a spot; 0: no planes for it
@@ -267,12 +304,17 @@ class PaperPreparation:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Occluders that the planes count wrong in a paper's order; the exact order counts all right."""
+        """Occluders that the planes count wrong in a paper's order; the
+        exact order counts all right.
+        """
         return () if self.order == "exact" else tuple(self.occluders.warnings)
 
     def __call__(self, scene: Scene) -> tuple[PaperPlanes, ...]:
         """Return the planes of every light of a scene."""
-        occluders, camera = with_positions(self.occluders, scene.positions), read_camera(scene.camera)
+        occluders, camera = (
+            with_positions(self.occluders, scene.positions),
+            read_camera(scene.camera),
+        )
         types, states = types_of(type(scene.camera.origin.x)), []
         for light in scene.lights:
             position, shape, ring = host_position(light), scene.source_shape(light), None

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shadow planes of one light as the paper draws them: in its order, with edges to mesh, and about a spot.
+"""The shadow planes of one light as the paper draws them: in its order, with edges
+to mesh, and about a spot.
 
-**The order** (section 5.1.4). Planes come towards the camera by the cosine of the angle at the light
-between the camera and the middle of their edge, the least first. For a light at infinity the distance c
-of the middle from the axis takes the place of that angle: cos psi = 1 - c^2/(2 D^2) + ..., so -c has the
-order of the cosine.
+**The order** (section 5.1.4). Planes come towards the camera by the cosine of the angle at the
+light between the camera and the middle of their edge, the least first. For a light at infinity the
+distance c of the middle from the axis takes the place of that angle: cos psi = 1 - c^2/(2 D^2) +
+..., so -c has the order of the cosine.
 
 **A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32
-edges). Points outside the cone are in shadow, one layer deep. Its silhouette is a ring of edges about
-the axis, close to the light; the corners lie on the cone of the spot, so that the pyramid is inside it.
-As the light sees the ring it runs counter-clockwise, with no layer to its left and one to its right:
-every edge has the coefficient -1.
+edges). Points outside the cone are in shadow, one layer deep. Its silhouette is a ring of edges
+about the axis, close to the light; the corners lie on the cone of the spot, so that the pyramid is
+inside it. As the light sees the ring it runs counter-clockwise, with no layer to its left and one
+to its right: every edge has the coefficient -1.
 """
 
 from dataclasses import dataclass
@@ -34,8 +35,8 @@ from airlight.realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 
-#: Distance of the ring of a spot from the light over that of the camera. All light passes within the
-#: ring, so it must be nearer to the light than anything that the picture shows.
+#: Distance of the ring of a spot from the light over that of the camera. All light passes within
+#: the ring, so it must be nearer to the light than anything that the picture shows.
 NEARNESS = 1e-6
 
 
@@ -91,7 +92,9 @@ def paper_planes(
 
 
 def edge_centres(ends: Array, w: int) -> Array:
-    """Return by what planes are ordered towards the camera, of the ends (planes, 2, 3) of their edges [m]."""
+    """Return by what planes are ordered towards the camera, of the ends (planes,
+    2, 3) of their edges [m].
+    """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     if w:
         return middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
@@ -101,15 +104,17 @@ def edge_centres(ends: Array, w: int) -> Array:
 def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
     """Return unit vectors from a light through the corners of a ring on its cone, (sides, 3).
 
-    `axis`: of the spot, a unit vector; `cos_cutoff`: cosine of the half angle of the cone, in (0, 1); `sides`: edges of
-    the ring, 3 or more.
+    `axis`: of the spot, a unit vector; `cos_cutoff`: cosine of the half angle of the cone, in (0,
+    1); `sides`: edges of the ring, 3 or more.
     """
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     above = np.cross(across, axis)  # looking along the axis, `across` is to the right of it
     angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     sine = np.sqrt((1 - cos_cutoff) * (1 + cos_cutoff))
-    return cos_cutoff * axis + sine * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * above)
+    return cos_cutoff * axis + sine * (
+        np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * above
+    )
 
 
 def ring_edges(ring: Array) -> Array:
@@ -118,7 +123,10 @@ def ring_edges(ring: Array) -> Array:
 
 
 def is_outside(ring: Array, direction: Array) -> bool:
-    """Return whether a direction from the light, (3,), of any length [1], is outside the pyramid of a ring, (n, 3)."""
-    # The axis is on the other side of every plane of the pyramid: seen along it the ring runs counter-clockwise.
+    """Return whether a direction from the light, (3,), of any length [1], is outside the
+    pyramid of a ring, (n, 3).
+    """
+    # The axis is on the other side of every plane of the pyramid: seen along it the
+    # ring runs counter-clockwise.
     normals = np.cross(ring, np.roll(ring, -1, axis=0))
     return bool(np.any(normals @ direction > 0))

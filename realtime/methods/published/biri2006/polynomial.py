@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The polynomial in bounded media, section 4.2 of Biri 2006.
 
-In a bounded medium the paper puts a constant R for the distance r from the light in the exponent, and
-x - x_n for x, with x_n where the ray enters. `realtime.methods.published.biri2006.media` says what is
-printed and what follows; with a = sigma_t h, b = sigma_t R and the angle theta at the light,
+In a bounded medium the paper puts a constant R for the distance r from the light in the exponent,
+and x - x_n for x, with x_n where the ray enters. `realtime.methods.published.biri2006.media` says
+what is printed and what follows; with a = sigma_t h, b = sigma_t R and the angle theta at the
+light,
 
     J = exp(-sigma_t (foot + R - x_n))/h int f(theta) dtheta,
 
@@ -12,9 +13,9 @@ printed and what follows; with a = sigma_t h, b = sigma_t R and the angle theta 
 
 "What only involves a change of coefficients c", says the paper: the polynomial is as before, and
 
-* derived, e = exp(-a tan theta) solves e' = -a T' e with T = tan theta, T' = 1 + T^2. So (n + 1) T_{n+1}
-  = delta_{n0} + sum_k T_k T_{n-k}, T_0 = 0, and n e_n = -a sum_{k=1..n} k T_k e_{n-k}, e_0 = 1: the
-  series 1, -a, a^2/2, -a^3/6 - a/3, a^4/24 + a^2/3, ...
+* derived, e = exp(-a tan theta) solves e' = -a T' e with T = tan theta, T' = 1 + T^2. So (n + 1)
+  T_{n+1} = delta_{n0} + sum_k T_k T_{n-k}, T_0 = 0, and n e_n = -a sum_{k=1..n} k T_k e_{n-k},
+  e_0 = 1: the series 1, -a, a^2/2, -a^3/6 - a/3, a^4/24 + a^2/3, ...
 * printed, the coefficients of the medium without bounds, c_n(sigma_t, h), become c_n(sigma_t, R).
 """
 
@@ -51,7 +52,9 @@ class ConstantLeg:
 
 
 def polynomial_of(kernel: Kernel | None) -> Callable[..., Any] | None:
-    """Return the polynomial of a kernel in a bounded medium, as `bounded_taylor`; None where it is no polynomial."""
+    """Return the polynomial of a kernel in a bounded medium, as `bounded_taylor`; None
+    where it is no polynomial.
+    """
     if kernel is None or kernel.function not in (taylor, taylor_printed):
         return None
     degree = kernel.parameters["degree"]
@@ -71,16 +74,20 @@ def bounded_taylor(
 ):
     """Return the airlight integral of a bounded medium by the polynomial [1/m].
 
-    `printed`: whether the coefficients are those of the annex; `x0` and `x1` bound a segment of any length [m].
+    `printed`: whether the coefficients are those of the annex; `x0` and `x1` bound a
+    segment of any length [m].
 
-    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium. The paper
-    prints no coefficients for the derived exponent.
+    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the
+    medium. The paper prints no coefficients for the derived exponent.
     """
     if segment.printed:
-        coefficients = coefficients_of(segment.sigma_t * segment.distance, phase, degree, printed=printed)
+        coefficients = coefficients_of(
+            segment.sigma_t * segment.distance, phase, degree, printed=printed
+        )
     elif printed:
         raise InputError(
-            "kernel taylor-printed: the paper prints no coefficients for the exponent that section 4.2 must mean; use "
+            "kernel taylor-printed: the paper prints no coefficients for the exponent that section "
+            "4.2 must mean; use "
             "media=printed, or the kernel 'taylor'"
         )
     else:
@@ -89,7 +96,8 @@ def bounded_taylor(
         coefficients = series_product(series, phase_series(phase, degree, "taylor"), degree)
     depth = dr.fma(segment.sigma_t, geometry.foot, segment.depth)
     if segment.printed:
-        depth = dr.fma(segment.sigma_t, segment.distance, depth)  # e^-b, which the coefficients leave out
+        # e^-b, which the coefficients leave out
+        depth = dr.fma(segment.sigma_t, segment.distance, depth)
     return integral_of(geometry, x0, x1, light, coefficients) * dr.exp(-depth) / geometry.height
 
 
@@ -97,7 +105,9 @@ def tangent_series(a: Any, degree: int) -> list[Any]:
     """Return the coefficients of exp(-a tan theta) in powers of theta, up to a degree."""
     tangent = [0.0]
     for n in range(degree):
-        tangent.append((float(n == 0) + sum(tangent[k] * tangent[n - k] for k in range(n + 1))) / (n + 1))
+        tangent.append(
+            (float(n == 0) + sum(tangent[k] * tangent[n - k] for k in range(n + 1))) / (n + 1)
+        )
     series = [type(a)(1)]
     for n in range(1, degree + 1):
         series.append((-a / n) * sum((k * tangent[k]) * series[n - k] for k in range(1, n + 1)))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: numbers of a slab come from the disk only for the medium that they were made of: no image depends on what was
-rendered before."""
+"""Claim: numbers of a slab come from the disk only for the medium that they were made of: no image
+depends on what was rendered before."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: looked up, the grid of canonical transport gives what it was made of, and what lies outside is defined."""
+"""Claim: looked up, the grid of canonical transport gives what it was made of, and what
+lies outside is defined.
+"""
 
 import drjit as dr
 import numpy as np
@@ -14,7 +16,8 @@ from airlight.realtime.numerics.array_types import array_types
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 SIDES = (11, 7, 5, 13, 5)
-STREAMS, MODES = 8, 8  #: of the computation on both sides: what is tested here is what lies between entries
+#: of the computation on both sides: what is tested here is what lies between entries
+STREAMS, MODES = 8, 8
 
 
 def transport_at(albedo, t, d, mu, phi, mu_l, *, phase=PHASE, streams=STREAMS, modes=MODES):
@@ -40,7 +43,9 @@ def transport_at(albedo, t, d, mu, phi, mu_l, *, phase=PHASE, streams=STREAMS, m
 
 @pytest.fixture(scope="module")
 def transport(tmp_path_factory):
-    """Compute with few streams: the grid and what it is compared with err alike; read it from the cache, too."""
+    """Compute with few streams: the grid and what it is compared with err alike;
+    read it from the cache, too.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grid_module, "_STREAMS", ((np.inf, STREAMS),))
         patch.setattr(grid_module, "_MODES", MODES)
@@ -64,10 +69,15 @@ def values(look_up, number, t, d, mu, phi, mu_l):
     return np.array(results, dtype=np.float64)
 
 
-@pytest.mark.claim("clouds-look-up", tolerance="0.5 % of T and sigma: half precision of entries up to 8")
+@pytest.mark.claim(
+    "clouds-look-up", tolerance="0.5 % of T and sigma: half precision of entries up to 8"
+)
 def test_at_entries_look_ups_are_the_computation(look_up):
     t = coordinates.thicknesses(SIDES[0])[6]
-    d, mu = coordinates.depths(SIDES[1], t)[[1, 3, 5]], np.sin(np.pi * (np.array([2, 3, 10]) / 12 - 0.5))
+    d, mu = (
+        coordinates.depths(SIDES[1], t)[[1, 3, 5]],
+        np.sin(np.pi * (np.array([2, 3, 10]) / 12 - 0.5)),
+    )
     mu_l, phi = coordinates.suns(SIDES[2])[1:4], np.array([1, 5, 2]) * np.pi / 4
     exact = transport_at(ALBEDO, np.full(3, t), d, mu, phi, mu_l)
     for number in (0, 4, 7):

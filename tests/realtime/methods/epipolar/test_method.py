@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slices, their height maps, trees and samples, against brute force; frames against the reference and light volumes."""
+"""Slices, their height maps, trees and samples, against brute force; frames against the
+reference and light volumes.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -7,7 +9,12 @@ import pytest
 
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.methods.epipolar.min_max_tree import slice_heights
-from airlight.realtime.methods.epipolar.slices import image_slices, neighbour, pixel_number, slice_coordinate
+from airlight.realtime.methods.epipolar.slices import (
+    image_slices,
+    neighbour,
+    pixel_number,
+    slice_coordinate,
+)
 from airlight.realtime.methods.epipolar.walk import sum_lit_intervals
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.read_scene import read_scene
@@ -38,9 +45,18 @@ def read(position, *, kind="point", **changes):
     lamp = {"type": "point", "position": list(position), "intensity": 1.0}
     if kind == "spot":
         aim = mi.ScalarTransform4f().look_at(list(position), [0.1, 2.4, -0.9], [1, 0, 0])
-        lamp = {"type": "spot", "to_world": aim, "cutoff_angle": 37.0, "beam_width": 37.0, "intensity": 1.0}
+        lamp = {
+            "type": "spot",
+            "to_world": aim,
+            "cutoff_angle": 37.0,
+            "beam_width": 37.0,
+            "intensity": 1.0,
+        }
     sphere = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
-    floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]).scale(6.3)}
+    floor = {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().translate([0, 0, -1]).scale(6.3),
+    }
     scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": sphere, "floor": floor} | changes))
     scene["sensor"] = scene["sensor"] | {"to_world": look}
     return read_scene(mi.load_dict(scene))
@@ -69,8 +85,8 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
     assert np.array(point[0]) == pytest.approx(i, abs=1e-4)
     assert np.array_equal(np.array(pixel_number(slices, *point)), pixel)
     number = neighbour(slices, mi.Int32(slice_coordinate(slices, *point) + 0.5))
-    # No pixel is farther from the slice that stands for it than half a step between slices, except for the few in whose
-    # square the epipole lies.
+    # No pixel is farther from the slice that stands for it than half a step between slices, except
+    # for the few in whose square the epipole lies.
     across = vectors(slices.across)[np.array(number)]
     normal = np.cross(vectors(slices.towards), across)
     offset = np.abs(np.sum(vectors(direction) * normal, axis=1))
@@ -88,7 +104,8 @@ def height_maps(scene, size=32, count=24):
 
 
 def trees(heights):
-    with np.errstate(invalid="ignore"):  # the first place of a tree is never written, and may hold anything
+    # the first place of a tree is never written, and may hold anything
+    with np.errstate(invalid="ignore"):
         values = np.array(heights.tree).astype(float)
     return values.reshape(heights.slices.count, 2 * heights.leaves, 2)
 
@@ -117,7 +134,9 @@ def test_the_tree_holds_the_bounds(variant, kind):
 @pytest.mark.claim("tree-of-bounds", tolerance="4e-3 m: the distance of the points")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_lit_pieces_are_those_of_many_points(variant, kind):
-    """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
+    """A ray of the slice looked at point by point in float64: where is it, and what
+    does the map hold there?
+    """
     scene = read((0.4, 1.9, 1.9), kind=kind)
     heights = height_maps(scene, size=32)
     values, slices = samples_of(heights), heights.slices
@@ -134,7 +153,9 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
         begin, edges = x1 * 0, np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [-1.0, 0.0]]])
         edges = np.broadcast_to(edges, (count, 2, 2, 2))
     else:
-        chord = np.stack([np.array(coordinate, dtype=float) for coordinate in heights.chord], axis=1)[number]
+        chord = np.stack(
+            [np.array(coordinate, dtype=float) for coordinate in heights.chord], axis=1
+        )[number]
         edges, begin = chord.reshape(count, 1, 2, 2), x1 * 0
     total, inside_all = np.zeros(count), np.zeros(count)
     for edge in range(heights.edges):
@@ -156,16 +177,20 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
         has = inside.any(axis=1)
         begin = np.where(has, x[np.arange(count), inside.argmax(axis=1)], 0.0)
         x1 = np.where(has, x[np.arange(count), points - 1 - inside[:, ::-1].argmax(axis=1)], 0.0)
-    geometry = RayGeometry(mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None)
+    geometry = RayGeometry(
+        mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None
+    )
     zero = mi.Float(np.zeros(count))
     segment = mi.Float(begin), mi.Float(x1)
-    length = np.array(sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
+    length = np.array(
+        sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero)
+    )
     assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
     # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
     assert length == pytest.approx(total, abs=4e-3)
 
 
-# Frames --------------------------------------------------------------------------------------------------------------
+# Frames -------------------------------------------------------------------------------------------
 
 
 MAP = 256
@@ -175,7 +200,9 @@ CHANGES = {
     "spot": lambda: {"lamp": spot()},
     "colour, HG, two lights": lambda: {"fog": coloured_fog(), "second": lamp(-1, 1.4, 0.6)},
 }
-ALL = [pytest.param(change, marks=pytest.mark.slow) if "HG" in change else change for change in CHANGES]
+ALL = [
+    pytest.param(change, marks=pytest.mark.slow) if "HG" in change else change for change in CHANGES
+]
 
 
 def scene_with(change):
@@ -186,10 +213,15 @@ def render(scene, method, **parameters):
     return frame(scene, method, **parameters).airlight
 
 
-@pytest.mark.claim("tree-of-bounds", tolerance="a fifth of the shadows; 0.4 of the error with an eighth of the texel")
+@pytest.mark.claim(
+    "tree-of-bounds",
+    tolerance="a fifth of the shadows; 0.4 of the error with an eighth of the texel",
+)
 @pytest.mark.parametrize("change", ALL)
 def test_every_pixel_comes_to_the_reference_as_the_map_grows(variant, change):
-    """Where the map jumps a wall leans over one texel: the error falls as its size, as its root at grazing rays."""
+    """Where the map jumps a wall leans over one texel: the error falls as its size, as
+    its root at grazing rays.
+    """
     scene = scene_with(change)
     expected = reference_of(scene).airlight
     errors = [
@@ -224,21 +256,28 @@ def test_samples_converge_to_all_pixels(variant, change):
     expected = render(scene, "min-max", map=MAP, sampling="pixels", slices=1600)
     fine, coarse = (
         relative_rmse(render(scene, "min-max", map=MAP, **settings), expected)
-        for settings in ({"slices": 200, "samples": 256, "step": 1}, {"slices": 30, "samples": 32, "step": 16})
+        for settings in (
+            {"slices": 200, "samples": 256, "step": 1},
+            {"slices": 30, "samples": 32, "step": 16},
+        )
     )
     assert fine < max(0.25 * coarse, 1e-6)
-    # Measured 3.8e-3 at most: slices are half a pixel apart, and the mean of two is as wrong as the nearest.
+    # Measured 3.8e-3 at most: slices are half a pixel apart, and the mean of two is
+    # as wrong as the nearest.
     assert fine < 6e-3
 
 
 @pytest.mark.claim("a-lit-fraction")
 def test_no_pixel_is_brighter_than_without_shadows(variant):
-    """Lights in view and sharp phase functions: fractions of a rough estimate made an image 363 times too bright."""
+    """Lights in view and sharp phase functions: fractions of a rough estimate made an
+    image 363 times too bright.
+    """
     scene = read_scene(load_scene("random:427", (80, 60)).scene)
     image, bare = (
         np.asarray(render_frame(prepared(scene, configuration(method, None, {}))).airlight)
         for method in ("min-max", "unshadowed")
     )
-    # Sums over lit intervals and the whole ray are rounded differently, and in float32 by the quadrature's size.
+    # Sums over lit intervals and the whole ray are rounded differently, and in float32
+    # by the quadrature's size.
     assert (image <= bare * 1.01 + 1e-4 * bare.mean()).all()
     assert image.mean() < bare.mean()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Froxel fog: the same sums in plain NumPy, its limits, and its order, under lamps and area lights."""
+"""Froxel fog: the same sums in plain NumPy, its limits, and its order,
+under lamps and area lights.
+"""
 
 from types import SimpleNamespace
 
@@ -48,9 +50,13 @@ def hazy(sigma_t=(0.11, 0.37, 0.93)):
 
 
 def by_hand(scene, *, width, height, slices, far):
-    """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
+    """Do what the method does in NumPy, from the formulas of its
+    documentation; no shadows, no bounds.
+    """
     reference = read_reference(mi.load_dict(scene))
-    matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
+    matrix = np.array(
+        mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float
+    ).reshape(4, 4)
     origin, forward = matrix[:3, 3], matrix[:3, 2]
     half = np.tan(np.radians(0.5 * scene["sensor"]["fov"]))
     left, up = matrix[:3, 0] * half, matrix[:3, 1] * half * reference.height / reference.width
@@ -81,9 +87,12 @@ def by_hand(scene, *, width, height, slices, far):
                     source += strength * light.intensity * phase * np.exp(-sigma * r) / r**2
                 source *= albedo * sigma / (4 * np.pi)
                 length = (end - begin) * stretch
-                sums[k + 1, j, i] = sums[k, j, i] + kept * source * (1 - np.exp(-sigma * length)) / sigma
+                sums[k + 1, j, i] = (
+                    sums[k, j, i] + kept * source * (1 - np.exp(-sigma * length)) / sigma
+                )
                 kept *= np.exp(-sigma * length)
-    # Between the middles of columns and the ends of slices: rays that meet no surface end at the last slice.
+    # Between the middles of columns and the ends of slices: rays that meet no
+    # surface end at the last slice.
     image = np.zeros((reference.height, reference.width, 3))
     for row in range(reference.height):
         for column in range(reference.width):
@@ -99,14 +108,23 @@ def by_hand(scene, *, width, height, slices, far):
 @pytest.mark.claim("froxel-sums", tolerance="1e-6 relative: positions are float32")
 def test_the_sums_are_those_of_plain_numpy(variant):
     scene = tiny_scene(
-        size=(13, 11), ball=None, floor=None, fog=hazy(), lamp=lamp_behind(), spot=spot(cutoff=41.0, beam=12.0)
+        size=(13, 11),
+        ball=None,
+        floor=None,
+        fog=hazy(),
+        lamp=lamp_behind(),
+        spot=spot(cutoff=41.0, beam=12.0),
     )
     np.testing.assert_allclose(
-        frame(scene, "froxel-fog", precision="double", **COARSE).airlight, by_hand(scene, **COARSE), rtol=2e-6
+        frame(scene, "froxel-fog", precision="double", **COARSE).airlight,
+        by_hand(scene, **COARSE),
+        rtol=2e-6,
     )
 
 
-@pytest.mark.claim("froxel-slice", tolerance="1e-12 relative: the closed form, whatever the number of slices")
+@pytest.mark.claim(
+    "froxel-slice", tolerance="1e-12 relative: the closed form, whatever the number of slices"
+)
 @pytest.mark.parametrize("sigma_t", [1e-9, 0.003, 0.9, 37.0])
 @pytest.mark.parametrize("slices", [1, 5])
 def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, slices):
@@ -115,7 +133,9 @@ def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, sl
     medium = Homogeneous((mi.Float64(sigma_t),), mi.Color3d(1), Isotropic())
     view = SimpleNamespace(medium=medium, distance=mi.Float64(0), origin=scene.camera.origin)
     light = dr.full(mi.Color3d, 1.7, 2 * slices)
-    sums = np.array(accumulated(view, grid, column_rays(view, grid), light)).reshape(slices + 1, 2, 4)
+    sums = np.array(accumulated(view, grid, column_rays(view, grid), light)).reshape(
+        slices + 1, 2, 4
+    )
     x = np.array(grid.depth(dr.arange(mi.Float64, slices + 1) / slices))[:, None]
     x = x * np.array(dr.norm(grid.column_ray(dr.arange(mi.UInt32, 2))))
     closed = 1.7 * -np.expm1(-sigma_t * x) / sigma_t
@@ -124,13 +144,21 @@ def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, sl
 
 
 SMOOTH = {
-    "one medium": lambda: tiny_scene(size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy((0.31, 0.31, 0.31))),
-    "three extinctions": lambda: tiny_scene(size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy()),
-    "spot": lambda: tiny_scene(size=(24, 18), lamp=None, spot=spot(cutoff=60.0, beam=5.0), ball=None),
+    "one medium": lambda: tiny_scene(
+        size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy((0.31, 0.31, 0.31))
+    ),
+    "three extinctions": lambda: tiny_scene(
+        size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy()
+    ),
+    "spot": lambda: tiny_scene(
+        size=(24, 18), lamp=None, spot=spot(cutoff=60.0, beam=5.0), ball=None
+    ),
     "sphere of fog": lambda: clear_scene(
         size=(24, 18),
         lamp=lamp_behind(),
-        fog=bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.9}, 0.9, (0.9, 0.4, 0.3)),
+        fog=bounded_medium(
+            {"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.9}, 0.9, (0.9, 0.4, 0.3)
+        ),
     ),
     "sun": lambda: sunny(size=(24, 18), brick=brick(), pearl=pearl()),
 }
@@ -139,26 +167,33 @@ OUTLINED = ("spot", "sphere of fog", "sun")
 
 @pytest.mark.claim(
     "froxel-limit",
-    tolerance="relative RMSE 2.5e-3, the light from beyond the grid; order 0.5 at the outline of a medium or a cone",
+    tolerance=(
+        "relative RMSE 2.5e-3, the light from beyond the grid; order 0.5 at the outline of a "
+        "medium or a cone"
+    ),
 )
 @pytest.mark.parametrize("name", SMOOTH)
 def test_fine_grids_reach_the_integral_of_unshadowed_light(variant, name):
     """Middles of froxels and lines between them err as the square of their size.
 
-    An outline that columns cut is wrong in a strip as wide as a column: by all of its light in n^-1 of the pixels, so
-    that the RMSE falls as n^-1/2 at least.
+    An outline that columns cut is wrong in a strip as wide as a column: by all of its light in n^-1
+    of the pixels, so that the RMSE falls as n^-1/2 at least.
     """
     scene = SMOOTH[name]()
     exact = frame(scene, "unshadowed").airlight
     coarse, fine = (
-        relative_rmse(frame(scene, "froxel-fog", width=4 * n, height=3 * n, slices=4 * n).airlight, exact)
+        relative_rmse(
+            frame(scene, "froxel-fog", width=4 * n, height=3 * n, slices=4 * n).airlight, exact
+        )
         for n in (8, 24)
     )
     assert fine < 3**-0.5 * coarse
     assert fine < 2.5e-3 or name in OUTLINED
 
 
-@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from three grids, a factor of four apart")
+@pytest.mark.claim(
+    "froxel-order", tolerance="at least 0.7 from three grids, a factor of four apart"
+)
 def test_the_error_falls_with_the_grid_in_order(variant):
     scene = tiny_scene(size=(32, 24), lamp=lamp_above())
     sizes = np.array([8, 16, 32])
@@ -181,13 +216,17 @@ def test_shadows_of_the_sun_are_there(variant):
 
 
 @pytest.mark.slow
-@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
+@pytest.mark.claim(
+    "froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart"
+)
 def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
     scene = read_scene(load_scene("penumbra-plane", (80, 60)).scene)
     exact = render(scene, "shadow-planes", points=4).airlight
     sizes = np.array([8, 16, 32, 64])
     errors = [
-        relative_rmse(render(scene, "froxel-fog", points=4, width=2 * n, height=n, slices=n).airlight, exact)
+        relative_rmse(
+            render(scene, "froxel-fog", points=4, width=2 * n, height=n, slices=n).airlight, exact
+        )
         for n in sizes.tolist()
     ]
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of light volumes, walked and drawn, against the float64 twin with the very map that they used; their walls."""
+"""Frames of light volumes, walked and drawn, against the float64 twin with the very map
+that they used; their walls.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -40,19 +42,26 @@ from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 #: One of a kind; beside the view the faces of the cube that a tile passes count.
 FEW = ("light beside the view", "light in view", "fence", "spot in view")
 
-#: Fraction of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
-#: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
+#: Fraction of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim
+#: of a cone, some millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft
+#: one what is lit is as dim.
 FRACTIONS = {"soft spot": 0.994, "three lights": 0.998}
 
 
 @pytest.mark.claim("exact-for-its-map", tolerance="float32: 1e-5 of the largest")
 @pytest.mark.parametrize("walls", ["slanted", "upright"])
-@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in FEW else pytest.mark.slow) for name in SCENES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in FEW else pytest.mark.slow) for name in SCENES]
+)
 def test_frames_are_exact_with_respect_to_the_map(variant, name, walls):
-    """Walked and drawn; with walls over a texel, or with those that the rays of the map found, which are walked."""
+    """Walked and drawn; with walls over a texel, or with those that the rays of the map
+    found, which are walked.
+    """
     loaded, size = loaded_scene(name), SCENES[name][1]
     frames = (
-        render_both(loaded, "single", map=size) if walls == "slanted" else [render(loaded, "light-volumes", map=size)]
+        render_both(loaded, "single", map=size)
+        if walls == "slanted"
+        else [render(loaded, "light-volumes", map=size)]
     )
     wanted = twin_of(loaded, frames[0], size, "single", walls=walls)
     assert np.max(wanted) > 5e-4
@@ -81,8 +90,13 @@ def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, method):
     origin, target, up, light = (
         np.roll(vector, axis) for vector in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5))
     )
-    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
-    changes = camera(origin, target, size=GRID, up=up) | {"lamp": lamp(*light), "ball": speck, "floor": None}
+    # falls between the rays of the map
+    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}
+    changes = camera(origin, target, size=GRID, up=up) | {
+        "lamp": lamp(*light),
+        "ball": speck,
+        "floor": None,
+    }
     loaded = loaded_scene(**changes)
     wanted = render(loaded, "unshadowed").airlight
     # Three faces have nodes of their own: within the kernel's 5e-6.
@@ -90,24 +104,33 @@ def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, method):
 
 
 HEIGHTS = (0.0, 0.15, 0.4, 0.7, 1.9)  # inverse depths [1/m]; few, so that many texels are flat
-VIEWS = (((0.2, -4.1, 1.3), (0.1, 0.0, 0.6)), ((0.31, -1.2, 1.13), (0.9, 0.6, 1.7)), ((1.3, 0.4, 2.1), (5, 4, 2.7)))
+VIEWS = (
+    ((0.2, -4.1, 1.3), (0.1, 0.0, 0.6)),
+    ((0.31, -1.2, 1.13), (0.9, 0.6, 1.7)),
+    ((1.3, 0.4, 2.1), (5, 4, 2.7)),
+)
 SMALL = 4  # texels
 
 
 @cache
 def renderers(kind, view):
     """Return a scene, its renderers in float64, and a map to replace the values of."""
-    changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
+    changes = camera(*VIEWS[view], size=(13, 9)) | (
+        {"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {}
+    )
     loaded = loaded_scene(**changes)
     both = [
-        renderer(loaded, method, precision="double", map=SMALL, **parameters) for method, parameters in VOLUMES.items()
+        renderer(loaded, method, precision="double", map=SMALL, **parameters)
+        for method, parameters in VOLUMES.items()
     ]
     scene = both[0].scene
     return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
 
 
 def vertices_of(shadow_map):
-    """Return for each corner of the texels the number of its vertex: faces of a cube meet in the same ones."""
+    """Return for each corner of the texels the number of its vertex: faces of a
+    cube meet in the same ones.
+    """
     size = shadow_map.size
     face, row, column = np.indices((shadow_map.faces, size + 1, size + 1)).reshape(3, -1)
     place = np.stack([np.where(face % 2, -size, size), 2 * column - size, 2 * row - size])
@@ -119,7 +142,9 @@ def vertices_of(shadow_map):
 
 def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
-    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
+    length = np.array(
+        inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights)))))
+    )
     with np.errstate(divide="ignore"):
         return replace(shadow_map, distance=mi.Float64(length / heights))
 
@@ -158,17 +183,25 @@ def any_walls(rng, faces, fraction):
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
 def test_any_walls_in_any_map(variant, kind, data):
-    """Wherever walls stand, on any number of a texel's sides, between heights that jump or do not."""
+    """Wherever walls stand, on any number of a texel's sides, between
+    heights that jump or do not.
+    """
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     # Heights of no two corners are the same, so that no ray lies in the height field over a length.
-    heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
+    heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[
+        vertex
+    ]
     drawn_map = with_heights(shadow_map, heights)
     walls = any_walls(rng, drawn_map.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
-    field = walled_heights(inverse_depth_field(drawn_map), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
+    field = walled_heights(
+        inverse_depth_field(drawn_map), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls))
+    )
     walked = image_frame(walk, run_stages(walk, ((field,),)))
-    wanted = oracle_airlight(read_reference(loaded), [drawn_map], distance=walked.distance, walls=[walls])
+    wanted = oracle_airlight(
+        read_reference(loaded), [drawn_map], distance=walked.distance, walls=[walls]
+    )
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
@@ -176,19 +209,22 @@ def test_any_walls_in_any_map(variant, kind, data):
 @pytest.mark.claim("enclosed-light")
 @pytest.mark.parametrize(("shape", "kind"), [("sphere", "point"), ("cube", "spot")])
 def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):
-    place = mi.ScalarTransform4f().translate([0.11, 0.13, 0.72]).rotate([0.3, 1, 0.2], 17).scale(0.39)
+    place = (
+        mi.ScalarTransform4f().translate([0.11, 0.13, 0.72]).rotate([0.3, 1, 0.2], 17).scale(0.39)
+    )
     inside = [0.173, 0.052, 0.781]
     light = {"to_world": mi.ScalarTransform4f().look_at(inside, [0, 1, 2], [1, 0, 0])}
     lights = {"lamp": lamp(*inside) if kind == "point" else spot() | light}
     loaded = loaded_scene(ball={"type": shape, "to_world": place}, **lights)
     assert np.max(render(loaded, "unshadowed").airlight) > 0.01
-    # Before a wall that the camera sees, 0.3 m from the light and 3 m away, rounding leaves 1e-6 m at most.
+    # Before a wall that the camera sees, 0.3 m from the light and 3 m away,
+    # rounding leaves 1e-6 m at most.
     at_wall = 0.31 * 9 / (4 * np.pi * 0.3**2)
     for frame in render_both(loaded, map=32):
         assert np.max(np.abs(frame.airlight)) < 1e-6 * at_wall
 
 
-# Walls between the samples of a map: where they stand, and what they are worth ---------------------------------------
+# Walls between the samples of a map: where they stand, and what they are worth --------------------
 
 
 LAMP = (0.13, -0.07, 2.9)
@@ -196,19 +232,24 @@ FLAT = {"ball": None, "lamp": lamp(*LAMP)}
 
 
 def walled(loaded, size, precision="single"):
-    """Return the heights of a scene's first light with walls, and the walls' places by face, row, column and side."""
+    """Return the heights of a scene's first light with walls, and the walls' places by
+    face, row, column and side.
+    """
     scene = read_scene(loaded, precision)
     heights = inverse_depth_field(cast_shadow_map(scene.geometry, scene.lights[0], size))
     walled_field = with_walls(heights, scene.geometry, scene.lights[0])
     number = (
-        np.array(walled_field.walls).reshape(heights.faces, size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32)
+        np.array(walled_field.walls).reshape(heights.faces, size, size, 1)
+        >> np.arange(0, 32, 8, dtype=np.uint32)
         & 0xFF
     )
     return walled_field, np.where(number > 0, (number - 0.5) / PLACES, np.nan)
 
 
 def plate(x, y, z=1.1, half=0.6):
-    """Return a level square whose sides have the given distances from the lamp's axis on the low side."""
+    """Return a level square whose sides have the given distances from the
+    lamp's axis on the low side.
+    """
     place = mi.ScalarTransform4f().translate([LAMP[0] + x + half, LAMP[1] + y + half, z])
     return {"type": "rectangle", "to_world": place.scale([half, half, 1])}
 
@@ -225,7 +266,8 @@ def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
         for edge in (low, low + 2 * half):
             texel = 0.5 * size * (edge / depth + 1)
             column = int(texel)
-            # Sides that the edge cuts across: the bottoms of a column, or the left sides of a row, along the plate.
+            # Sides that the edge cuts across: the bottoms of a column, or the left sides
+            # of a row, along the plate.
             line = below[:, column, 0] if across == 0 else below[column, :, 2]
             other = (y, x)[across]
             first, last = (int(0.5 * size * (end / depth + 1)) for end in (other, other + 2 * half))
@@ -236,13 +278,16 @@ def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
 
 @pytest.mark.claim("upright-walls")
 def test_slopes_are_no_walls(variant):
-    """A floor that rays meet at a grazing angle is as steep as a jump between two samples, and bends nowhere."""
+    """A floor that rays meet at a grazing angle is as steep as a jump between two
+    samples, and bends nowhere.
+    """
     ground = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([400, 400, 1])}
     heights, places = walled(loaded_scene(ball=None, floor=ground, lamp=lamp(*LAMP)), 32)
     s00, s10, s01, s11 = np.array(heights.texels).reshape(-1, 4).T
     steep = np.abs(s01 - s00) > _JUMP * np.maximum(s00, s01)
     assert np.sum(steep) > 100
-    # The rim of the floor is a jump; it lies within a texel of the horizon, whose samples have no height.
+    # The rim of the floor is a jump; it lies within a texel of the horizon,
+    # whose samples have no height.
     assert np.all(np.isnan(places.reshape(-1, 4)[np.min([s00, s10, s01, s11], axis=0) > 0]))
 
 
@@ -260,14 +305,18 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     assert error("upright") < 0.15 * error("slanted")
 
 
-# Refusals and memory -------------------------------------------------------------------------------------------------
+# Refusals and memory ------------------------------------------------------------------------------
 
 
 def test_a_mesh_is_for_one_homogeneous_medium_without_bounds(variant):
-    smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
+    smoke = bounded_medium(
+        {"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7)
+    )
     loaded = mi.load_dict(clear_scene(cloud=smoke))
     for other in (loaded, load_scene("street", (4, 3)).scene):  # height fog
-        with pytest.raises(InputError, match=r"light-volumes-2010: expected one homog.*use light-volumes"):
+        with pytest.raises(
+            InputError, match=r"light-volumes-2010: expected one homog.*use light-volumes"
+        ):
             renderer(other, "light-volumes-2010")
     assert np.max(render(loaded, "light-volumes", map=16).airlight) > 0
 
@@ -282,7 +331,9 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, method):
 
     loaded = loaded_scene(size=(4, 4))
     monkeypatch.setattr(
-        airlight.realtime.memory, "usable_memory", lambda: airlight.realtime.memory.Memory(10**9, "this machine has")
+        airlight.realtime.memory,
+        "usable_memory",
+        lambda: airlight.realtime.memory.Memory(10**9, "this machine has"),
     )
     with monkeypatch.context() as patch:
         patch.setattr(f"{METHODS[method].__module__}.cast_shadow_map", never)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The published light volumes: closed meshes without gaps, whose crossings count how often they surround the eye."""
+"""The published light volumes: closed meshes without gaps, whose crossings count how
+often they surround the eye.
+"""
 
 from collections import Counter
 from typing import Any
@@ -28,11 +30,13 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.scenes import spot, tiny_scene
 
-# Tessellation --------------------------------------------------------------------------------------------------------
+# Tessellation -------------------------------------------------------------------------------------
 
 
 def tessellated_heights(height, divided: list[Any]):
-    """Return the heights of the tessellation at every corner of the texels, to compare with `height`."""
+    """Return the heights of the tessellation at every corner of the texels,
+    to compare with `height`.
+    """
     size = 2 ** len(divided)
     flat = np.array(height, dtype=float).ravel()
     result = flat.copy()
@@ -53,7 +57,9 @@ def tessellated_heights(height, divided: list[Any]):
 
 
 def _weights(fan, step: int, size: int):
-    """Return the weights of the ring at all corners of the texels of a quad, and their numbers from its first."""
+    """Return the weights of the ring at all corners of the texels of a quad, and
+    their numbers from its first.
+    """
     row, column = (part.ravel() for part in np.mgrid[: step + 1, : step + 1])
     point = np.stack([column * 2 / step, row * 2 / step, np.ones(len(row))])
     weights = np.zeros((len(row), 8))
@@ -68,7 +74,9 @@ def _weights(fan, step: int, size: int):
 
 def directed_edges(corners):
     return Counter(
-        (int(a), int(b)) for triangle in corners for a, b in zip(triangle, np.roll(triangle, -1), strict=True)
+        (int(a), int(b))
+        for triangle in corners
+        for a, b in zip(triangle, np.roll(triangle, -1), strict=True)
     )
 
 
@@ -141,14 +149,15 @@ def test_errors_stay_a_small_multiple_of_the_threshold():
     for threshold in (1e-3, 1e-2, 1e-1):
         divided = divide(edges(height, threshold))
         error = abs(tessellated_heights(height, divided) / height - 1).max()
-        # The errors of a corner and of those it was interpolated from add up; on a smooth surface they fall by 4 from
-        # level to level, which makes 4/3, and a diagonal sees the derivatives along both sides.
+        # The errors of a corner and of those it was interpolated from add up; on a smooth surface
+        # they fall by 4 from level to level, which makes 4/3, and a diagonal sees the derivatives
+        # along both sides.
         assert threshold / 8 < error < 4 * threshold
         counts.append(len(triangles(divided)))
     assert counts[0] > 2 * counts[1] > 4 * counts[2]
 
 
-# Meshes --------------------------------------------------------------------------------------------------------------
+# Meshes -------------------------------------------------------------------------------------------
 
 
 def map_of(kind: str, size: int):
@@ -157,7 +166,9 @@ def map_of(kind: str, size: int):
 
 
 def assert_closed(mesh):
-    """Every edge has two triangles of opposite direction, and the surface is one sphere: no vertex twice."""
+    """Every edge has two triangles of opposite direction, and the surface is one
+    sphere: no vertex twice.
+    """
     ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
     count = len(mesh.vertices)
     keys = ends[:, 0] * count + ends[:, 1]
@@ -184,7 +195,7 @@ def test_mesh_is_closed(variant, kind, size, tessellation):
         assert len(mesh.triangles) < shadow_map.faces * size**2
 
 
-# Signs of the triangles that a ray crosses ---------------------------------------------------------------------------
+# Signs of the triangles that a ray crosses --------------------------------------------------------
 
 
 WIDTH, HEIGHT = 11, 8
@@ -203,12 +214,16 @@ def make_camera(origin, target=(0.0, 0.0, 0.0), *, fov=50.0, size=(WIDTH, HEIGHT
 
 
 def simple_camera():
-    """Return a camera at the origin that looks along z and has the pixel (i, j) in the direction (5 - i, 4 - j, 1)."""
+    """Return a camera at the origin that looks along z and has the pixel (i, j) in the
+    direction (5 - i, 4 - j, 1).
+    """
     return opaque_camera((11, 9), ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0)))
 
 
 def opaque_camera(size, vectors):
-    """Return a camera of these vectors, in float64; all such cameras share their kernels, as the product's do."""
+    """Return a camera of these vectors, in float64; all such cameras share their
+    kernels, as the product's do.
+    """
     arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
     dr.make_opaque(arrays)
     return Camera(*size, arrays[0], tuple(arrays[1:]), grid=pixel_grid(*size))
@@ -219,11 +234,15 @@ def tetrahedron(points) -> VolumeMesh:
     points = np.asarray(points, dtype=float)
     triangles = np.array([(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
     outward = np.linalg.det(points[triangles]).sum() > 0
-    return VolumeMesh(np.column_stack((points, np.ones(4))), triangles if outward else triangles[:, ::-1])
+    return VolumeMesh(
+        np.column_stack((points, np.ones(4))), triangles if outward else triangles[:, ::-1]
+    )
 
 
 def light_pyramid(inverse, *, apex=(0.2, -0.1, 2.3), aim=(0.1, 0.3, -1.0)) -> VolumeMesh:
-    """Return the volume of a spot: a grid displaced to the inverse depths given, joined to the light at its edges."""
+    """Return the volume of a spot: a grid displaced to the inverse depths given, joined
+    to the light at its edges.
+    """
     side = len(inverse)
     axis = np.asarray(aim) / np.linalg.norm(aim)
     across = np.cross((1.0, 0.0, 0.0), axis)
@@ -243,9 +262,11 @@ def light_pyramid(inverse, *, apex=(0.2, -0.1, 2.3), aim=(0.1, 0.3, -1.0)) -> Vo
 
 
 def winding_number(mesh: VolumeMesh, point) -> int | None:
-    """Return how often a mesh surrounds a point, by its solid angle (Van Oosterom, Strackee 1983); None if it is on it.
+    """Return how often a mesh surrounds a point, by its solid angle (Van Oosterom, Strackee
+    1983); None if it is on it.
 
-    Next to a triangle that a point is on (rounding apart), half of all directions end; there `top` is 0.
+    Next to a triangle that a point is on (rounding apart), half of all
+    directions end; there `top` is 0.
     """
     corner = mesh.vertices[:, :3] - mesh.vertices[:, 3:] * np.asarray(point)
     length = np.linalg.norm(corner, axis=1)
@@ -281,7 +302,9 @@ whole = st.integers(-4, 4)
 @settings(max_examples=60, deadline=None)
 @given(corners=st.lists(st.tuples(whole, whole, whole), min_size=4, max_size=4))
 def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
-    """Corners at whole coordinates before a camera at 0: every edge and plane meets centres, or passes the camera."""
+    """Corners at whole coordinates before a camera at 0: every edge and plane meets
+    centres, or passes the camera.
+    """
     corners = np.array(corners, dtype=float)
     assume(abs(np.linalg.det(corners[1:] - corners[0])) > 0.5)
     check_signs(tetrahedron(corners), simple_camera())
@@ -295,6 +318,8 @@ def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
     aim=places,
 )
 def test_signs_add_up_for_light_volumes(variant, inverse, eye, aim):
-    """With vertices at infinity and behind the camera, the camera in the light, in shadow, or beside."""
+    """With vertices at infinity and behind the camera, the camera in the
+    light, in shadow, or beside.
+    """
     assume(np.linalg.norm(np.subtract(eye, aim)) >= 1e-3)
     check_signs(light_pyramid(np.reshape(inverse, (6, 6))), make_camera(eye, aim, fov=100.0))

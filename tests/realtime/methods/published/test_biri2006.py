@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The frame of Biri 2006: pyramids of spots, one buffer of 8 bits for surfaces and all lights, Gamma at vertices."""
+"""The frame of Biri 2006: pyramids of spots, one buffer of 8 bits for surfaces and all
+lights, Gamma at vertices.
+"""
 
 from functools import partial
 
@@ -21,37 +23,51 @@ from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 def frame(parameters):
     """A frame of the sphere under the spot."""
     scene = load_scene("sphere-spot", (64, 48)).scene
-    return render_frame(prepared(read_scene(scene), configuration("shadow-planes-2006", None, parameters)))
+    return render_frame(
+        prepared(read_scene(scene), configuration("shadow-planes-2006", None, parameters))
+    )
 
 
 def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(variant):
-    """A regular polygon has the fraction 1 - (2 pi / N)^2 / 6 of its circle: four times the edges, a sixteenth."""
+    """A regular polygon has the fraction 1 - (2 pi / N)^2 / 6 of its circle: four
+    times the edges, a sixteenth.
+    """
     whole = frame({"order": "exact"}).airlight
-    missing = [1 - frame({"order": "exact", "cone": sides}).airlight.mean() / whole.mean() for sides in (16, 64, 4096)]
+    missing = [
+        1 - frame({"order": "exact", "cone": sides}).airlight.mean() / whole.mean()
+        for sides in (16, 64, 4096)
+    ]
     assert 0.01 < missing[0] < 0.05
     # The 3072 pixels and the sphere's shadow in the middle leave a fraction of it to chance.
     assert missing[0] / missing[1] == pytest.approx(16, rel=0.2)
     assert abs(missing[2]) < 1e-5
     many = frame({"order": "exact", "cone": 4096})
-    # (2 pi / 4096)^2 / 6 = 4e-7 of the cone's section; rays along its edge see more of that, and float32 adds 1e-5.
+    # (2 pi / 4096)^2 / 6 = 4e-7 of the cone's section; rays along its edge see more of
+    # that, and float32 adds 1e-5.
     np.testing.assert_allclose(many.airlight, whole, rtol=1e-3, atol=1e-4 * whole.mean())
 
 
-@pytest.mark.claim("cone-at-vertices", tolerance="second order in the logarithm of the ratio of rows")
+@pytest.mark.claim(
+    "cone-at-vertices", tolerance="second order in the logarithm of the ratio of rows"
+)
 def test_a_cone_is_meshed_from_the_light_to_the_camera(variant, monkeypatch):
-    """Rows at equal ratios: the error falls as the square of the logarithm of the ratio, near the light too."""
+    """Rows at equal ratios: the error falls as the square of the logarithm of the
+    ratio, near the light too.
+    """
     pixel = frame({"cone": 32, "order": "paper"}).airlight
     errors = []
     for rows, ratio in ((16, 1.5), (32, 1.5**0.5)):
         monkeypatch.setattr(module, "RATIO", ratio)
-        vertex = frame({"cone": 32, "order": "paper", "evaluation": "vertex", "rows": rows}).airlight
+        vertex = frame(
+            {"cone": 32, "order": "paper", "evaluation": "vertex", "rows": rows}
+        ).airlight
         # The floor is two triangles: Gamma on it is another matter.
         hidden = np.abs(vertex - pixel)[: vertex.shape[0] // 3]
         errors.append(hidden.mean() / pixel.mean())
     assert 1e-5 < errors[1] < 0.4 * errors[0]
 
 
-# Bounded media, and the buffer ---------------------------------------------------------------------------------------
+# Bounded media, and the buffer --------------------------------------------------------------------
 
 
 render = partial(frames.render, method="shadow-planes-2006", precision="double")
@@ -64,7 +80,9 @@ def occluder(centre=(0.55, 0.2, 1.35), radius=0.28):
 
 
 def fog(centre, radius, sigma=0.9):
-    return bounded_medium({"type": "sphere", "center": list(centre), "radius": radius}, sigma, (0.9, 0.4, 0.3))
+    return bounded_medium(
+        {"type": "sphere", "center": list(centre), "radius": radius}, sigma, (0.9, 0.4, 0.3)
+    )
 
 
 def stored(value, white):
@@ -98,7 +116,9 @@ def test_the_buffer_holds_surfaces_and_all_lights_pass_by_pass(variant):
     assert np.array_equal(shown.max() >= white * (1 - 1e-9), free.max() > white)
 
 
-@pytest.mark.claim("media-at-vertices", tolerance="errors fall to 0.4 with a quarter of the spacing")
+@pytest.mark.claim(
+    "media-at-vertices", tolerance="errors fall to 0.4 with a quarter of the spacing"
+)
 def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
     """One convex occluder before a sphere of fog."""
     scene = clear_scene(ball=fog((0.1, 0.0, 0.4), 0.8), occluder=occluder())
@@ -117,7 +137,9 @@ def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
 
 @pytest.mark.claim("media-at-vertices", tolerance="relative RMSE 1e-6: rounding")
 def test_without_occluders_in_view_a_medium_is_its_end_less_its_entry(variant):
-    """Two media, one before the other: Gamma at exit and entry, and what absorbs before as a factor of the ray."""
+    """Two media, one before the other: Gamma at exit and entry, and what absorbs
+    before as a factor of the ray.
+    """
     media = {"ball": fog((0.1, -0.9, 0.7), 0.4), "behind": fog((0.2, 0.9, 0.8), 0.5, sigma=0.6)}
     scene = clear_scene(**media, occluder=occluder(centre=(0.3, 0.1, -30.0)))
     pixel = render(scene, kernel="taylor", media="paper").airlight

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A constant distance from the light in bounded media: what section 4.2 of Biri 2006 means, and what it prints."""
+"""A constant distance from the light in bounded media: what section 4.2 of Biri 2006
+means, and what it prints.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -16,7 +18,9 @@ CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
 
 
 def render(scene, kernel, **parameters):
-    return frames.render(scene, "shadow-planes-2006", kernel=kernel, precision="double", **parameters).airlight
+    return frames.render(
+        scene, "shadow-planes-2006", kernel=kernel, precision="double", **parameters
+    ).airlight
 
 
 def ball(**phase):
@@ -25,7 +29,9 @@ def ball(**phase):
 
 
 def by_hand(scene, exponent, p):
-    """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
+    """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every
+    chord by adaptive quadrature.
+    """
     reference = read_reference(mi.load_dict(scene))
     light = reference.lights[0]
     image = np.zeros(len(reference.direction))
@@ -59,11 +65,15 @@ def printed(x, r, foot, height, enter):
 
 
 @pytest.mark.claim(
-    "polynomial-of-bounded-media", "mean-distance-of-the-paper", tolerance="relative RMSE 1e-4 of nodes and degree 25"
+    "polynomial-of-bounded-media",
+    "mean-distance-of-the-paper",
+    tolerance="relative RMSE 1e-4 of nodes and degree 25",
 )
 @pytest.mark.parametrize(("form", "exponent"), [("paper", meant), ("printed", printed)])
 @pytest.mark.parametrize("phase", [pytest.param("isotropic", marks=pytest.mark.slow), "rayleigh"])
-def test_both_forms_are_their_integrals_by_nodes_and_by_a_polynomial(variant, form, exponent, phase):
+def test_both_forms_are_their_integrals_by_nodes_and_by_a_polynomial(
+    variant, form, exponent, phase
+):
     # The chords pass their feet within 45 degrees at the light, where the series converge fast.
     lamp = clear_scene()["lamp"] | {"position": [-0.1, 0.5, 2.7]}
     scene = clear_scene(lamp=lamp, ball=ball(phase={"type": phase}))
@@ -86,5 +96,7 @@ def test_a_polynomial_kernel_is_asked_for_a_constant_distance_and_by_no_other_me
     # c_2 of the isotropic function is misprinted: a^2 - a for half of it.
     assert relative_rmse(wrong, render(scene, "taylor", media="printed")) > 1e-3
     for kernel in ("taylor", "quadrature"):
-        with pytest.raises(InputError, match=f"kernel: got {kernel}, which is of one medium without bounds"):
+        with pytest.raises(
+            InputError, match=f"kernel: got {kernel}, which is of one medium without bounds"
+        ):
             frames.render(scene, "shadow-planes", kernel=kernel)

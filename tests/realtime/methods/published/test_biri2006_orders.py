@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from airlight.realtime.methods.published.biri2006.crossings import Buffer, _entry_key, sum_crossings
-from tests.helpers.shadow_planes import bundles, crossings, lit_lengths, occluders_of, planes_of, rays_of
+from tests.helpers.shadow_planes import (
+    bundles,
+    crossings,
+    lit_lengths,
+    occluders_of,
+    planes_of,
+    rays_of,
+)
 
 
 def added_up(planes, ways, end, *, order, buffer=None):
@@ -17,12 +24,16 @@ def added_up(planes, ways, end, *, order, buffer=None):
     Float = type(planes.index.distance)
     gammas = (lambda plane, ray, x: 1 - dr.exp(-x)), (lambda x: 1 - dr.exp(-x))
     distance = Float(np.asarray(end, dtype=np.float64))
-    total, lit = sum_crossings(planes, rays_of(planes.index, ways), distance, gammas, order=order, buffer=buffer)
+    total, lit = sum_crossings(
+        planes, rays_of(planes.index, ways), distance, gammas, order=order, buffer=buffer
+    )
     return np.array(total, dtype=np.float64), np.array(lit)
 
 
 def most(wrong):
-    """All but one ray in a hundred, which rounding takes past an edge, or to a plane before another."""
+    """All but one ray in a hundred, which rounding takes past an edge, or
+    to a plane before another.
+    """
     return wrong.mean() < 0.01
 
 
@@ -44,7 +55,9 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
 
 @pytest.mark.claim("orders-of-the-planes")
 def test_without_an_order_every_plane_counts(variant):
-    """The artefact of Fig. 4, by formula: Gamma at the surface if it is lit, and all planes with their signs."""
+    """The artefact of Fig. 4, by formula: Gamma at the surface if it is lit, and all
+    planes with their signs.
+    """
     planes = planes_of(occluders_of("torus", "crossing spheres"))
     ways = bundles(1920, spread=0.003)
     end = np.full(len(ways), 4.7)
@@ -102,11 +115,19 @@ def test_buffer_clamps_after_every_plane(variant):
 
 
 def test_the_key_of_an_entry_is_the_angle_at_the_light_and_a_number_along_its_axis_too(variant):
-    """The light is at 0, the camera at D on the z axis; the cosine of a ray along it may exceed 1 by rounding."""
-    x, z, distance = np.array([2.0, 3.0, 1.5, 1.5]), np.array([-0.6, 0.3, 1.0, np.nextafter(np.float32(1), 2)]), 4.0
+    """The light is at 0, the camera at D on the z axis; the cosine of a ray along it
+    may exceed 1 by rounding.
+    """
+    x, z, distance = (
+        np.array([2.0, 3.0, 1.5, 1.5]),
+        np.array([-0.6, 0.3, 1.0, np.nextafter(np.float32(1), 2)]),
+        4.0,
+    )
     index, ray = SimpleNamespace(distance=mi.Float(distance)), SimpleNamespace(z=mi.Float(z))
     entry = SimpleNamespace(distance=mi.Float(x))
     point = np.stack([x * np.sqrt(np.maximum(1 - z**2, 0)), distance + x * z])
     key = np.array(_entry_key(index, ray, entry, "paper"))
     np.testing.assert_allclose(key, -point[1] / np.linalg.norm(point, axis=0), rtol=2e-6)  # float32
-    np.testing.assert_allclose(np.array(_entry_key(index, ray, entry, "exact")), distance / x, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.array(_entry_key(index, ray, entry, "exact")), distance / x, rtol=1e-6
+    )

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the default sum of shadow planes keeps its digits where differences of Gamma lose them.
 
-The airlight of a ray that crosses shadow planes is sum_i Gamma(b_i) - Gamma(a_i). If each Gamma has a relative rounding
-error eps, the sum has an error of about eps sum_i Gamma, many times the sum itself where slats let little light
-through, or where a strong light close to the camera makes Gamma large before the first shadow. The integrals
-J(a_i, b_i) of lit segments are positive, so their sum keeps the digits of its terms. `shadow-planes` adds these,
-`shadow-planes-2006` Gamma plane by plane. The reference has its lit intervals from exact geometry.
+The airlight of a ray that crosses shadow planes is sum_i Gamma(b_i) - Gamma(a_i). If each Gamma has
+a relative rounding error eps, the sum has an error of about eps sum_i Gamma, many times the sum
+itself where slats let little light through, or where a strong light close to the camera makes Gamma
+large before the first shadow. The integrals J(a_i, b_i) of lit segments are positive, so their sum
+keeps the digits of its terms. `shadow-planes` adds these, `shadow-planes-2006` Gamma plane by
+plane. The reference has its lit intervals from exact geometry.
 """
 
 import mitsuba as mi
@@ -31,7 +32,11 @@ def slats():
         upright = number % 2
         slat = box((0.023, 0.011, 1.7) if upright else (1.9, 0.011, 0.023))
         step = 0.037 * (number % 13) - 0.21
-        place = (step, -1.13 + 0.051 * number, 0.93) if upright else (0.07, -1.13 + 0.051 * number, 0.93 + step)
+        place = (
+            (step, -1.13 + 0.051 * number, 0.93)
+            if upright
+            else (0.07, -1.13 + 0.051 * number, 0.93 + step)
+        )
         parts.append(placed(slat, place))
     return mi.load_dict(
         {
@@ -51,7 +56,9 @@ def airlight(scene, precision, method="shadow-planes", **parameters):
 
 @pytest.mark.claim(
     "differences-of-gamma",
-    tolerance="1e-4 of each pixel in float32; 1e-6 of 99 % in float64: float32 distances to surfaces",
+    tolerance=(
+        "1e-4 of each pixel in float32; 1e-6 of 99 % in float64: float32 distances to surfaces"
+    ),
 )
 def test_the_default_keeps_the_digits_that_gamma_loses(variant):
     built = slats()

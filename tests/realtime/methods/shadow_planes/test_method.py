@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of shadow planes against the quadrature reference on exact geometry, which shares no code with them."""
+"""Frames of shadow planes against the quadrature reference on exact geometry, which
+shares no code with them.
+"""
 
 import mitsuba as mi
 import numpy as np
@@ -45,7 +47,9 @@ def reference(scene):
 
 
 def assert_is_reference(frame, image, *, rmse=1e-5):
-    """Relative RMSE, all but one value in two hundred within 1e-3 (one ray may pass an edge), none negative, no NaN."""
+    """Relative RMSE, all but one value in two hundred within 1e-3 (one ray may pass an
+    edge), none negative, no NaN.
+    """
     mean = image.airlight.mean()
     if mean == 0:
         assert np.all(frame.airlight == 0)
@@ -60,10 +64,12 @@ def assert_is_reference(frame, image, *, rmse=1e-5):
 def surface_differs(frame, image):
     """The fraction of pixels whose surface is lit in one and dark in the other.
 
-    The reference's shadow rays start 1e-4 m above the surface and are cast in float32: at the edge of a shadow they and
-    the planes may differ by a pixel.
+    The reference's shadow rays start 1e-4 m above the surface and are cast in float32: at the edge
+    of a shadow they and the planes may differ by a pixel.
     """
-    return np.mean(np.any(np.abs(frame.surface - image.surface) > 1e-2 * image.surface.mean(), axis=2))
+    return np.mean(
+        np.any(np.abs(frame.surface - image.surface) > 1e-2 * image.surface.mean(), axis=2)
+    )
 
 
 @pytest.mark.claim("planes-are-exact", tolerance="relative RMSE 5e-6: float32")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Silhouettes count the layers over every direction; layers before the camera are counted as triangles say."""
+"""Silhouettes count the layers over every direction; layers before the camera are
+counted as triangles say.
+"""
 
 from collections import Counter
 from itertools import pairwise
@@ -11,7 +13,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from airlight.errors import InputError
-from airlight.realtime.methods.shadow_planes.plane_table import index_planes, layers_between, light_basis
+from airlight.realtime.methods.shadow_planes.plane_table import (
+    index_planes,
+    layers_between,
+    light_basis,
+)
 from airlight.realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import read_camera
@@ -36,9 +42,12 @@ def determinant(a, b, c):
 
 
 def layers_over(occluders, light, way):
-    """How many layers lie over a direction, triangle by triangle: those of a closed component that face the light."""
+    """How many layers lie over a direction, triangle by triangle: those of a closed
+    component that face the light.
+    """
     a, b, c = (occluders.vertices[occluders.triangles[:, k]] - light for k in range(3))
-    towards = -determinant(a, b, c)  # the normal is turned to the light if the corners run clockwise from outside
+    # the normal is turned to the light if the corners run clockwise from outside
+    towards = -determinant(a, b, c)
     sides = np.stack([determinant(p, q, way) for p, q in ((a, b), (b, c), (c, a))])
     hit = np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)
     # All corners lie on the far side of the light, or the three sides agree behind it.
@@ -48,8 +57,13 @@ def layers_over(occluders, light, way):
 
 
 def layers_gained(occluders, contour, light, start, end):
-    """Layers gained, by the silhouette, on the way from one direction to another along the shorter arc."""
-    a, b = occluders.vertices[contour.edges[:, 0]] - light, occluders.vertices[contour.edges[:, 1]] - light
+    """Layers gained, by the silhouette, on the way from one direction to
+    another along the shorter arc.
+    """
+    a, b = (
+        occluders.vertices[contour.edges[:, 0]] - light,
+        occluders.vertices[contour.edges[:, 1]] - light,
+    )
     across = np.sign(determinant(a, b, start)) - np.sign(determinant(a, b, end))
     within = determinant(start, end, a) * determinant(start, end, b) < 0
     # Two great circles meet twice: the arcs do if a crossing lies on the near side of both.
@@ -101,7 +115,9 @@ def test_silhouette_counts_layers(name, light):
     seed=st.integers(0, 1000),
 )
 def test_any_triangles_and_any_light(vertices, faces, light, seed):
-    """Whole numbers, so that lights lie in planes, on edges and on vertices, and triangles lie upon one another."""
+    """Whole numbers, so that lights lie in planes, on edges and on vertices, and
+    triangles lie upon one another.
+    """
     mesh = np.array(vertices, dtype=float), np.array(faces) % len(vertices)
     occluders = occluders_of(mesh)
     assume(len(occluders.triangles))
@@ -112,7 +128,9 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
 def heap_of_balls():
     """Return many balls that touch and run into one another, one component each."""
     ways = random_directions(7, 9)
-    return joined([placed(closed_sphere(1), 0.5 * way, rotation((1, 0.3, 0.2), 40.0)) for way in ways])
+    return joined(
+        [placed(closed_sphere(1), 0.5 * way, rotation((1, 0.3, 0.2), 40.0)) for way in ways]
+    )
 
 
 SUMMED = {
@@ -142,7 +160,9 @@ def test_a_coefficient_is_the_sum_over_the_triangles_at_an_edge(name, light):
             edge = corners[tail], corners[head]
             expected[min(edge), max(edge)] += weight if edge[0] < edge[1] else -weight
     contour = silhouette(occluders, place)
-    summed = dict(zip(map(tuple, contour.edges.tolist()), contour.coefficient.tolist(), strict=True))
+    summed = dict(
+        zip(map(tuple, contour.edges.tolist()), contour.coefficient.tolist(), strict=True)
+    )
     assert summed == {edge: value for edge, value in expected.items() if value}
     assert summed or light == "inside"
 
@@ -162,11 +182,13 @@ def test_edges_of_more_layers_than_a_plane_has_room_for_are_refused(variant):
         index_planes(many, light, camera, used=used, types=array_types("single"))
 
 
-# Layers between light and camera -------------------------------------------------------------------------------------
+# Layers between light and camera ------------------------------------------------------------------
 
 
 def count_between(occluders, light, camera):
-    """Layers between two points, triangle by triangle: a closed component by its facing or its averted ones."""
+    """Layers between two points, triangle by triangle: a closed component by its
+    facing or its averted ones.
+    """
     corner = occluders.vertices[occluders.triangles]
     edge, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     way = camera - light
@@ -193,7 +215,8 @@ def test_layers_between_light_and_camera(seed, components):
     rng = np.random.default_rng(seed)
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     meshes = [
-        ("closed", rng.normal(size=(4, 3)), faces if rng.random() < 0.5 else faces[:, ::-1]) for _ in range(components)
+        ("closed", rng.normal(size=(4, 3)), faces if rng.random() < 0.5 else faces[:, ::-1])
+        for _ in range(components)
     ]
     meshes.append(("open", rng.normal(size=(9, 3)), np.arange(9).reshape(3, 3)))
     occluders = make_occluders(meshes)
@@ -201,7 +224,9 @@ def test_layers_between_light_and_camera(seed, components):
     for _ in range(4):
         light, camera = rng.normal(size=(2, 3)) * rng.choice([0.3, 1.0, 3.0], (2, 1))
         basis = light_basis(light, camera)
-        assert layers_between(occluders, light, basis, used=used) == count_between(occluders, light, camera)
+        assert layers_between(occluders, light, basis, used=used) == count_between(
+            occluders, light, camera
+        )
         assert layers_between(occluders, light, basis, used=~used) == 0
 
 
@@ -215,7 +240,7 @@ def test_axis_through_edges_and_vertices_counts_each_layer_once():
         assert layers_between(occluders, light, light_basis(light, camera), used=used) == 1
 
 
-# No occluder is left out whose shadow is seen ------------------------------------------------------------------------
+# No occluder is left out whose shadow is seen -----------------------------------------------------
 
 
 def camera_at(origin, target, size=(40, 30)):
@@ -263,5 +288,6 @@ def test_no_component_is_dropped_whose_shadow_is_seen(variant, w):
             if sees(camera, points + beyond * (w * points - light)).any():
                 assert used[component]
         dropped += int(np.sum(~used))
-    # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.
+    # A third at least has its shadow elsewhere: the test is worth its time only if
+    # there is something to drop.
     assert dropped > 100

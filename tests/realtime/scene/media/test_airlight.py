@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight and surfaces in bounded media: against a closed form and the reference, whose plain sums share no code."""
+"""Airlight and surfaces in bounded media: against a closed form and the reference, whose
+plain sums share no code.
+"""
 
 from functools import partial
 
@@ -29,7 +31,8 @@ render = partial(frames.render, precision="double")
 @pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 1e-6, in float32 1e-5")
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
-    """With the light coming straight down the segment is H - z, linear in x, and the integral is an exponential's.
+    """With the light coming straight down the segment is H - z, linear in x, and the
+    integral is an exponential's.
 
     int_0^c exp(-sigma x - sigma (H - z_0 - x d_z)) dx = exp(-sigma (H - z_0)) (1 - exp(-k c))/k,  k = sigma (1 - d_z).
     """
@@ -44,15 +47,20 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
             (centre - 0.5 * sides - origin) / direction,
             (centre + 0.5 * sides - origin) / direction,
         )
-    enter, leave = np.minimum(low_planes, high_planes).max(axis=1), np.maximum(low_planes, high_planes).min(axis=1)
+    enter, leave = (
+        np.minimum(low_planes, high_planes).max(axis=1),
+        np.maximum(low_planes, high_planes).min(axis=1),
+    )
     chord, height = np.maximum(leave - enter, 0), (origin + enter[:, None] * direction)[:, 2]
     k = sigma * (1 - direction[:, 2])
     integral = np.exp(-sigma * (centre[2] + 0.5 * sides[2] - height)) * -np.expm1(-k * chord) / k
-    phase = (1 - g * g) / (1 + g * g - 2 * g * direction[:, 2]) ** 1.5  # scattering angle: down, then against the ray
+    # scattering angle: down, then against the ray
+    phase = (1 - g * g) / (1 + g * g - 2 * g * direction[:, 2]) ** 1.5
     expected = np.where(chord > 0, integral * phase * sigma, 0)[:, None]
     expected = expected * np.array([0.2, 0.5, 0.9]) * np.array([3.0, 2.0, 1.0]) / (4 * np.pi)
     assert np.count_nonzero(chord) > 10
-    # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32 rays near an edge lose more.
+    # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32
+    # rays near an edge lose more.
     assert relative_rmse(airlight, expected) < (1e-6 if precision == "double" else 1e-5)
 
 
@@ -73,7 +81,9 @@ def under_sun(along=ALONG, **media):
 
 def solid(mesh, g=0.0):
     phase = {"type": "hg", "g": g}
-    return medium_boundary("solid", mesh, {"type": "homogeneous", "sigma_t": 1.3, "albedo": 0.7, "phase": phase})
+    return medium_boundary(
+        "solid", mesh, {"type": "homogeneous", "sigma_t": 1.3, "albedo": 0.7, "phase": phase}
+    )
 
 
 def lamp_over(mesh):
@@ -85,35 +95,53 @@ def lamp_over(mesh):
 
 def along_the_light():
     """The middle ray runs with the light."""
-    place = mi.ScalarTransform4f().look_at(list(np.asarray(CUBE_AT) - 4 * unit(ALONG)), list(CUBE_AT), [0, 0, 1])
-    sensor = {key: entry for key, entry in tiny_scene(size=(5, 5))["sensor"].items() if key != "medium"}
+    place = mi.ScalarTransform4f().look_at(
+        list(np.asarray(CUBE_AT) - 4 * unit(ALONG)), list(CUBE_AT), [0, 0, 1]
+    )
+    sensor = {
+        key: entry for key, entry in tiny_scene(size=(5, 5))["sensor"].items() if key != "medium"
+    }
     return under_sun(cube=cube(), ball=fog_sphere()) | {"sensor": sensor | {"to_world": place}}
 
 
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), np.sin(np.arange(12) * np.pi / 6)], axis=1)
-#: Scenes and the relative RMSE of the airlight, in float64 and float32. Segments are cut where the edges of a box bend
-#: the segment's length, which leaves 1e-5; corners of media are float32 numbers, 1e-7. Between nodes that are spread
-#: over a chord lie the kinks of 80 facets.
+#: Scenes and the relative RMSE of the airlight, in float64 and float32. Segments are cut where the
+#: edges of a box bend the segment's length, which leaves 1e-5; corners of media are float32
+#: numbers, 1e-7. Between nodes that are spread over a chord lie the kinks of 80 facets.
 SCENES = {
     "lamp above": (lambda: under_lamp(0.9, 0.7, 1.9), 3e-5, 3e-5),
     "lamp through one to the other": (lambda: under_lamp(-2.9, 0.6, 0.5), 3e-5, 3e-5),
     "lamp within": (lambda: under_lamp(0.8, 0.6, 0.7), 3e-5, 3e-5),
     "two boxes": (lambda: under_sun(cube=cube(), plank=plank()), 1e-5, 3e-5),
     "box and sphere": (lambda: under_sun(cube=cube(), ball=fog_sphere()), 1e-5, 3e-5),
-    "from behind": (lambda: under_sun((-0.2, -1.0, 0.3), cube=cube(), plank=plank(), floor=None), 1e-5, 3e-5),
+    "from behind": (
+        lambda: under_sun((-0.2, -1.0, 0.3), cube=cube(), plank=plank(), floor=None),
+        1e-5,
+        3e-5,
+    ),
     "along a face": (
-        lambda: under_sun(rotation((0.4, 1.0, 0.1), 33.0)[:, 2], cube=cube(), plank=plank(), floor=None),
+        lambda: under_sun(
+            rotation((0.4, 1.0, 0.1), 33.0)[:, 2], cube=cube(), plank=plank(), floor=None
+        ),
         1e-5,
         3e-5,
     ),
     "along a ray": (along_the_light, 1e-5, 3e-5),
-    "80 planes": (lambda: under_sun(solid=solid(placed(icosphere(1), (0.0, 0.0, 0.6)))), 1e-3, 1e-3),
+    "80 planes": (
+        lambda: under_sun(solid=solid(placed(icosphere(1), (0.0, 0.0, 0.6)))),
+        1e-3,
+        1e-3,
+    ),
     "gem": (lambda: lamp_over(gem(13, 5)), 1e-5, 3e-5),
     "column": (lambda: lamp_over(prism(CIRCLE, 1.9)), 1e-5, 3e-5),
 }
 
 
-@pytest.mark.claim("bounded-media-of-methods", "directional-light-volumes", tolerance="relative RMSE 3e-5, by scene")
+@pytest.mark.claim(
+    "bounded-media-of-methods",
+    "directional-light-volumes",
+    tolerance="relative RMSE 3e-5, by scene",
+)
 @pytest.mark.parametrize("name", SCENES)
 def test_airlight_and_surfaces_are_those_of_the_reference(variant, name):
     make, double, single = SCENES[name]
@@ -134,14 +162,21 @@ def test_airlight_and_surfaces_are_those_of_the_reference(variant, name):
 def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
     """A sum of some of the panels was a dark pixel in silence."""
     monkeypatch.setattr("airlight.realtime.scene.media.bounded_rays._MOST", 1)
-    ball = bounded_medium({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.4}, 3.1, (0.9, 0.8, 0.7))
-    with pytest.raises(InputError, match=r"airlight of \d+ of 48 pixels is not finite.* more panels"):
+    ball = bounded_medium(
+        {"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.4}, 3.1, (0.9, 0.8, 0.7)
+    )
+    with pytest.raises(
+        InputError, match=r"airlight of \d+ of 48 pixels is not finite.* more panels"
+    ):
         render(clear_scene(size=(8, 6), ball=ball))
 
 
 def test_an_ambient_field_fills_bounded_media(variant):
     scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
-    gain = render(scene, "shadow-planes-2006", ambient=0.3).airlight - render(scene, "unshadowed").airlight
+    gain = (
+        render(scene, "shadow-planes-2006", ambient=0.3).airlight
+        - render(scene, "unshadowed").airlight
+    )
     reference = read_reference(mi.load_dict(scene))
     near, far = airlight_sum.ball(SPHERE_AT, RADIUS)(reference.origin, reference.direction)
     chord = far - near
@@ -161,8 +196,9 @@ def test_an_ambient_field_fills_bounded_media(variant):
 def test_random_scenes_against_the_reference(variant, scene, bound):
     """Scenes that sweeps found; in brackets the error before the fix, at 160 x 120.
 
-    Segments graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies
-    (84: 1.7e-3); segments pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
+    Segments graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72
+    facets of two bodies (84: 1.7e-3); segments pass edges of boxes on their way to fog and other
+    boxes (146: 1.2e-3).
     """
     loaded = load_scene(scene, (64, 48)).scene
     reference = reference_image(loaded).airlight

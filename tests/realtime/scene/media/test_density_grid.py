@@ -30,7 +30,9 @@ def scene(variant, tmp_path):
     return load
 
 
-@pytest.mark.claim("density-grid-methods", tolerance="2e-5 of the largest value: float32 and six digits of the box")
+@pytest.mark.claim(
+    "density-grid-methods", tolerance="2e-5 of the largest value: float32 and six digits of the box"
+)
 @pytest.mark.parametrize(
     "turn",
     [
@@ -48,7 +50,9 @@ def test_a_mirrored_grid_and_one_turned_by_right_angles_lie_as_mitsuba_lays_them
     interaction = dr.zeros(mi.MediumInteraction3f, len(place))
     interaction.p = mi.Point3f(place.T)
     wanted = np.array(reference.plugin.get_scattering_coefficients(interaction)[2])[0]
-    found = np.array(methods.density.at(mi.Point3d(place.T), mi.UInt32(0))) * np.array(methods.largest)
+    found = np.array(methods.density.at(mi.Point3d(place.T), mi.UInt32(0))) * np.array(
+        methods.largest
+    )
     assert np.ptp(wanted) > 0.5
     for each in (reference.extinction(place), found):
         np.testing.assert_allclose(each, wanted, rtol=0, atol=2e-5 * wanted.max())
@@ -56,17 +60,23 @@ def test_a_mirrored_grid_and_one_turned_by_right_angles_lie_as_mitsuba_lays_them
     np.testing.assert_allclose(np.ravel(methods.high), reference.high, atol=1e-5)
 
 
-@pytest.mark.claim("density-grid-methods", tolerance="5e-3 of 400 steps: they know no faces and edges")
+@pytest.mark.claim(
+    "density-grid-methods", tolerance="5e-3 of 400 steps: they know no faces and edges"
+)
 @pytest.mark.parametrize("light", [LAMP, INSIDE, SPOT, SUN])
 def test_a_ray_march_goes_to_the_reference(scene, light):
     loaded = scene(light)
     reference = quadrature_image(read_reference(loaded), checks=0)
     errors = []
     for precision, steps in (("single", 400), ("double", 100), ("double", 400)):
-        frame = render_frame(frame_renderer(read_scene(loaded, precision), METHODS["ray-march"], steps=steps))
+        frame = render_frame(
+            frame_renderer(read_scene(loaded, precision), METHODS["ray-march"], steps=steps)
+        )
         errors.append(relative_rmse(frame.airlight, reference.airlight))
         # Depths are exact by cells: only rounding is left of a surface.
-        np.testing.assert_allclose(frame.surface, reference.surface, rtol=1e-4, atol=1e-4 * reference.surface.max())
+        np.testing.assert_allclose(
+            frame.surface, reference.surface, rtol=1e-4, atol=1e-4 * reference.surface.max()
+        )
     assert max(errors[::2]) < 5e-3
     assert errors[2] < 0.5 * errors[1]
 
@@ -80,7 +90,9 @@ def test_depths_of_steps_add_up_to_the_depth_from_the_camera(scene, monkeypatch)
     np.testing.assert_allclose(*marched, rtol=2e-5)
 
 
-@pytest.mark.claim("density-grid-methods", tolerance="5 %: froxels of 6 cm in a box that ends within them")
+@pytest.mark.claim(
+    "density-grid-methods", tolerance="5 %: froxels of 6 cm in a box that ends within them"
+)
 def test_froxels_go_to_the_reference(scene):
     loaded = scene(SUN)
     reference = quadrature_image(read_reference(loaded), checks=0)
@@ -89,7 +101,9 @@ def test_froxels_go_to_the_reference(scene):
     assert relative_rmse(frame.airlight, reference.airlight) < 0.05
 
 
-@pytest.mark.claim("density-grid-methods", tolerance="3 % of 200 steps in a third of the box: edges of a grille")
+@pytest.mark.claim(
+    "density-grid-methods", tolerance="3 % of 200 steps in a third of the box: edges of a grille"
+)
 def test_the_built_in_scene(variant):
     loaded = load_scene("smoke", (24, 18)).scene
     reference = quadrature_image(read_reference(loaded), checks=8)
@@ -106,7 +120,8 @@ def test_methods_of_lit_segments_and_turned_boxes_are_refused(scene):
     assert {"shadow-planes", "light-volumes", "unshadowed"} <= set(refused)
     for name in refused:
         with pytest.raises(
-            InputError, match=r"the medium is a density grid.*use froxel-fog, soft-shafts, or ray-march"
+            InputError,
+            match=r"the medium is a density grid.*use froxel-fog, soft-shafts, or ray-march",
         ):
             frame_renderer(read, METHODS[name], kernel=KERNELS["exact"])
     with pytest.raises(InputError, match="whose box is turned"):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Height fog on the device: the certified rays in both precisions, frames against the reference, and refusals."""
+"""Height fog on the device: the certified rays in both precisions, frames against the
+reference, and refusals.
+"""
 
 from dataclasses import replace
 
@@ -33,7 +35,9 @@ from tests.helpers.height_fog import LAMP, SPOT, SUN, Row, fog_xml, rows
 
 
 def ends_of(row):
-    """Return a floor and a cap beyond which a row finds nothing: scenes have them, and no infinite density."""
+    """Return a floor and a cap beyond which a row finds nothing: scenes have them,
+    and no infinite density.
+    """
     heights = [row.origin[2]]
     heights += [] if row.sun else [row.origin[2] + row.direction[2] * row.x1, row.light[2]]
     layers = [layer for layer in row.fog.layers if layer.sigma_t > 0]
@@ -54,7 +58,9 @@ def relative_errors(chosen, precision, kernel=KERNELS["exact"]):
 
     def layer(i):
         found = [row.fog.layers[i] for row in chosen]
-        return Layer(*(number([getattr(each, name) for each in found]) for name in Layer.__annotations__))
+        return Layer(
+            *(number([getattr(each, name) for each in found]) for name in Layer.__annotations__)
+        )
 
     medium = HeightFog(
         (layer(0), layer(1)),
@@ -66,11 +72,15 @@ def relative_errors(chosen, precision, kernel=KERNELS["exact"]):
         types.color(1),
         HenyeyGreenstein(number([row.phase.g for row in chosen])),
     )
-    directions, places = (np.array([getattr(row, name) for row in chosen]).T for name in ("direction", "light"))
+    directions, places = (
+        np.array([getattr(row, name) for row in chosen]).T for name in ("direction", "light")
+    )
     light = Light(position=vector(places.T), intensity=types.color(1))
     if chosen[0].sun:  # a light at infinity is one that has an extent
         light = replace(
-            light, exact_axis=mi.Vector3d(*(mi.Float64(-column) for column in places)), extent=types.scalar(1)
+            light,
+            exact_axis=mi.Vector3d(*(mi.Float64(-column) for column in places)),
+            extent=types.scalar(1),
         )
     aim = mi.Vector3d(*(mi.Float64(column) for column in directions))
     rays = medium.rays(vector([row.origin for row in chosen]), vector(directions.T), aim)
@@ -82,7 +92,11 @@ def relative_errors(chosen, precision, kernel=KERNELS["exact"]):
 
 
 def by_tag(*tags, clamped=False):
-    return [row for row in rows() if row.tag in tags and row.fog.clamped == clamped and 1e-30 < row.value < 1e30]
+    return [
+        row
+        for row in rows()
+        if row.tag in tags and row.fog.clamped == clamped and 1e-30 < row.value < 1e30
+    ]
 
 
 SUNS = ("sun", "sun-infinite", "sun-resonant")
@@ -91,7 +105,9 @@ HARD = ("small-H", "near-light", "strong-g")
 _STEEP = ((1.5, 0.4), (0.3, 2.0), (0.02, 15.0))  # extinction [1/m] and scale height [m]
 
 
-@pytest.mark.claim("height-fog-kernels", tolerance="1e-5 in float32 to an exponent of 30, 1e-12 in float64")
+@pytest.mark.claim(
+    "height-fog-kernels", tolerance="1e-5 in float32 to an exponent of 30, 1e-12 in float64"
+)
 def test_suns_on_certified_rays(variant):
     assert relative_errors(by_tag(*SUNS), "double").max() < 1e-12
     # An exponent of 30 has as many roundings in float32.
@@ -99,7 +115,10 @@ def test_suns_on_certified_rays(variant):
     assert relative_errors(chosen, "single").max() < 1e-5
 
 
-@pytest.mark.claim("height-fog-kernels", tolerance="1e-5 in float32, 1e-9 in float64; of hard rays the coordinates'")
+@pytest.mark.claim(
+    "height-fog-kernels",
+    tolerance="1e-5 in float32, 1e-9 in float64; of hard rays the coordinates'",
+)
 @pytest.mark.parametrize("clamped", [False, True])
 def test_panels_on_certified_rays(variant, clamped):
     generic = by_tag("clamped", clamped=True) if clamped else by_tag(*GENERIC)
@@ -111,13 +130,21 @@ def test_panels_on_certified_rays(variant, clamped):
         assert relative_errors(by_tag("small-H"), "single").max() < 2e-5
 
 
-@pytest.mark.claim("height-fog-kernels", tolerance="1e-4 in float32: depths of 30 have a rounding of 1e-5 or two")
+@pytest.mark.claim(
+    "height-fog-kernels", tolerance="1e-4 in float32: depths of 30 have a rounding of 1e-5 or two"
+)
 @pytest.mark.parametrize("clamped", [False, True])
 def test_no_panel_misses_a_layer(variant, clamped):
-    """Thin layers, long rays and lights far above: a panel that is too long for any of them is wrong by a tenth."""
+    """Thin layers, long rays and lights far above: a panel that is too long for any of
+    them is wrong by a tenth.
+    """
     random, count = np.random.default_rng(5), 3000
-    fogs = [HostFog((HostLayer(s, 0.0, h), HostLayer(0.05, 1.0, 40.0)), 0.0, clamped) for s, h in _STEEP]
-    origin, direction, place = random.normal(size=(3, count, 3)).astype(np.float32).astype(np.float64)
+    fogs = [
+        HostFog((HostLayer(s, 0.0, h), HostLayer(0.05, 1.0, 40.0)), 0.0, clamped) for s, h in _STEEP
+    ]
+    origin, direction, place = (
+        random.normal(size=(3, count, 3)).astype(np.float32).astype(np.float64)
+    )
     origin, place = 5 * origin, place * np.exp(random.uniform(-2, 3, (count, 1))).astype(np.float32)
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     x0 = np.where(random.random(count) < 0.5, 0, random.uniform(0, 10, count)).astype(np.float32)
@@ -135,15 +162,22 @@ def test_no_panel_misses_a_layer(variant, clamped):
         assert relative_errors(chosen, "single").max() < 1e-4
 
 
-@pytest.mark.claim("height-fog-kernels", tolerance="1e-4 for nine of ten generic rays, as asked for")
+@pytest.mark.claim(
+    "height-fog-kernels", tolerance="1e-4 for nine of ten generic rays, as asked for"
+)
 def test_sixteen_nodes_in_w(variant):
     errors = relative_errors(by_tag(*GENERIC), "single", KERNELS["quadrature"])
     assert np.quantile(errors, 0.9) < 1e-5
-    assert np.quantile(relative_errors(by_tag(*GENERIC), "double", find_kernel("quadrature-8")), 0.9) < 1e-5
+    assert (
+        np.quantile(relative_errors(by_tag(*GENERIC), "double", find_kernel("quadrature-8")), 0.9)
+        < 1e-5
+    )
 
 
 def test_a_segment_whose_panels_run_out_is_not_dark(variant, monkeypatch):
-    """A frame refuses what is not finite; a sum of some of the panels was a dark pixel in silence."""
+    """A frame refuses what is not finite; a sum of some of the panels was
+    a dark pixel in silence.
+    """
     monkeypatch.setattr(LitRays, "most_panels", 1)
     errors = relative_errors(by_tag(*GENERIC), "double")
     finite = np.isfinite(errors)
@@ -154,7 +188,11 @@ def test_a_segment_whose_panels_run_out_is_not_dark(variant, monkeypatch):
 def test_phi_keeps_its_digits(variant):
     for precision, error in (("single", 3e-7), ("double", 3e-15)):
         Float = array_types(precision).scalar
-        u = np.concatenate([[0.0], np.geomspace(1e-12, 60, 400)]).astype(np.float32).astype(np.float64)
+        u = (
+            np.concatenate([[0.0], np.geomspace(1e-12, 60, 400)])
+            .astype(np.float32)
+            .astype(np.float64)
+        )
         expected = np.where(u == 0, 1, -np.expm1(-u) / np.where(u == 0, 1, u))
         np.testing.assert_allclose(np.array(phi(Float(u)), dtype=np.float64), expected, rtol=error)
 
@@ -170,7 +208,9 @@ def scene(variant, tmp_path):
 
 
 def frame(scene, method, kernel="exact", **parameters):
-    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=find_kernel(kernel), **parameters))
+    return render_frame(
+        frame_renderer(read_scene(scene), METHODS[method], kernel=find_kernel(kernel), **parameters)
+    )
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
@@ -195,7 +235,8 @@ def test_a_running_sum_of_the_depth(scene):
 
     def differs(steps):
         exact_depth, running = (
-            frame(loaded, "ray-march", steps=steps, depth=depth, **how).airlight for depth in ("exact", "running")
+            frame(loaded, "ray-march", steps=steps, depth=depth, **how).airlight
+            for depth in ("exact", "running")
         )
         return relative_rmse(running, exact_depth)
 
@@ -224,5 +265,7 @@ def test_no_image_has_the_name_of_a_kernel_that_height_fog_did_not_ask(variant, 
 def test_refusals(scene):
     with pytest.raises(InputError, match="kernel: got taylor, which is of homogeneous fog"):
         frame(scene(LAMP), "shadow-planes", "taylor")
-    with pytest.raises(InputError, match="light 'sun' is directional and shines from the horizon or below"):
+    with pytest.raises(
+        InputError, match="light 'sun' is directional and shines from the horizon or below"
+    ):
         read_scene(scene(SUN.replace('z="-0.45"', 'z="0.1"')))

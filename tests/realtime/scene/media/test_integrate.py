@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a new medium that says its depth, its extinction, its bends and its longest panel is right to 1e-6 at once."""
+"""Claim: a new medium that says its depth, its extinction, its bends and its longest panel
+is right to 1e-6 at once.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +19,8 @@ from airlight.realtime.scene.media.medium import LitRays, VaryingMedium
 from airlight.realtime.scene.phase import HenyeyGreenstein
 from airlight.realtime.scene.rule_reach import NODES
 
-LOW, HIGH, TOP, G = 0.15, 1.1, 2.5, 0.6  # extinction below the ramp and above it [1/m], height of the ramp [m]
+# extinction below the ramp and above it [1/m], height of the ramp [m]
+LOW, HIGH, TOP, G = 0.15, 1.1, 2.5, 0.6
 LAMP = np.array([0.7, 1.3, 1.9])
 
 
@@ -36,7 +39,9 @@ class Ramp(VaryingMedium):
         """Return the optical depth of segments [1]: the mean over heights, in closed form."""
         z0, z1 = rays.at(x0).z, rays.at(x1).z
         level = dr.abs(z1 - z0) < 1e-9
-        column = LOW * z1 + (HIGH - LOW) * self._column(z1) - LOW * z0 - (HIGH - LOW) * self._column(z0)
+        column = (
+            LOW * z1 + (HIGH - LOW) * self._column(z1) - LOW * z0 - (HIGH - LOW) * self._column(z0)
+        )
         (here,) = self.extinction(rays, x0)
         return ((x1 - x0) * dr.select(level, here, column / (z1 - z0)),)
 
@@ -50,7 +55,9 @@ class Ramp(VaryingMedium):
         return tuple((z - rays.origin.z) / rays.direction.z for z in (0, TOP))
 
     def longest(self, rays, light, x, change):
-        """Return the length in which depths and the logarithm of the extinction change by so much together [m]."""
+        """Return the length in which depths and the logarithm of the extinction change
+        by so much together [m].
+        """
         r = dr.norm(light.toward(rays.at(x)))
         return change / (2 * HIGH + (HIGH - LOW) / TOP * (1 / LOW + r))
 
@@ -60,7 +67,9 @@ class Ramp(VaryingMedium):
 
 
 def depth(origin, direction, length):
-    """Return the optical depth of a segment: the trapezoidal rule is exact between the ends of the ramp."""
+    """Return the optical depth of a segment: the trapezoidal rule is exact
+    between the ends of the ramp.
+    """
     ends = [-origin[2] / direction[2], (TOP - origin[2]) / direction[2]]
     x = np.sort([0, *np.clip(ends, 0, length), length])
     return np.trapezoid(np.interp(origin[2] + x * direction[2], [0, TOP], [LOW, HIGH]), x)
@@ -114,13 +123,16 @@ def integrals(precision, spot=None, count=40):
         return 1 if spot is None else np.clip((cutoff - np.arccos(-way[2])) / (cutoff - beam), 0, 1)
 
     values = [
-        expected(origin, *ray, profile) if ray[2] > ray[1] else 0.0 for ray in zip(direction, x0, x1, strict=True)
+        expected(origin, *ray, profile) if ray[2] > ray[1] else 0.0
+        for ray in zip(direction, x0, x1, strict=True)
     ]
     return np.array(found.x, dtype=np.float64), np.array(values)
 
 
 def test_a_linear_density_ramp(variant, monkeypatch):
-    """The rule of float64, that of float32 without its rounding, and float32: its depth is a difference of columns."""
+    """The rule of float64, that of float32 without its rounding, and float32: its depth is
+    a difference of columns.
+    """
     found, values = integrals("double")
     assert np.abs(found / values - 1).max() < 1e-9
     monkeypatch.setattr(integrate, "_NODES_DOUBLE", NODES)

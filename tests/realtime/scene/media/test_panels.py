@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths by a walk from facet to facet are those by all planes, and bounds hold what they should; frames try panels."""
+"""Paths by a walk from facet to facet are those by all planes, and bounds hold what they
+should; frames try panels.
+"""
 
 import time
 
@@ -41,7 +43,9 @@ def bounds_of(name):
 
 @pytest.mark.parametrize("name", ["gem", "ball"])
 def test_paths_to_points_by_a_walk_over_the_facets(variant, name):
-    """Points anywhere: what a walk finds from facet to facet, and what all planes say of the same paths."""
+    """Points anywhere: what a walk finds from facet to facet, and what all
+    planes say of the same paths.
+    """
     light, types = np.array([1.7, 0.4, 2.9]), array_types("double")
     body = make_bounded_medium(
         Homogeneous((types.scalar(1.0),), types.color(1.0), Isotropic()),
@@ -50,13 +54,21 @@ def test_paths_to_points_by_a_walk_over_the_facets(variant, name):
     )
     rng = np.random.default_rng(11)
     points = CENTRE + rng.normal(size=(4000, 3)) * 1.2
-    start = types.vector(*(aligned_array(types.scalar, c) for c in (points - np.array(body.centre).ravel()).T))
-    for w, toward in ((1.0, light - np.array(body.centre).ravel()), (0.0, light / np.linalg.norm(light))):
+    start = types.vector(
+        *(aligned_array(types.scalar, c) for c in (points - np.array(body.centre).ravel()).T)
+    )
+    for w, toward in (
+        (1.0, light - np.array(body.centre).ravel()),
+        (0.0, light / np.linalg.norm(light)),
+    ):
         towards = types.vector(*(float(c) for c in toward))
         paths = LightPaths(body, w, towards, start, dr.zeros(types.vector))
         zero = types.scalar(0)
         r = dr.norm(towards - start) if w else types.scalar(1)
-        lengths = np.array(paths.length_at(zero, r)), np.array(paths.length(paths.envelopes_at(zero), zero, r))
+        lengths = (
+            np.array(paths.length_at(zero, r)),
+            np.array(paths.length(paths.envelopes_at(zero), zero, r)),
+        )
         assert np.count_nonzero(lengths[1]) > 400
         assert lengths[0] == pytest.approx(lengths[1], abs=1e-12)
 
@@ -70,7 +82,9 @@ def bounds_of_mesh(mesh, name="solid"):
 
 
 def sphere_bounds(centre, radius):
-    return Bounds("sphere", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius)
+    return Bounds(
+        "sphere", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius
+    )
 
 
 def test_what_the_half_spaces_hold_is_what_the_box_holds():
@@ -88,7 +102,9 @@ def divided_box(divisions):
     u, v = (part.ravel() for part in np.meshgrid(ends, ends))
     first = np.arange(len(u)).reshape(divisions + 1, -1)[:-1, :-1].ravel()
     right, up, across = first + 1, first + divisions + 1, first + divisions + 2
-    quads = np.concatenate([np.stack(corners, axis=1) for corners in ((first, right, across), (first, across, up))])
+    quads = np.concatenate(
+        [np.stack(corners, axis=1) for corners in ((first, right, across), (first, across, up))]
+    )
     vertices, faces = [], []
     for axis in range(3):
         for side in (-1, 1):
@@ -111,10 +127,13 @@ def test_facets_in_one_plane_are_one_half_space(divisions):
 def test_a_dent_and_a_twist_are_not_convex():
     """All vertices of the twisted prism, of Schoenhardt, are those of its hull."""
     vertices, faces = icosphere(3)
-    for depth, convex in ((3e-3, True), (2e-2, False)):  # a vertex of the sphere rises 3e-3 above its neighbours
+    # a vertex of the sphere rises 3e-3 above its neighbours
+    for depth, convex in ((3e-3, True), (2e-2, False)):
         dented = np.concatenate([vertices[:1] * (1 - depth), vertices[1:]])
         assert (bounds_of_mesh((dented, faces)) is not None) == convex
-    column, sides = prism(np.array([[np.cos(a), np.sin(a)] for a in np.arange(3) * 2 * np.pi / 3]), 1.9)
+    column, sides = prism(
+        np.array([[np.cos(a), np.sin(a)] for a in np.arange(3) * 2 * np.pi / 3]), 1.9
+    )
     for turn, convex in ((0.0, True), (30.0, False), (-30.0, True)):
         top = column[:, 2] > column[:, 2].mean()
         turned = np.where(top[:, None], column @ rotation((0, 0, 1), turn).T, column)
@@ -132,5 +151,6 @@ def test_a_smooth_body_is_read_in_seconds():
 
 def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():
     assert mean_distance(sphere_bounds((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
-    # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within 0.2 % (one standard error).
+    # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within
+    # 0.2 % (one standard error).
     assert mean_distance(bounds_of_mesh(icosphere(3))) == pytest.approx(1.2, rel=0.01)

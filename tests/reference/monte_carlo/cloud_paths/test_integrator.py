@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: paths through clouds give the light of each order: DISORT's in a slab, Mitsuba's `volpath` elsewhere.
+"""Claim: paths through clouds give the light of each order: DISORT's in a slab,
+Mitsuba's `volpath` elsewhere.
 
-In clouds with densities the opacity is the sum over the grid, and an even grid is a homogeneous cloud.
+In clouds with densities the opacity is the sum over the grid, and an even
+grid is a homogeneous cloud.
 """
 
 import math
@@ -24,7 +26,15 @@ from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.meshes import box, grid, placed
 from airlight.validation.scenes.parts import camera, mitsuba_mesh, sky, sun
 from airlight.validation.slab.radiance import slab_radiance
-from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, dense, length_inside, linear_between
+from tests.helpers.clouds import (
+    DROPLETS,
+    SUN,
+    cloud,
+    cloud_scene,
+    dense,
+    length_inside,
+    linear_between,
+)
 
 SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 
@@ -32,7 +42,11 @@ SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 def paths(clouds, count, samples, sets=SETS, first=0):
     seen = seen_clouds(clouds).meets
     return reduce(
-        merged, (cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen) for seed in range(first, first + count))
+        merged,
+        (
+            cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
+            for seed in range(first, first + count)
+        ),
     )
 
 
@@ -64,8 +78,12 @@ def scene(**parts):
 
 def scenes():
     hg = {"type": "hg", "g": 0.6}
-    ground = mitsuba_mesh("ground", grid((-9, -9, -1.7), (18, 0, 0), (0, 18, 0), (1, 1)), (0.7, 0.5, 0.3))
-    block = mitsuba_mesh("block", grid((0.0, -0.6, -0.6), (1.1, 0.2, 0), (0.1, 0.0, 1.1), (1, 1)), (0.6, 0.6, 0.2))
+    ground = mitsuba_mesh(
+        "ground", grid((-9, -9, -1.7), (18, 0, 0), (0, 18, 0), (1, 1)), (0.7, 0.5, 0.3)
+    )
+    block = mitsuba_mesh(
+        "block", grid((0.0, -0.6, -0.6), (1.1, 0.2, 0), (0.1, 0.0, 1.1), (1, 1)), (0.6, 0.6, 0.2)
+    )
     table = {"type": "tabphase", "values": "1.0, 0.2, 0.3, 0.9, 5.0"}
     return {
         "sky alone, coloured and absorbing": {
@@ -88,7 +106,9 @@ def scenes():
 
 
 def check_equal(first, second, least, layers=()):
-    """Assert that image means agree; the errors of these layers, or of all that have light, are below `least`."""
+    """Assert that image means agree; the errors of these layers, or of all that have
+    light, are below `least`.
+    """
     for layer in second.layers:
         (a, va), (b, vb) = (
             (own.mean(0), own.var(0, ddof=1) / len(own))
@@ -103,18 +123,28 @@ def check_equal(first, second, least, layers=()):
 @pytest.mark.slow
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "cloud-paths-are-volpath", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
+    "cloud-paths-are-volpath",
+    tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance",
 )
 @pytest.mark.parametrize(
     "name",
-    ["sky alone, coloured and absorbing", "two clouds, a ground and a block inside", "a surface within, two suns"],
+    [
+        "sky alone, coloured and absorbing",
+        "two clouds, a ground and a block inside",
+        "a surface within, two suns",
+    ],
 )
 def test_every_order_is_that_of_volpath(variant, name):
-    """Sky, several suns and clouds, phase functions, colours, and surfaces below and within clouds."""
+    """Sky, several suns and clouds, phase functions, colours, and surfaces
+    below and within clouds.
+    """
     clouds = read_clouds(scene(**scenes()[name]))
-    sets, batches = [("1", (1, 1)), ("2-inf", (2, math.inf))], 32  # few sets: each compiles a kernel of Mitsuba
+    # few sets: each compiles a kernel of Mitsuba
+    sets, batches = [("1", (1, 1)), ("2-inf", (2, math.inf))], 32
     ours = paths(clouds, batches, 256, sets)
-    theirs = reduce(merged, (volpath_orders_batch(clouds, seed, 256, sets=sets) for seed in range(batches)))
+    theirs = reduce(
+        merged, (volpath_orders_batch(clouds, seed, 256, sets=sets) for seed in range(batches))
+    )
     check_equal(ours, theirs, 0.04)
 
 
@@ -132,24 +162,34 @@ def slab_clouds():
     ways = []
     for mu, phi in slab_rays():
         angle, sine = math.radians(phi), math.sqrt(1 - mu * mu)
-        ways.append(-np.array([*(sine * (math.cos(angle) * forward + math.sin(angle) * aside)), mu]))
+        ways.append(
+            -np.array([*(sine * (math.cos(angle) * forward + math.sin(angle) * aside)), mu])
+        )
     return replace(clouds, direction=np.array(ways), origin=np.array([0.0, 0.0, 311.0]))
 
 
 def slab_reference(clouds):
-    """Return the radiance of the slab along `slab_rays`; another test holds `slab_radiance` against DISORT."""
+    """Return the radiance of the slab along `slab_rays`; another test holds
+    `slab_radiance` against DISORT.
+    """
     cloud, sun = clouds.clouds[0], clouds.suns[0]
     tau, g = float(cloud.sigma_t[1]) * 291.7, cloud.phase.g
     directions = [(mu, math.radians(phi)) for mu, phi in slab_rays()]
     radiance = slab_radiance(
-        tau, -sun.direction[2], HenyeyGreensteinPhase(g), float(cloud.albedo[1]), depths=[0.0], directions=directions
+        tau,
+        -sun.direction[2],
+        HenyeyGreensteinPhase(g),
+        float(cloud.albedo[1]),
+        depths=[0.0],
+        directions=directions,
     )[0]
     return radiance[:, None] * sun.irradiance
 
 
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "cloud-paths-are-disort", tolerance="chi-squared of 12 directions, level 1e-4; bias 4 standard errors"
+    "cloud-paths-are-disort",
+    tolerance="chi-squared of 12 directions, level 1e-4; bias 4 standard errors",
 )
 def test_the_slab_is_that_of_disort(variant):
     clouds = slab_clouds()
@@ -165,10 +205,13 @@ def test_the_slab_is_that_of_disort(variant):
 @pytest.mark.slow
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "cloud-paths-standard-errors", tolerance="95 % intervals of 32 batches hold DISORT's radiance: 91 to 98 %"
+    "cloud-paths-standard-errors",
+    tolerance="95 % intervals of 32 batches hold DISORT's radiance: 91 to 98 %",
 )
 def test_standard_errors_cover_the_reference_as_often_as_they_say(variant):
-    """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance at a level of 1e-4 or so."""
+    """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance
+    at a level of 1e-4 or so.
+    """
     clouds = slab_clouds()
     reference = slab_reference(clouds)[:, 1]
     held = []
@@ -178,7 +221,8 @@ def test_standard_errors_cover_the_reference_as_often_as_they_say(variant):
         held.append(np.abs(z) < t.ppf(0.975, 31))
     fraction = np.mean(held)
     spread = math.sqrt(0.95 * 0.05 / np.size(held))
-    assert abs(fraction - 0.95) < norm.ppf(1 - 5e-5) * spread + 0.005  # batches of 64 paths are skewed
+    # batches of 64 paths are skewed
+    assert abs(fraction - 0.95) < norm.ppf(1 - 5e-5) * spread + 0.005
 
 
 def test_order_one_is_its_integral(variant):
@@ -187,8 +231,12 @@ def test_order_one_is_its_integral(variant):
     mu0, g = -clouds.suns[0].direction[2], clouds.clouds[0].phase.g
     tau = float(clouds.clouds[0].sigma_t[1]) * 291.7
     batches = paths(clouds, 8, 256)
-    for (mu, phi), mean, error in zip(slab_rays(), batches.mean[2][:, 1], batches.standard_error[2][:, 1], strict=True):
-        cosine = -mu * mu0 + math.sqrt((1 - mu * mu) * (1 - mu0 * mu0)) * math.cos(math.radians(phi))
+    for (mu, phi), mean, error in zip(
+        slab_rays(), batches.mean[2][:, 1], batches.standard_error[2][:, 1], strict=True
+    ):
+        cosine = -mu * mu0 + math.sqrt((1 - mu * mu) * (1 - mu0 * mu0)) * math.cos(
+            math.radians(phi)
+        )
         p = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
         light = p / (4 * math.pi) * mu0 / (mu + mu0) * -math.expm1(-tau * (1 / mu + 1 / mu0))
         assert mean == pytest.approx(light * clouds.suns[0].irradiance[1], abs=6 * error)
@@ -216,7 +264,7 @@ def test_layers_add_up_and_seeds_give_the_same_numbers(variant):
     np.testing.assert_allclose(few.mean[0], one.mean[0], rtol=1e-6, atol=1e-12)
 
 
-# Clouds with densities -----------------------------------------------------------------------------------------------
+# Clouds with densities ----------------------------------------------------------------------------
 
 
 LOW, HIGH = np.array([-91.3, -73.9, -52.7]), np.array([111.7, 79.3, 61.1])
@@ -225,24 +273,33 @@ ROUGH = np.random.default_rng(5).random((9, 8, 7)) ** 3
 
 def clouds_of(medium=None, **parts):
     mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
-    scene = cloud_scene(sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts)
+    scene = cloud_scene(
+        sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts
+    )
     return read_clouds(mi.load_dict(scene))
 
 
 def rough(**changes):
-    return dense(changes.pop("values", ROUGH), LOW, HIGH, **{"sigma_t": 0.0517, "albedo": 0.96} | changes)
+    return dense(
+        changes.pop("values", ROUGH), LOW, HIGH, **{"sigma_t": 0.0517, "albedo": 0.96} | changes
+    )
 
 
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "hypertexture-reference", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
+    "hypertexture-reference",
+    tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance",
 )
 def test_an_even_grid_is_a_homogeneous_cloud(variant):
-    """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""
+    """Half the largest density everywhere but in a corner without cloud:
+    flights end where nothing is.
+    """
     values = np.full((40, 40, 40), 0.5)
     values[0, 0, 0] = 1.0  # beyond the box except for a fraction of 1e-5 of a voxel
     even = paths(clouds_of(rough(values=values)), 24, 256)
-    homogeneous = paths(clouds_of(DROPLETS | {"sigma_t": 0.5 * 0.0517, "albedo": 0.96}), 24, 256, first=100)
+    homogeneous = paths(
+        clouds_of(DROPLETS | {"sigma_t": 0.5 * 0.0517, "albedo": 0.96}), 24, 256, first=100
+    )
     check_equal(even, homogeneous, 0.02, ("airlight", "airlight_1"))
 
 
@@ -267,7 +324,10 @@ def test_opacity_is_the_sum_over_the_grid(variant):
 def test_what_is_no_density_is_refused_by_name(variant):
     wrong = ROUGH.copy()
     wrong[3, 2, 1] = -1e-3
-    coloured = {"type": "gridvolume", "grid": mi.VolumeGrid(np.full((2, 2, 2, 3), 0.5, dtype=np.float32))}
+    coloured = {
+        "type": "gridvolume",
+        "grid": mi.VolumeGrid(np.full((2, 2, 2, 3), 0.5, dtype=np.float32)),
+    }
     thin = mi.ScalarTransform4f().translate(LOW.tolist()).scale([5.0, 7.0, 9.0])
     small = {"sigma_t": rough()["sigma_t"] | {"to_world": thin}}
     cases = [

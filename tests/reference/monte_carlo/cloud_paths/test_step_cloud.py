@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the paths through clouds, and Mitsuba's `volpath`, give the consensus of I3RC in the step cloud."""
+"""Claim: the paths through clouds, and Mitsuba's `volpath`, give the consensus
+of I3RC in the step cloud.
+"""
 
 import math
 
@@ -17,7 +19,8 @@ from airlight.validation.scenes.registry import SCENES
 COLUMNS = 32
 PERIODS, WIDTH, THICKNESS = 9, 500.0, 250.0  #: of the cloud, widths [m]
 THIN, THICK = 2.0, 18.0  #: optical thickness of both halves
-#: Light at the zenith, and at 60 degrees travelling to +x: mean reflectance, and that of columns 1, 8, 17, 24.
+#: Light at the zenith, and at 60 degrees travelling to +x: mean reflectance, and that
+#: of columns 1, 8, 17, 24.
 CONSENSUS = {
     0.0: (0.32760, (0.27859, 0.22592, 0.32332, 0.45022)),
     60.0: (0.58044, (0.47539, 0.34333, 0.60301, 0.84800)),
@@ -32,7 +35,9 @@ def lit_from(sun):
 
 
 def rays_from_above(paths, seed):
-    """Return rays into the middle period, as many in each column, that gather a flux: by the cosine law."""
+    """Return rays into the middle period, as many in each column, that gather a
+    flux: by the cosine law.
+    """
     random = np.random.default_rng(seed)
     x = (np.arange(paths) % COLUMNS + random.random(paths)) * (500.0 / COLUMNS)
     cosine, azimuth = np.sqrt(random.random(paths)), 2 * np.pi * random.random(paths)
@@ -52,14 +57,25 @@ def by_walk(scene, paths, seed):
     sampler.seed(seed, paths)
     targets = Targets(mi.UInt32([0, 0]), 1)
     sums, _ = walk(
-        walk_scene(read_clouds(scene), 0), targets, sampler, rays_from_above(paths, seed), samples=1, side=SIDE
+        walk_scene(read_clouds(scene), 0),
+        targets,
+        sampler,
+        rays_from_above(paths, seed),
+        samples=1,
+        side=SIDE,
     )
     return np.array(sums[0]).reshape(-1, paths)[0]
 
 
 def as_grid(scene):
-    """Return the cloud as one box of a `heterogeneous` medium: `volpath` would leap over the gaps between boxes."""
-    grid = np.tile([THIN / THICKNESS, THICK / THICKNESS], PERIODS).astype(np.float32).reshape(1, 1, 2 * PERIODS, 1)
+    """Return the cloud as one box of a `heterogeneous` medium: `volpath` would leap
+    over the gaps between boxes.
+    """
+    grid = (
+        np.tile([THIN / THICKNESS, THICK / THICKNESS], PERIODS)
+        .astype(np.float32)
+        .reshape(1, 1, 2 * PERIODS, 1)
+    )
     to_world = mi.ScalarTransform4f().translate([-(PERIODS // 2) * WIDTH, -1200.0, 0.0])
     to_world = to_world @ mi.ScalarTransform4f().scale([PERIODS * WIDTH, 2400.0, THICKNESS])
     return mi.load_dict(
@@ -91,14 +107,17 @@ def by_volpath(scene, paths, seed):
     integrator = mi.load_dict({"type": "volpath", "max_depth": -1, "rr_depth": 1 << 20})
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, paths)
-    radiance, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(rays_from_above(paths, seed)), None)
+    radiance, _, _ = integrator.sample(
+        scene, sampler, mi.RayDifferential3f(rays_from_above(paths, seed)), None
+    )
     return np.array(radiance.x)
 
 
 @pytest.mark.slow
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "cloud-paths-step-cloud", tolerance="mean 0.0005 and three standard errors, columns 0.003 and theirs"
+    "cloud-paths-step-cloud",
+    tolerance="mean 0.0005 and three standard errors, columns 0.003 and theirs",
 )
 @pytest.mark.parametrize("sun", CONSENSUS)
 @pytest.mark.parametrize("estimate", [by_walk, by_volpath])

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sampling distances: the densities against histograms, integrals and a single technique at a time.
 
-The spans cover what a camera can see: a light behind it, beside it, beyond the surface, very close to the ray, spans
-that are short, unbounded, thin or many mean free paths thick, and the spans that a spot's cone cuts out.
+The spans cover what a camera can see: a light behind it, beside it, beyond the surface, very close
+to the ray, spans that are short, unbounded, thin or many mean free paths thick, and the spans that
+a spot's cone cuts out.
 """
 
 import drjit as dr
@@ -65,18 +66,26 @@ def _technique(case, name):
         flight = ds.free_flights(_span(case).length, dr.opaque(mi.Float64, SPANS[case][3][-1]))
         return lambda u: ds.free_flight(u, flight), lambda y: ds.free_flight_pdf(y, flight)
     mixture = _mixture(case)
-    return lambda u: mi.Float64(ds.sample_distance(u, mixture)[0]), lambda y: sum(ds.mixture_pdfs(y, mixture))
+    return lambda u: mi.Float64(ds.sample_distance(u, mixture)[0]), lambda y: sum(
+        ds.mixture_pdfs(y, mixture)
+    )
 
 
 def _edges(case, sample):
-    """Return cells that hold about equal fractions of the samples and of the length, to the end of the span."""
+    """Return cells that hold about equal fractions of the samples and of the
+    length, to the end of the span.
+    """
     length = SPANS[case][2]
-    fractions = np.array(sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64)
+    fractions = np.array(
+        sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64
+    )
     return np.concatenate([[0.0], np.unique(fractions), [length]])
 
 
 def _probabilities(edges, density):
-    """Integrate a density over cells by the tanh-sinh rule, whose nodes crowd at the ends, where the peaks are."""
+    """Integrate a density over cells by the tanh-sinh rule, whose nodes crowd at the
+    ends, where the peaks are.
+    """
     step = 0.05
     k = step * np.arange(-80, 81)
     v = 1 / (1 + np.exp(-np.pi * np.sinh(k)))
@@ -87,7 +96,9 @@ def _probabilities(edges, density):
     # An unbounded cell goes by y = low + width v/(1 - v).
     y = np.where(np.isinf(high), low + width * v / rest, low + width * v)
     jacobian = np.where(np.isinf(high), width / rest**2, width)
-    values = np.array(density(aligned_array(mi.Float64, y.ravel())), dtype=np.float64).reshape(y.shape)
+    values = np.array(density(aligned_array(mi.Float64, y.ravel())), dtype=np.float64).reshape(
+        y.shape
+    )
     return (values * jacobian * weight).sum(axis=1)
 
 
@@ -108,7 +119,9 @@ def _p_value(case, name, *, sample=None, density=None, seed=0):
 @pytest.mark.claim("sampled-distances", tolerance="chi-square, family level 1e-4")
 @pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
 def test_samples_follow_the_density(variant, name):
-    """Rationale: chi-square tests of 13 spans, Sidak's level for all of them together is 1e-4 with fixed seeds."""
+    """Rationale: chi-square tests of 13 spans, Sidak's level for all of them together
+    is 1e-4 with fixed seeds.
+    """
     level = 1 - (1 - 1e-4) ** (1 / len(SPANS))
     p_values = {case: _p_value(case, name, seed=number) for number, case in enumerate(SPANS)}
     assert min(p_values.values()) > level, p_values
@@ -120,12 +133,14 @@ def test_samples_follow_the_density(variant, name):
 def test_densities_integrate_to_one(variant, case, name):
     sample, density = _technique(case, name)
     total = _probabilities(_edges(case, sample), density).sum()
-    # The integrals of the cells are good to 1e-9; a free flight is cut after 60 mean free paths, worth 1e-26.
+    # The integrals of the cells are good to 1e-9; a free flight is cut after 60 mean
+    # free paths, worth 1e-26.
     assert total == pytest.approx(1, abs=1e-8)
 
 
 def test_mixture_is_inverted(variant):
-    """Rationale: the estimator divides by the mixture's density, so its distribution must be inverted to rounding.
+    """Rationale: the estimator divides by the mixture's density, so its distribution must
+    be inverted to rounding.
 
     Setup: random spans over many orders of magnitude, unbounded ones among them.
     """
@@ -141,19 +156,22 @@ def test_mixture_is_inverted(variant):
     )
     u = rng.random(n)
     y, _ = sample_distance(mi.Float64(u), mixture)
-    # y has all its digits near the start of the span, s has them near the light; either may be rounded elsewhere.
+    # y has all its digits near the start of the span, s has them near the light; either
+    # may be rounded elsewhere.
     errors = [
         np.abs(np.array(mixture_cdf(at, mixture)) - u)
         for at in (mi.Float64(y), mi.Float64(start + y) - mi.Float64(start))
     ]
-    # Tolerance: single precision's rounding 6e-8 of y, times up to y pdf(y), at most about 40 by the cut of flights.
+    # Tolerance: single precision's rounding 6e-8 of y, times up to y pdf(y), at most about
+    # 40 by the cut of flights.
     assert np.minimum(*errors).max() < 3e-6
 
 
 def test_spots_cone_is_covered(variant):
     """Rationale: samples may fall beside a cone, never may the cone reach beyond the samples.
 
-    Setup: random rays and cones; points on the ray inside the cone, by the angle to the axis in plain NumPy.
+    Setup: random rays and cones; points on the ray inside the cone, by the angle to
+    the axis in plain NumPy.
     """
 
     rng = np.random.default_rng(11)
@@ -162,9 +180,13 @@ def test_spots_cone_is_covered(variant):
         origin, direction, axis = rng.normal(size=(3, n, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        approach = closest_approach(mi.Point3d(origin.T), mi.Vector3d(direction.T), mi.Point3d(0, 0, 0))
+        approach = closest_approach(
+            mi.Point3d(origin.T), mi.Vector3d(direction.T), mi.Point3d(0, 0, 0)
+        )
         cutoff = np.deg2rad(cutoff_degrees)
-        ends = cone_ends(approach, mi.Vector3d(direction.T), axis=mi.Vector3d(axis.T), cutoff=cutoff)
+        ends = cone_ends(
+            approach, mi.Vector3d(direction.T), axis=mi.Vector3d(axis.T), cutoff=cutoff
+        )
         low, high = (np.broadcast_to(np.array(end, dtype=np.float64), n) for end in ends)
         foot = -np.sum(origin * direction, axis=1)
         x = np.linspace(-30, 30, 2001)
@@ -180,11 +202,15 @@ def test_spots_cone_is_covered(variant):
 
 @pytest.mark.claim("sampled-distances")
 def test_sampled_distances_have_their_density(variant):
-    """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
+    """The mean of 1/density over the samples is the length; the density is
+    below 1/(2 length) nowhere.
+    """
     count = 4096
     u = mi.Float((np.arange(count) + 0.5) / count)
     for sigma_t in ([0.0], [1.3], [0.2, 3.0, 40.0]):
-        y, density = (np.array(part, dtype=np.float64) for part in sample_stretch(u, mi.Float(1.7), sigma_t))
+        y, density = (
+            np.array(part, dtype=np.float64) for part in sample_stretch(u, mi.Float(1.7), sigma_t)
+        )
         assert np.all((y >= 0) & (y <= 1.7000001))
         assert density.min() >= 0.5 / 1.7 * (1 - 1e-6)
         # The midpoint rule in u, whose integrand has a jump between the techniques: 1/count.

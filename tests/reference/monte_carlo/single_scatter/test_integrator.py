@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The integrator `single-scatter` against everything that leads to the same radiance without its code."""
+"""The integrator `single-scatter` against everything that leads to the same
+radiance without its code.
+"""
 
 from functools import reduce
 
@@ -24,7 +26,9 @@ def _load(**changes):
 
 
 def _run(reference, *, samples=64, batches=_BATCHES):
-    return reduce(merged, (single_scatter_batch(reference, seed, samples) for seed in range(batches)))
+    return reduce(
+        merged, (single_scatter_batch(reference, seed, samples) for seed in range(batches))
+    )
 
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.31, "albedo": 0.8}
@@ -61,22 +65,35 @@ MEDIA = {
     "thick, light from behind": lambda: in_media(
         brick=brick((0.71, 0.3, 0.02), scale=3.1), pearl=None, sun=sun([0.1, -1.0, -0.2])
     ),
-    "two suns and a lamp": lambda: in_media(second=sun([0.4, 0.9, -0.3], (1.0, 2.0, 3.0)), lamp=lamp(), occluder=None),
-    "lamp inside of the box": lambda: in_media(sun=None, lamp=lamp(position=[-0.6, 0.3, 0.71]), **ball_over_floor()),
+    "two suns and a lamp": lambda: in_media(
+        second=sun([0.4, 0.9, -0.3], (1.0, 2.0, 3.0)), lamp=lamp(), occluder=None
+    ),
+    "lamp inside of the box": lambda: in_media(
+        sun=None, lamp=lamp(position=[-0.6, 0.3, 0.71]), **ball_over_floor()
+    ),
 }
 CASES = FOGS | MEDIA
-FAST = ("sphere and floor", "soft spot", "coloured", "sun on box and sphere", "lamp inside of the box")
+FAST = (
+    "sphere and floor",
+    "soft spot",
+    "coloured",
+    "sun on box and sphere",
+    "lamp inside of the box",
+)
 
 
-@pytest.mark.claim("single-scatter-agrees", "bounded-media", tolerance="family level 1e-4; bias within four errors")
+@pytest.mark.claim(
+    "single-scatter-agrees", "bounded-media", tolerance="family level 1e-4; bias within four errors"
+)
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in FAST else pytest.mark.statistical) for name in CASES]
+    "name",
+    [pytest.param(name, marks=[] if name in FAST else pytest.mark.statistical) for name in CASES],
 )
 def test_agrees_with_the_quadrature(variant, name):
     """Rationale: the certified integral over lit intervals and this estimator share no derivation.
 
-    Setup: 16 x 12 pixels, 32 batches of 64 stratified distances, fixed seeds.
-    Expected: each pixel within its error at a family level of 1e-4, pooled bias within four standard errors, and those
+    Setup: 16 x 12 pixels, 32 batches of 64 stratified distances, fixed seeds. Expected: each pixel
+    within its error at a family level of 1e-4, pooled bias within four standard errors, and those
     below 0.1 %; surfaces, which need no sampling, to the rounding of single precision.
     """
     reference = read_reference(mi.load_dict(CASES[name]()))
@@ -86,8 +103,8 @@ def test_agrees_with_the_quadrature(variant, name):
     lit = expected > 0
     assert lit.sum() > 60
     assert np.all(mean[~lit] == 0)
-    # Rounding in single precision: 3e-6 of a value, to be seen where the sampling error is smaller still; it puts
-    # boundaries and segments that are some metres long to 1e-6 m.
+    # Rounding in single precision: 3e-6 of a value, to be seen where the sampling error is smaller
+    # still; it puts boundaries and segments that are some metres long to 1e-6 m.
     rounding = 3e-6 * (expected + (expected[lit].mean() if name in MEDIA else 0))[lit]
     score = (mean - expected)[lit] / np.hypot(error[lit], rounding)
     assert np.abs(score).max() < t.isf(0.5e-4 / lit.sum(), _BATCHES - 1)
@@ -96,8 +113,11 @@ def test_agrees_with_the_quadrature(variant, name):
         total = expected[:, channel].sum()
         pooled = np.sqrt(np.sum(error[:, channel] ** 2)) / total
         assert pooled < 1e-3
-        assert abs(mean[:, channel].sum() / total - 1) < 4 * pooled + (3e-6 if name in MEDIA else 1e-6)
-    # A pixel at the terminator or on an edge of a shadow may fall on either side: none does in these scenes.
+        assert abs(mean[:, channel].sum() / total - 1) < 4 * pooled + (
+            3e-6 if name in MEDIA else 1e-6
+        )
+    # A pixel at the terminator or on an edge of a shadow may fall on either side:
+    # none does in these scenes.
     close = 1e-5 if name in MEDIA else 5e-6
     assert batches.mean[1] == pytest.approx(image.surface.reshape(-1, 3), rel=close, abs=1e-12)
     assert np.all(batches.standard_error[1] == 0)
@@ -121,5 +141,7 @@ def _kernels(lamps: int) -> set:
 
 
 def test_lamps_share_their_compiled_kernels(variant):
-    """A kernel with a loop for each lamp took minutes to compile for 32 of them, and did not end for 512."""
+    """A kernel with a loop for each lamp took minutes to compile for 32 of them,
+    and did not end for 512.
+    """
     assert _kernels(7) == _kernels(2)

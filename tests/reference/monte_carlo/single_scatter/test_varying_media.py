@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Skies and area lights in height fog, density grids and bounds: estimators that share no sample agree."""
+"""Skies and area lights in height fog, density grids and bounds: estimators
+that share no sample agree.
+"""
 
 import numpy as np
 import pytest
@@ -54,7 +56,9 @@ CASES = {
 
 @pytest.mark.slow
 @pytest.mark.statistical
-@pytest.mark.claim("varying-estimators", tolerance="four standard errors, 0.5 % of the airlight at most")
+@pytest.mark.claim(
+    "varying-estimators", tolerance="four standard errors, 0.5 % of the airlight at most"
+)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: ", ".join(case[:2]))
 def test_estimators_agree_where_shapes_stand_in_the_light(variant, tmp_path, case):
     """Airlight and surface of the image, in red; the errors of volpath are below 1 and 2 %."""
@@ -62,9 +66,13 @@ def test_estimators_agree_where_shapes_stand_in_the_light(variant, tmp_path, cas
     compare(tmp_path, medium, light, CASES[case], samples=256)
 
 
-@pytest.mark.claim("varying-estimators", tolerance="four standard errors, 0.5 % of the image at most")
+@pytest.mark.claim(
+    "varying-estimators", tolerance="four standard errors, 0.5 % of the image at most"
+)
 def test_a_panel_in_height_fog(variant, tmp_path):
-    """The sampled estimator finds what the quadrature does of a light whose paths have optical depths of their own."""
+    """The sampled estimator finds what the quadrature does of a light whose paths have
+    optical depths of their own.
+    """
     compare(tmp_path, "height fog", PANEL, ((single_scatter_batch, 12, 5e-3),), samples=128)
 
 
@@ -74,9 +82,13 @@ def compare(tmp_path, medium, light, traces, *, samples):
     reference = read_reference(load_scene(str(path)).scene)
     image = quadrature_image(reference, checks=0)
     known = image.replicate_means.mean(axis=1)[:, 0]
-    of_known = image.replicate_means.std(axis=1, ddof=1)[:, 0] / np.sqrt(image.replicate_means.shape[1])
+    of_known = image.replicate_means.std(axis=1, ddof=1)[:, 0] / np.sqrt(
+        image.replicate_means.shape[1]
+    )
     for trace, count, most in traces:
-        means = np.array([trace(reference, seed, samples).mean.mean(axis=1)[:, 0] for seed in range(count)])
+        means = np.array(
+            [trace(reference, seed, samples).mean.mean(axis=1)[:, 0] for seed in range(count)]
+        )
         error = np.hypot(of_known, means.std(axis=0, ddof=1) / np.sqrt(count))
         assert (np.abs(means.mean(axis=0) - known) < 4 * error).all(), trace.__name__
         assert (error < np.array([most, 2 * most]) * known).all(), trace.__name__

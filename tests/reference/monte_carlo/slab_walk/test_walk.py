@@ -38,12 +38,16 @@ def test_a_table_has_the_moments_of_its_function():
 
 
 def test_the_beam_is_exact_and_orders_begin_at_zero():
-    """Order 0 has no noise: each photon counts with its probability to pass, at the place where the beam goes."""
+    """Order 0 has no noise: each photon counts with its probability to pass, at the
+    place where the beam goes.
+    """
     slab = Slab(1.3, 0.6, 0.9, HenyeyGreenstein(0.5), [0.5])
     counts = walk(slab, 100, np.random.default_rng(0))
     tangent = 0.8 / 0.6
     beam = math.exp(-1.3 / 0.6)
-    assert counts.transmitted[:, 0] == pytest.approx([beam, beam * 1.3 * tangent, beam * (1.3 * tangent) ** 2])
+    assert counts.transmitted[:, 0] == pytest.approx(
+        [beam, beam * 1.3 * tangent, beam * (1.3 * tangent) ** 2]
+    )
     assert counts.reflected[0, 0] == 0
     assert counts.down[0, 0, 0] == pytest.approx(math.exp(-0.5 / 0.6))
     assert counts.fluence[0, 0, 0] == pytest.approx(math.exp(-0.5 / 0.6) / 0.6)
@@ -54,7 +58,9 @@ def test_the_beam_is_exact_and_orders_begin_at_zero():
 def test_nothing_is_lost_and_absorption_is_a_weight():
     """Seeds are fixed: at 4.5 standard errors one of 150 000 seeds would fail."""
     estimates = {
-        albedo: slab_estimate(Slab(2.0, 0.7, albedo, HenyeyGreenstein(0.3)), [(1, 1), (3, 3)], photons=100_000)
+        albedo: slab_estimate(
+            Slab(2.0, 0.7, albedo, HenyeyGreenstein(0.3)), [(1, 1), (3, 3)], photons=100_000
+        )
         for albedo in (1.0, 0.5)
     }
     values, errors = estimates[1.0].totals

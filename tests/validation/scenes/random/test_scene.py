@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: `random:SEED` is a scene wherever one is taken, valid, the same on every run, sound and lit."""
+"""Claim: `random:SEED` is a scene wherever one is taken, valid, the same on
+every run, sound and lit.
+"""
 
 import hashlib
 from dataclasses import replace
@@ -20,35 +22,55 @@ from airlight.validation.scenes.random.lights import Light
 from airlight.validation.scenes.random.scene import draw_scene, drawn_values, with_reach
 
 
-@pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
-@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 48), marks=pytest.mark.slow)], ids=["few", "many"])
+@pytest.mark.claim(
+    "random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn"
+)
+@pytest.mark.parametrize(
+    "seeds", [range(8), pytest.param(range(8, 48), marks=pytest.mark.slow)], ids=["few", "many"]
+)
 def test_both_readers_take_what_was_drawn(variant, seeds):
     for seed in seeds:
         loaded = load_scene(f"random:{seed}", (16, 12))
         drawn = drawn_values(loaded.name)
         ours, reference = read_scene(loaded.scene), read_reference(loaded.scene)
         assert len(ours.lights) + len(ours.area_lights) == len(drawn["lights"])
-        assert len(reference.lights) + len(reference.area) + len(reference.directional) == len(drawn["lights"])
+        assert len(reference.lights) + len(reference.area) + len(reference.directional) == len(
+            drawn["lights"]
+        )
         bounded = [medium for medium in drawn["media"] if medium["bounds"] != "unbounded"]
         assert len(reference.media) == len(bounded)
         assert ours.medium.clear == (len(bounded) == len(drawn["media"]))
         # The drawn values arrive in single precision, as the scene has it.
-        sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"unbounded": reference.medium.sigma_t}
+        sigma = {medium.name: medium.sigma_t for medium in reference.media} | {
+            "unbounded": reference.medium.sigma_t
+        }
         for medium in drawn["media"]:
             np.testing.assert_allclose(sigma[medium["name"]], medium["sigma_t"], rtol=1e-6)
         assert len(reference.occluders.shapes()) >= len(drawn["occluders"])
 
 
-@pytest.mark.claim("random-same", tolerance="none: the digests of two loads, and of the record kept here, are equal")
+@pytest.mark.claim(
+    "random-same",
+    tolerance="none: the digests of two loads, and of the record kept here, are equal",
+)
 def test_the_same_seed_is_the_same_scene(variant):
-    digests = [scene_digest(load_scene(name, (8, 6)).scene) for name in ("random:3", "random:3", "random:4")]
+    digests = [
+        scene_digest(load_scene(name, (8, 6)).scene)
+        for name in ("random:3", "random:3", "random:4")
+    ]
     assert digests[0] == digests[1] != digests[2]
     # An old seed keeps its scene: the digest is of records, whose numbers no variant rounds.
     words = hashlib.sha256()
     for seed in range(8):
         drawn = drawn_values(f"random:{seed}")
-        words.update(",".join(f"{each['kind']} {each['position'][0]:.6g}" for each in drawn["lights"]).encode())
-        words.update(",".join(f"{each['kind']} {each['radius']:.6g}" for each in drawn["occluders"]).encode())
+        words.update(
+            ",".join(
+                f"{each['kind']} {each['position'][0]:.6g}" for each in drawn["lights"]
+            ).encode()
+        )
+        words.update(
+            ",".join(f"{each['kind']} {each['radius']:.6g}" for each in drawn["occluders"]).encode()
+        )
     assert words.hexdigest()[:16] == KEPT
 
 
@@ -56,7 +78,14 @@ KEPT = "626df2435b5b8389"
 
 
 def test_a_name_that_is_no_seed_is_refused():
-    for name in ("random:", "random:seven", "random:-1", "random:7,meshes=.", "random:7,ranges=", "random:1:2"):
+    for name in (
+        "random:",
+        "random:seven",
+        "random:-1",
+        "random:7,meshes=.",
+        "random:7,ranges=",
+        "random:1:2",
+    ):
         with pytest.raises(InputError, match=r"expected random:SEED|expected ranges=FILE"):
             load_scene(name)
     with pytest.raises(InputError, match="expected a whole number from 0"):
@@ -72,7 +101,8 @@ def points():
 
 
 @pytest.mark.claim(
-    "random-cover", tolerance="a sixteenth of the range holds 0.4 to 1.6 times its fraction of 512 points"
+    "random-cover",
+    tolerance="a sixteenth of the range holds 0.4 to 1.6 times its fraction of 512 points",
 )
 def test_the_first_points_cover_every_coordinate(points):
     counts = np.array([np.histogram(column, bins=16, range=(0, 1))[0] for column in points.T])
@@ -83,7 +113,12 @@ def test_the_first_points_cover_every_coordinate(points):
 @pytest.mark.claim("random-ranges", tolerance="none: what is drawn lies within the range")
 def test_what_is_set_is_drawn():
     ranges = ranges_from(
-        {"optical_depth": [0.5, 0.7], "lights": 2, "light_kinds": {"spot": 1}, "media": {"unbounded": 1}}
+        {
+            "optical_depth": [0.5, 0.7],
+            "lights": 2,
+            "light_kinds": {"spot": 1},
+            "media": {"unbounded": 1},
+        }
     )
     for seed in range(12):
         drawn = draw_scene(seed, ranges)
@@ -95,7 +130,10 @@ def test_what_is_set_is_drawn():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"optical_dept": [1, 2]}, "got optical_dept, expected one of .*did you mean 'optical_depth'"),
+        (
+            {"optical_dept": [1, 2]},
+            "got optical_dept, expected one of .*did you mean 'optical_depth'",
+        ),
         ({"fov": [50, 20]}, r"fov: got \[50, 20\], expected \[from, to\]"),
         ({"fov": [50, 200]}, "fov: got 200, expected a number from 1 to 160"),
         ({"light_kinds": {"laser": 1}}, "got light_kinds.laser, expected one of point, spot"),
@@ -130,7 +168,11 @@ def test_no_occluder_holds_the_camera_or_a_light_unless_meant_to(scenes):
             assert _clearance(occluder, drawn.origin) > 0, drawn.seed
             for light in drawn.lights:
                 caged = occluder.kind == "cage" and np.all(occluder.position == light.position)
-                assert caged or _clearance(occluder, light.position) > 0, (drawn.seed, occluder.name, light.name)
+                assert caged or _clearance(occluder, light.position) > 0, (
+                    drawn.seed,
+                    occluder.name,
+                    light.name,
+                )
 
 
 def test_all_lie_before_floor_wall_and_room(scenes):
@@ -141,10 +183,15 @@ def test_all_lie_before_floor_wall_and_room(scenes):
                 vertices, faces = occluder.mesh
                 a, b, c = (vertices[faces[:, corner]] for corner in range(3))
                 for place in (drawn.origin, *near):
-                    assert np.all(np.sum((place - a) * np.cross(b - a, c - a), axis=1) > 0), drawn.seed
+                    assert np.all(np.sum((place - a) * np.cross(b - a, c - a), axis=1) > 0), (
+                        drawn.seed
+                    )
 
 
-@pytest.mark.claim("random-not-round", tolerance="no number has fewer than four digits after the first in 300 scenes")
+@pytest.mark.claim(
+    "random-not-round",
+    tolerance="no number has fewer than four digits after the first in 300 scenes",
+)
 def test_no_number_is_round(scenes):
     for drawn in scenes:
         numbers = [drawn.scale, *drawn.centre, *drawn.origin, drawn.fov]
@@ -162,7 +209,10 @@ def found(*meshes):
     lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
     drawn = draw_scene(0, ranges_from({}))
     drawn = replace(drawn, centre=np.zeros(3), scale=1.0, lights=(lamp,), **camera)
-    shapes = {f"occluder-{number}": mitsuba_mesh("occluder", mesh, (0.5,) * 3) for number, mesh in enumerate(meshes)}
+    shapes = {
+        f"occluder-{number}": mitsuba_mesh("occluder", mesh, (0.5,) * 3)
+        for number, mesh in enumerate(meshes)
+    }
     return with_reach(drawn, mi.load_dict({"type": "scene"} | shapes))
 
 
