@@ -54,7 +54,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

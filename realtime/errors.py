@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exceptions of the side under test: `InputError` is that of all of airlight."""
-
-from airlight.errors import InputError as InputError
+"""Exceptions of the side under test beside `airlight.errors.InputError`."""
 
 
 class NoDriverError(RuntimeError):

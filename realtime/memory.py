@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 
 _CGROUPS = Path("/sys/fs/cgroup")
 _OWN_CGROUPS = Path("/proc/self/cgroup")

@@ -14,7 +14,7 @@ the documentation all follow from the fields.
 Steps(steps=24)
 >>> Steps(steps=0)
 Traceback (most recent call last):
-airlight.realtime.errors.InputError: steps: got 0, expected a whole number of at least 1
+airlight.errors.InputError: steps: got 0, expected a whole number of at least 1
 """
 
 import math

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -84,7 +84,7 @@ def work() -> None:
 
     import drjit as dr
 
-    from airlight.realtime.errors import InputError
+    from airlight.errors import InputError
     from airlight.realtime.frame.renderer import frame_renderer, render_frame
     from airlight.realtime.kernels.registry import KERNELS
     from airlight.realtime.methods.registry import METHODS, find_method

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.export.languages import LANGUAGES
 from airlight.realtime.kernels.exact import DEEPEST, MOST_PANELS
 from airlight.realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.camera import HostCamera, read_camera
 from airlight.realtime.scene.read_scene import Scene
 

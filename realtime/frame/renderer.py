@@ -33,8 +33,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.points import LightSamples
-from airlight.realtime.errors import InputError
 from airlight.realtime.frame.history import HistoryPass
 from airlight.realtime.frame.light_on_ray import check_radiance
 from airlight.realtime.frame.sphere_lights import sampled_sphere, sphere_scales

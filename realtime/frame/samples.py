@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.points import bit_reversed
-from airlight.realtime.errors import InputError
 from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from airlight.realtime.scene.camera import shifted_camera
 

@@ -39,7 +39,7 @@ make Im w agree in sign, so Im S keeps its relative accuracy where it is tiny.
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.exact import path_over_height
 from airlight.realtime.numerics.array_types import is_single, smallest
 from airlight.realtime.rays import RayGeometry

@@ -18,7 +18,7 @@ from typing import Any
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.exact import falloff_by_path, range_of_v, transmittance_before
 from airlight.realtime.numerics.array_types import smallest
 from airlight.realtime.numerics.functions import exp_bounded, summed, unit_nodes

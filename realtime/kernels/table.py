@@ -25,7 +25,7 @@ from functools import lru_cache
 import drjit as dr
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import four_numbers
 from airlight.realtime.numerics.functions import cell_of
 from airlight.realtime.rays import RayGeometry

@@ -46,7 +46,7 @@ Two choices let it be compared with other kernels:
 import drjit as dr
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import largest
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light

@@ -23,6 +23,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from airlight.errors import InputError
 from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
 from airlight.realtime.clouds.density_maps import LightDepths, sun_depths
 from airlight.realtime.clouds.march import (
@@ -40,7 +41,6 @@ from airlight.realtime.clouds.single_scattering import (
     sky_behind,
 )
 from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
-from airlight.realtime.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method, View
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.media.bounded import Clouds

@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass, field, fields, make_dataclass
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.parameters import Parameters, defaults, parameter
 

@@ -34,7 +34,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
 from airlight.realtime.methods.interface.method import Method, animate, jitter

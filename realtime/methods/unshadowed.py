@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.parameters import parameter
 

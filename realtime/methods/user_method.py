@@ -30,7 +30,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.errors import InputError, root_of
+from airlight.errors import InputError
+from airlight.realtime.errors import root_of
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.light_table import by_source as sources

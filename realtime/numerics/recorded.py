@@ -21,7 +21,8 @@ from typing import Any
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError, root_of
+from airlight.errors import InputError
+from airlight.realtime.errors import root_of
 
 
 class _CollectorPause:

@@ -16,8 +16,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.shape import AreaLight, occluder_vertices
-from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array, types_of
 from airlight.realtime.scene.directional_extent import directional_fields, extent_spheres
 from airlight.realtime.scene.lights import DirectionalExtent, Light

@@ -30,7 +30,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 from airlight.realtime.transforms import turned_outwards
 

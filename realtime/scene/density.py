@@ -26,7 +26,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.memory import check_memory
 from airlight.realtime.numerics.array_types import (
     ArrayTypes,

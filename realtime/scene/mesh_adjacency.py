@@ -25,12 +25,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.shape import (
     AreaLight,
     occluder_triangles,
     occluder_vertices,
 )
-from airlight.realtime.errors import InputError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -22,8 +22,8 @@ import mitsuba as mi
 import numpy as np
 from drjit.scalar import ArrayXf64
 
+from airlight.errors import InputError
 from airlight.realtime.droplets import CUT, droplet_table, fraction_cut
-from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.functions import between_entries, cell_of
 from airlight.realtime.scene.rule_reach import Reach, reach_of, shortest
 

@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array
 from airlight.realtime.scene.closed_mesh import (
     Bounds,

@@ -17,8 +17,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.shape import AreaLight, read_area_light
-from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import ArrayTypes, array_types, types_of
 from airlight.realtime.scene.camera import Camera, sensor_camera
 from airlight.realtime.scene.directional_extent import (

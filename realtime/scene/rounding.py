@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.transforms import host_matrix
 
 Array = NDArray[np.float64]

@@ -24,7 +24,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.memory import check_memory
 from airlight.realtime.numerics.array_types import bytes_of
 from airlight.realtime.parameters import parameter

@@ -43,6 +43,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.realtime.clouds.canonical import coordinates
 from airlight.realtime.clouds.canonical.coordinates import (
     ENTRIES,
@@ -55,7 +56,6 @@ from airlight.realtime.clouds.canonical.coordinates import (
 from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
 from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
-from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import ArrayTypes, four_numbers
 from airlight.realtime.numerics.functions import between_entries
 

@@ -7,7 +7,7 @@ by convex shapes, height fog, or a grid for those that march. Methods of clouds 
 boundaries of any shape, under lights at infinity.
 """
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.scene.read_scene import Scene
 

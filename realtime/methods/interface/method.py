@@ -23,8 +23,8 @@ from typing import Any, ClassVar
 
 import drjit as dr
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.points import LightSamples
-from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import Metres, PerRay
 from airlight.realtime.numerics.noise import PATTERNS, Noise
 from airlight.realtime.parameters import Parameters, defaults, parameter, read_parameters, values

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.shader.client import ShaderHost
 from airlight.realtime.methods.shader.prelude import phase_text, stage_text

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import host_numbers
 from airlight.realtime.scene.camera import read_camera

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 
 SUFFIX = ".glsl"
 OWN_LINES = 1_000_000  #: of the texts before and behind the user's

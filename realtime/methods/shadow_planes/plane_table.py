@@ -70,7 +70,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from airlight.realtime.numerics.array_types import ArrayTypes, four_numbers, is_single
 from airlight.realtime.numerics.functions import TURN, host_diamond_angle, host_direction

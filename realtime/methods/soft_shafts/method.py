@@ -33,7 +33,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.image_filters import (
     Guide,
     Raster,

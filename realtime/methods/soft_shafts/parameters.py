@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from airlight.errors import InputError
 from airlight.realtime.area_lights.points import LightSamples
-from airlight.realtime.errors import InputError
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.parameters import parameter
 from airlight.realtime.shadow_maps.shadow_map import map_size

@@ -16,7 +16,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.density import Density
 from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces
 from airlight.realtime.scene.media.light_paths import BoundedMedium, chord, paths_from

@@ -34,7 +34,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
 from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from airlight.realtime.scene.media.integrate import Node, Start

@@ -16,7 +16,7 @@ from typing import Any
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
 from airlight.realtime.numerics.functions import exp_bounded
 from airlight.realtime.scene.lights import Light

@@ -9,7 +9,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError, NoDriverError
+from airlight.errors import InputError
+from airlight.realtime.errors import NoDriverError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.methods.registry import find_method

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, triangles
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth

@@ -15,7 +15,7 @@ triangles where the map is flat (`realtime.methods.published.billeter2010.tessel
 
 from dataclasses import dataclass
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.methods.published.billeter2010.mesh import (
     THRESHOLD,

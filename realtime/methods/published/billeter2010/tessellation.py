@@ -41,7 +41,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 
 #: The corners and the middles of the sides of a quad, counter-clockwise, as (column,
 #: row) in halves of a side.

@@ -25,7 +25,7 @@ from typing import Any
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.registry import Kernel
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.methods.published.biri2006.polynomial import ConstantLeg, polynomial_of

@@ -58,7 +58,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.methods.published.biri2006.crossings import Buffer, Entry, sum_crossings
 from airlight.realtime.methods.published.biri2006.media import ConstantRays, gamma_in

@@ -26,7 +26,7 @@ from typing import Any
 
 import drjit as dr
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.registry import Kernel
 from airlight.realtime.kernels.taylor import (
     check_degree,
