@@ -28,8 +28,7 @@ from airlight.realtime.numerics.array_types import Metres, PerRay
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.rays import profile
 from airlight.realtime.scene.camera import ray_directions
-from airlight.realtime.scene.light_table import LightTable, one_by_one
-from airlight.realtime.scene.light_table import by_source as sources
+from airlight.realtime.scene.light_table import LightTable, lights_apart
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Medium, Rays
 from airlight.realtime.scene.read_scene import Scene
@@ -170,11 +169,7 @@ def surface_stages(
     """
 
     def apart(tables: Sequence[LightTable]) -> list[LightTable]:
-        return (
-            list(sources(tables))
-            if by_source
-            else [light for table in tables for light in one_by_one(table)]
-        )
+        return list(lights_apart(tables, by_source=by_source))
 
     if not scene.features.surfaces:
         return *_no_surfaces(lambda tables: len(apart(tables)) if provides_visibility else 1), False

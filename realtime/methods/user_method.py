@@ -34,8 +34,7 @@ from airlight.errors import InputError
 from airlight.realtime.errors import root_of
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.parameters import values
-from airlight.realtime.scene.light_table import by_source as sources
-from airlight.realtime.scene.light_table import one_by_one
+from airlight.realtime.scene.light_table import lights_apart
 
 _WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -439,12 +438,7 @@ def checked_layers(
             "realtime.methods.interface.method.Layers"
         )
     fractions = 0 if returned.visibility is None else len(returned.visibility)
-    several = (
-        sources(view.tables)
-        if by_source
-        else (light for table in view.tables for light in one_by_one(table))
-    )
-    wanted = len(list(several)) if visibility else 0
+    wanted = len(list(lights_apart(view.tables, by_source=by_source))) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
             f"method {name}: returned the visibility of {fractions} lights, expected that of "

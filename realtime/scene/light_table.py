@@ -114,18 +114,13 @@ def alike(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
     return list(map(tuple, several.values()))
 
 
-def by_source(tables: Iterable[LightTable]) -> Iterator[LightTable]:
-    """Yield the lights of each source: the samples of an area light together, others one by one."""
+def lights_apart(tables: Iterable[LightTable], *, by_source: bool) -> Iterator[LightTable]:
+    """Yield each light as a table by itself; `by_source`: the samples of an area light together."""
     for table in tables:
-        if table.rows.source is not None:
+        if by_source and table.rows.source is not None:
             yield table
         else:
-            yield from one_by_one(table)
-
-
-def one_by_one(table: LightTable) -> Iterator[LightTable]:
-    """Yield tables of one light each."""
-    return (LightTable(table[number], 1) for number in range(table.count))
+            yield from (LightTable(table[number], 1) for number in range(table.count))
 
 
 def _table(lights: tuple[Light, ...]) -> LightTable:

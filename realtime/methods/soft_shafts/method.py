@@ -62,7 +62,7 @@ from airlight.realtime.methods.soft_shafts.sources import (
     source_state,
 )
 from airlight.realtime.numerics.array_types import two_numbers
-from airlight.realtime.scene.light_table import LightTable, by_source, light_tables
+from airlight.realtime.scene.light_table import LightTable, light_tables, lights_apart
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from airlight.realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
@@ -95,7 +95,9 @@ class SoftShafts(SoftShaftsParameters):
                 "one that divides both "
                 "sides"
             )
-        most = max(lights.count for lights in by_source(light_tables(scene.lights)))
+        most = max(
+            lights.count for lights in lights_apart(light_tables(scene.lights), by_source=True)
+        )
         if self.interleave and (most > 16 or 16 % most):
             raise InputError(
                 f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a "
@@ -122,7 +124,7 @@ class SoftShafts(SoftShaftsParameters):
         }
 
         def prepare(now):
-            sources = by_source(light_tables(now.lights))
+            sources = lights_apart(light_tables(now.lights), by_source=True)
             return tuple(
                 source_state(now.geometry, lights, self.map, **asked) for lights in sources
             )
@@ -133,7 +135,7 @@ class SoftShafts(SoftShaftsParameters):
         """Return the layers of every ray."""
         frame = _Frame(view, state, self)
         total, visibility = dr.zeros(type(view.medium.albedo), dr.width(view.pixel)), []
-        for number, lights in enumerate(by_source(view.tables)):
+        for number, lights in enumerate(lights_apart(view.tables, by_source=True)):
             total += frame.airlight(number, lights)
             visibility += frame.visibility(number, lights)
         return Layers(total, tuple(visibility))
