@@ -42,19 +42,19 @@ them.
 2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its
    parameters (`parameters.py`), and later the view of the rays that it renders.
    `methods/interface/media_checks.py` refuses media that it does not render.
-3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of
-   lights, by `numerics/recorded.py`.
+3. `frame/renderer.py` records the stages below once for each structure of lights, by
+   `numerics/recorded.py`; `frame/light_groups.py` says which lights are rendered together.
 4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang
    together, `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
    `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light
    (`numerics/functions.py`).
-5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
+5. `frame/surface.py` casts the camera rays, and says what the surfaces that they meet send back.
 6. `rays.py` says where each ray of the view passes the light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
 8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the
    kernel, `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and that how far a
    panel may reach (`scene/rule_reach.py`).
-9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings
-   both to the host; `frame/light_on_ray.py` checks that all of it is finite.
+9. The surfaces are lit where the planes say so, the renderer adds up what the lights send, and
+   `frame/image.py` brings it to the host; `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -8,7 +8,8 @@ order of their first call.
 import sys
 from pathlib import Path
 
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.scene.read_scene import read_scene

@@ -85,7 +85,8 @@ def work() -> None:
     import drjit as dr
 
     from airlight.errors import InputError
-    from airlight.realtime.frame.renderer import frame_renderer, render_frame
+    from airlight.realtime.frame.image import render_frame
+    from airlight.realtime.frame.renderer import frame_renderer
     from airlight.realtime.kernels.registry import KERNELS
     from airlight.realtime.methods.registry import METHODS, find_method
     from airlight.realtime.scene.read_scene import read_scene

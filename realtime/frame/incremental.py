@@ -74,7 +74,7 @@ def next_parts(
 
     `renderer`, `scene`, `moved`: see `next_frame`; `caches`: what the parts of the last frame left;
     None for the first. Yields `part`: the stages of one part, with the scene: for
-    `realtime.frame.renderer.frame_with_part`; `stages`, `cache`: as of `next_frame`.
+    `realtime.frame.image.frame_with_part`; `stages`, `cache`: as of `next_frame`.
     """
     renderer, state = replace(renderer, scene=scene), None
     for number, part in enumerate(parts(renderer)):
@@ -107,11 +107,11 @@ def _next_of(
             state = renderer.prepare(renderer.scene)
     cast = cache.cast if cache else None
     if camera_moved or geometry_moved:
-        cast, by_light = run_cast_and_shade(renderer)
+        cast, lit = run_cast_and_shade(renderer)
     else:
         cast = run_cast_and_shade(renderer)[0] if cast is None else cast
-        by_light = run_shade(renderer, cast)
-    rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
+        lit = run_shade(renderer, cast)
+    rendered = run_method(renderer, state, cast, lit, cache.carried if cache else None)
     return evaluated(cast, rendered), FrameCache(
         cast, state, rendered.carried, rendered.extra, frames + 1
     )

@@ -18,7 +18,8 @@ import numpy as np
 
 from airlight.errors import InputError
 from airlight.realtime.area_lights.points import bit_reversed
-from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from airlight.realtime.frame.image import Frame, render_frame
+from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.scene.camera import shifted_camera
 
 

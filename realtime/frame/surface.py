@@ -18,7 +18,7 @@ whenever something moved would take up to 7 % longer.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import drjit as dr
@@ -30,7 +30,7 @@ from airlight.realtime.rays import profile
 from airlight.realtime.scene.camera import ray_directions
 from airlight.realtime.scene.light_table import LightTable, lights_apart
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.medium import Medium, Rays
+from airlight.realtime.scene.media.medium import Medium
 from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.scene.triangle_table import Facets, facet_at, facet_number
 
@@ -45,7 +45,6 @@ class Cast:
     triangle: PerRay | None = None  #: its number in the table of facets, where there is one
     uv: PerRay | None = None  #: barycentric coordinates in it, where its normals are interpolated
     hit: Any = None  #: without a table, Mitsuba's preliminary intersection
-    crossed: tuple[Any, ...] = ()  #: `Rays.crossed`
 
 
 @dataclass
@@ -115,29 +114,75 @@ def _ray(origin, direction):
     return mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
 
 
-def lit_surface(
-    scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool = True
-):
-    """Return the radiance that the visible surface sends to the eye through the medium,
-    from one light [W/(m^2 sr)].
+@dataclass(frozen=True)
+class LitSurfaces:
+    """The surfaces that camera rays meet, with the media before them; any light may fall on them."""
 
-    `scene`: the Mitsuba scene, for shadow rays; `surface`: from `visible_surface`; `medium`,
-    `light`: what the light crosses and where it comes from; `depths`: the optical depths of the
-    camera rays, by channel; `shadows`: whether to cast shadow rays; a method that finds out
-    otherwise what is lit leaves them to that.
-    """
-    cosine, r, arriving = _arriving(light, surface)
-    lit = surface.seen & (cosine > 0)
-    if shadows:
-        lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
-    reflected = (
-        surface.albedo
-        * arriving
-        * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
-    )
-    both = zip(depths, medium.depth_to_light(light, surface.point, r, active=lit), strict=True)
-    kept = medium.transmittance([camera + own for camera, own in both])
-    return dr.select(lit, reflected * kept, type(medium.albedo)(0))
+    geometry: Any  #: the Mitsuba scene, for shadow rays; None where none are cast
+    visible: VisibleSurface
+    medium: Medium  #: that light crosses on its way
+    depths: tuple[PerRay, ...]  #: optical depths of the camera rays, by channel
+
+    @property
+    def nothing(self) -> PerRay:
+        """The radiance of surfaces that no light reaches."""
+        return dr.zeros(type(self.medium.albedo), dr.width(self.visible.distance))
+
+    def reflected(self, light: Light, *, shadow_rays: bool) -> PerRay:
+        """Return the radiance that the surfaces send to the eye from one light [W/(m^2 sr)].
+
+        `shadow_rays`: whether rays say where the light is blocked; a method that finds out
+        otherwise what is lit leaves them out.
+        """
+        visible, medium = self.visible, self.medium
+        # Lambert's law: the surface faces the light, and nothing is between them.
+        cosine, r, arriving = _arriving(light, visible)
+        lit = visible.seen & (cosine > 0)
+        if shadow_rays:
+            lit &= ~self.geometry.ray_test(light.shadow_ray_from(visible.interaction), lit)
+        reflected = (
+            visible.albedo
+            * arriving
+            * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
+        )
+        # One exponential takes the extinction of both segments.
+        to_light = medium.depth_to_light(light, visible.point, r, active=lit)
+        depths = [camera + beyond for camera, beyond in zip(self.depths, to_light, strict=True)]
+        return dr.select(lit, reflected * medium.transmittance(depths), type(medium.albedo)(0))
+
+    def before_shadows(self, light: Light, _: Any = 0) -> PerRay:
+        """Return what the surfaces send back of a light whose shadows a method knows.
+
+        The map of a light at infinity covers the media alone, and surfaces beside them are lit too:
+        shadows of such a light always come from rays.
+        """
+        return self.reflected(light, shadow_rays=not light.w)
+
+    def reached(self, tables: Sequence[LightTable], visibility: Sequence[Any]) -> PerRay:
+        """Return the radiance of the surfaces where a method knows what reaches them.
+
+        `tables`: the lights; `visibility`: see `realtime.methods.interface.method.Layers`.
+        """
+        # One entry for each light, or one for all samples of each area light.
+        by_source = len(visibility) != sum(table.count for table in tables)
+        apart, total = lights_apart(tables, by_source=by_source), self.nothing
+        for fraction, lights in zip(visibility, apart, strict=True):
+            if callable(fraction):
+                total = lights.sum(partial(self._of_sample, fraction), total)
+            else:
+                color = lights.sum(self.before_shadows, self.nothing)
+                total = total + _part(fraction, color)
+        return total
+
+    def _of_sample(self, fraction: Callable[[Light, Any], Any], light: Light, number: Any):
+        return _part(fraction(light, number), self.before_shadows(light))
+
+
+def _part(fraction: Any, color: PerRay) -> PerRay:
+    """Return a fraction of a colour, or the colour where a mask lets it pass."""
+    if isinstance(fraction, bool) or dr.is_mask_v(fraction):
+        return dr.select(fraction, color, 0)
+    return fraction * color
 
 
 def _arriving(light: Light, surface: VisibleSurface):
@@ -154,74 +199,62 @@ def _arriving(light: Light, surface: VisibleSurface):
     return cosine, r, light.intensity * profile(light, surface.point, -to_light / r)
 
 
+def lit_surfaces(
+    geometry,
+    facets: Facets | None,
+    pixel,
+    camera,
+    medium: Any,
+    cast: Cast,
+    *,
+    through_media: bool,
+) -> LitSurfaces:
+    """Return the surfaces that the camera rays of some pixels met.
+
+    `geometry`: the Mitsuba scene, None where no shadow rays will be cast; `facets`: as for
+    `cast_rays`; `cast`: from there; `through_media`: whether bounded media dim the surfaces; if
+    not, the method says how much they do.
+    """
+    medium = medium if through_media else replace(medium, bounded_media=())
+    direction, _ = ray_directions(camera, pixel)
+    visible = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
+    # Rays that meet nothing have no depth: an infinite one would be NaN times 0.
+    end = dr.select(visible.seen, cast.distance, 0)
+    depths = medium.optical_depth(medium.rays(camera.origin, direction), 0, end)
+    return LitSurfaces(geometry, visible, medium, depths)
+
+
 def surface_stages(
-    scene: Scene, *, provides_visibility: bool, by_source: bool = False, through_media: bool = True
-) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
-    """Return the stages for a scene.
+    scene: Scene, *, shadow_rays: bool, through_media: bool
+) -> tuple[Frozen, Frozen]:
+    """Return the recorded functions that cast the camera rays of a scene, and light what they meet.
 
-    `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method
-    finds out which surfaces are lit; `by_source`: whether it does so for all points of an area
-    light together; `through_media`: whether the bounded media dim the surfaces; if not, the method
-    says how much they do. Returns `surface`: (geometry, facets, pixel, camera, medium, tables) ->
-    what camera rays meet, and what `shade` returns; `shade`: (geometry, facets, pixel, camera,
-    medium, tables, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
-    whether `shade` needs the geometry.
+    `scene`: the scene; what matters is what cannot move; `shadow_rays`: whether shadow rays say
+    which surfaces are lit; if not, the method of the frame does, and nothing is lit here;
+    `through_media`: see `lit_surfaces`. Returns `surface`: (geometry, facets, pixel, camera,
+    medium, tables) -> a `Cast`, and what `shade` returns; `shade`: (geometry, facets, pixel,
+    camera, medium, tables, cast) -> the radiance of the surfaces [W/(m^2 sr)], None where nothing
+    is lit.
     """
-
-    def apart(tables: Sequence[LightTable]) -> list[LightTable]:
-        return list(lights_apart(tables, by_source=by_source))
-
-    if not scene.features.surfaces:
-        return *_no_surfaces(lambda tables: len(apart(tables)) if provides_visibility else 1), False
-
-    def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
-        direction, _ = ray_directions(camera, pixel)
-        cast = cast_rays(geometry, facets, camera.origin, direction)
-        return replace(
-            cast, crossed=medium.rays(camera.origin, direction).crossed if through_media else ()
-        )
-
-    def shade_all(geometry, facets, pixel, camera, medium, tables, cast):
-        direction, _ = ray_directions(camera, pixel)
-        seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
-        medium = medium if through_media else replace(medium, bounded_media=())
-        rays = Rays(camera.origin, direction, direction, cast.crossed)
-        depths = medium.optical_depth(rays, 0, dr.select(seen.seen, cast.distance, 0))
-
-        def lit(light: Light, number: Any = 0):
-            # The map of a light at infinity covers the media alone; surfaces
-            # beside them are lit too.
-            shadows = not (light.w and provides_visibility)
-            return lit_surface(
-                geometry, seen, medium=medium, light=light, depths=depths, shadows=shadows
-            )
-
-        nothing = dr.zeros(type(medium.albedo), dr.width(pixel))
-        if not provides_visibility:
-            return (reduce(lambda total, table: table.sum(lit, total), tables, nothing),)
-        return tuple(part.sum(lit, nothing) for part in apart(tables))
-
-    @Frozen
-    def surface(geometry, facets, pixel, camera, medium, tables):
-        cast = cast_all(geometry, facets, pixel, camera, medium)
-        return cast, shade_all(geometry, facets, pixel, camera, medium, tables, cast)
-
-    asks = not provides_visibility or any(not light.w for light in scene.lights)
-    return surface, Frozen(shade_all), scene.facets is None or asks
-
-
-def _no_surfaces(
-    colors: Callable[[Sequence[LightTable]], int],
-) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the stages of a scene without surfaces, whose `shade`
-    returns so many black colours.
-    """
+    features = scene.features  # a function that holds the scene would keep its meshes alive
 
     def shade(geometry, facets, pixel, camera, medium, tables, cast):
-        return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in range(colors(tables)))
+        if not (features.surfaces and shadow_rays):
+            return None
+        surfaces = lit_surfaces(
+            geometry, facets, pixel, camera, medium, cast, through_media=through_media
+        )
+
+        def lit(light: Light, _: Any) -> PerRay:
+            return surfaces.reflected(light, shadow_rays=True)
+
+        return reduce(lambda total, table: table.sum(lit, total), tables, surfaces.nothing)
 
     def surface(geometry, facets, pixel, camera, medium, tables):
-        cast = Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
+        if not features.surfaces:
+            return Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel))), None
+        direction, _ = ray_directions(camera, pixel)
+        cast = cast_rays(geometry, facets, camera.origin, direction)
         return cast, shade(geometry, facets, pixel, camera, medium, tables, cast)
 
-    return surface, shade
+    return Frozen(surface), Frozen(shade)

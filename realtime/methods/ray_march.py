@@ -37,11 +37,12 @@ import mitsuba as mi
 from airlight.errors import InputError
 from airlight.realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
-from airlight.realtime.methods.interface.method import Method, animate, jitter
+from airlight.realtime.methods.interface.method import Method, animate, jitter, no_state
 from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.light_table import light_tables
 from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.shadow_maps.shadow_map import (
-    cast_shadow_map,
+    cast_shadow_maps,
     check_maps,
     lit_in_map,
     map_size,
@@ -68,6 +69,7 @@ class RayMarch(Method):
     )
     prepared_from = frozenset({"geometry", "light"})
     by_rays = True
+    by_table = True
 
     steps: int = parameter(100, "steps of every ray and light", least=1)
     spacing: str = parameter(
@@ -109,11 +111,6 @@ class RayMarch(Method):
             )
 
     @property
-    def by_table(self):
-        """Maps are a state of each light."""
-        return self.shadow != "map"
-
-    @property
     def uses_kernel(self):
         """Runs of lit steps are integrated by a kernel."""
         return self.sum == "transitions"
@@ -128,9 +125,15 @@ class RayMarch(Method):
         if self.shadow == "map" and scene.features.shadows:
             check_maps(scene.lights, self.map)
 
-    def prepare(self, scene, light):
-        """Return the shadow map of a light."""
-        return cast_shadow_map(scene.geometry, light, self.map)
+    def preparation(self, scene):
+        """Return a function that casts the shadow maps of each table of lights, if
+        they are asked for.
+        """
+        if self.shadow != "map" or not scene.features.shadows:
+            return no_state
+        return lambda now: tuple(
+            cast_shadow_maps(now.geometry, table, self.map) for table in light_tables(now.lights)
+        )
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray by marching [W/(m^2 sr)]."""

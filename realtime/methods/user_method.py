@@ -151,9 +151,7 @@ def _guarded(method: type[Method], name: str) -> type[Method]:
     def render(self, view, state, kernel):
         with user_errors(f"method {name}", file):
             returned = method.render(self, view, state, kernel)
-        return checked_layers(
-            returned, view, name, visibility=self.provides_visibility, by_source=self.by_source
-        )
+        return checked_layers(returned, view, name, visibility=self.provides_visibility)
 
     return dataclass(frozen=True)(
         type(method.__name__, (method,), {"name": name, "render": render})
@@ -408,9 +406,7 @@ def checked_radiance(returned: Any, view: View, name: str):
     return Color(*(Float(channel) + dr.zeros(Float, width) for channel in channels))
 
 
-def checked_layers(
-    returned: Any, view: View, name: str, *, visibility: bool, by_source: bool
-) -> Layers:
+def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) -> Layers:
     """Return the layers of a method, their in-scattered radiance as `checked_radiance` does.
 
     Parameters
@@ -423,8 +419,6 @@ def checked_layers(
         Its name, for messages.
     visibility
         Whether it says that it provides the visibility of its lights.
-    by_source
-        Whether it has one entry for all samples of an area light.
 
     Raises
     ------
@@ -437,13 +431,23 @@ def checked_layers(
             f"method {name}: returned a {type(returned).__name__}; expected "
             "realtime.methods.interface.method.Layers"
         )
-    fractions = 0 if returned.visibility is None else len(returned.visibility)
-    wanted = len(list(lights_apart(view.tables, by_source=by_source))) if visibility else 0
-    if fractions != wanted or (returned.visibility is None) == visibility:
+    fractions = () if returned.visibility is None else returned.visibility
+    if not visibility and returned.visibility is not None:
         raise InputError(
-            f"method {name}: returned the visibility of {fractions} lights, expected that of "
-            f"{wanted}: one for each "
-            "light where `provides_visibility`, otherwise None"
+            f"method {name}: returned a visibility, expected None where `provides_visibility` is "
+            "False"
+        )
+    # One for each light, or one for all samples of each area light.
+    lights, sources = (
+        len(list(lights_apart(view.tables, by_source=by_source))) for by_source in (False, True)
+    )
+    if visibility and len(fractions) not in (lights, sources):
+        expected = f"{lights}: one for each light"
+        if sources != lights:
+            expected += f", or {sources}: one for each light of the scene"
+        raise InputError(
+            f"method {name}: returned the visibility of {len(fractions)} lights, expected "
+            f"{expected}"
         )
     return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))
 

@@ -17,8 +17,9 @@ import drjit as dr
 
 from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
+from airlight.realtime.frame.image import Frame, image_frame
 from airlight.realtime.frame.incremental import FrameCache, next_frame
-from airlight.realtime.frame.renderer import Frame, FrameRenderer, image_frame
+from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.method import Shader
 from airlight.realtime.parameters import defaults
@@ -256,7 +257,7 @@ class LiveScene:
         """Return a renderer that casts and shades by the functions that
         another one has recorded.
         """
-        key = self._code(), made.method.provides_visibility, made.method.by_source
+        key = self._code(), made.method.provides_visibility
         known = self._surfaces.setdefault(key, made)
         stages = replace(made.stages, surface=known.stages.surface, shade=known.stages.shade)
         # The pixels too: a recorded function tells arrays apart by how they lie in memory.

@@ -4,8 +4,8 @@
 __version__: str
 
 from .errors import InputError as InputError
+from .realtime.frame.image import render_frame as render_frame
 from .realtime.frame.renderer import frame_renderer as frame_renderer
-from .realtime.frame.renderer import render_frame as render_frame
 from .realtime.kernels.registry import KERNELS as KERNELS
 from .realtime.methods.interface.marching import marched_steps as marched_steps
 from .realtime.methods.interface.method import Layers as Layers

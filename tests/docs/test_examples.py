@@ -198,7 +198,7 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
 @pytest.mark.claim("own-method")
 def test_the_plain_method_returns_what_the_page_says(fog, variant):
-    from airlight.realtime.frame.renderer import render_frame
+    from airlight.realtime.frame.image import render_frame
     from airlight.realtime.scene.read_scene import read_scene
     from airlight.validation.study.configuration import prepared
 

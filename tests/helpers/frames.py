@@ -12,7 +12,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.image import quadrature_image

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from airlight.realtime.frame.image import Frame, render_frame
+from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.validation.arrays import Array
 from airlight.validation.clock import time_repeated, timed

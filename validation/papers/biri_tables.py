@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.clock import time_in_turns
 from airlight.validation.estimates.quadrature import reference_image

@@ -24,12 +24,8 @@ import numpy as np
 
 from airlight.realtime.clouds.canonical.coordinates import SETS, order_layer
 from airlight.realtime.clouds.collector_search import Collector
-from airlight.realtime.frame.renderer import (
-    frame_renderer,
-    render_frame,
-    run_cast_and_shade,
-    run_method,
-)
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer, run_cast_and_shade, run_method
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 from airlight.realtime.scene.read_scene import Scene, read_scene
@@ -111,8 +107,8 @@ def _light_moved(scene: Scene) -> Timing:
     cache = first_frame(renderer)
 
     def work() -> None:
-        cast, by_light = run_cast_and_shade(renderer)
-        dr.eval(run_method(renderer, cache.state, cast, by_light, cache.carried))
+        cast, lit = run_cast_and_shade(renderer)
+        dr.eval(run_method(renderer, cache.state, cast, lit, cache.carried))
 
     maps = time_repeated(lambda: renderer.prepare(scene), seconds=1.0)
     frame = time_repeated(work, seconds=1.0)
@@ -207,8 +203,8 @@ def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array
     )
     cache = first_frame(renderer)
     start = _each(cache.carried, lambda collector: _beside(collector, aside))
-    cast, by_light = run_cast_and_shade(renderer)
-    rendered = run_method(renderer, cache.state, cast, by_light, start)
+    cast, lit = run_cast_and_shade(renderer)
+    rendered = run_method(renderer, cache.state, cast, lit, start)
     extra, carried = rendered.extra, rendered.carried
     assert extra is not None
     dr.eval(extra, carried)

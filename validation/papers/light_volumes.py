@@ -28,11 +28,10 @@ import numpy as np
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import Isotropic
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
-    image_frame,
-    render_frame,
     run_cast_and_shade,
     run_method,
 )
@@ -104,10 +103,10 @@ def triangle_times() -> dict[str, Any]:
         scene = _sphere(facets)
         volumes = _renderer(scene, "light-volumes", MAP, walls="slanted")
         state = volumes.prepare(scene)
-        cast, by_light = run_cast_and_shade(volumes)
-        dr.eval(cast, by_light)
+        cast, lit = run_cast_and_shade(volumes)
+        dr.eval(cast, lit)
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
-        works = [_evaluation(volumes, state, cast, by_light), moved_light(planes)]
+        works = [_evaluation(volumes, state, cast, lit), moved_light(planes)]
         volume, frame = time_in_turns(works, seconds=_SECONDS * len(works))
         medians = {"volume": volume.quartiles, "planes": frame.quartiles}
         times |= {f"{what}, {name}": quartiles(found) for what, found in medians.items()}
@@ -233,12 +232,12 @@ def _filter_errors(
 ) -> dict[str, float]:
     """Return the error of the airlight of both filters, with as many triangles."""
     light = renderer.scene.lights[0]
-    cast, by_light = run_cast_and_shade(renderer)
-    dr.eval(cast, by_light)
+    cast, lit = run_cast_and_shade(renderer)
+    dr.eval(cast, lit)
 
     def airlight(mesh: VolumeMesh) -> Array:
         return image_frame(
-            renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, by_light))
+            renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, lit))
         ).airlight
 
     def adaptive(divided: list[Any]) -> VolumeMesh:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD
 from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, triangles
 from airlight.realtime.scene.animate import thicker_medium

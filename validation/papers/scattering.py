@@ -23,7 +23,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.monte_carlo.batches import LAYERS
 from airlight.validation.arrays import Array

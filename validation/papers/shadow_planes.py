@@ -19,7 +19,7 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.analytic.geometry import foot_and_height
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.scene.read import read_reference
 from airlight.validation.arrays import Array, Bools

@@ -29,7 +29,9 @@ from typing import Any
 
 import numpy as np
 
-from airlight.realtime.frame.renderer import render_frame, run_cast_and_shade
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
+from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.clock import time_in_turns
@@ -138,18 +140,24 @@ def penumbra(scene: Scene) -> Bools:
     occluders from the same points.
     """
     surface = render_frame(prepared(scene, _exact(_FEW))).surface
-    lit = prepared(
-        scene,
-        Configuration("soft-shafts", None, (("points", _FEW), ("pattern", "sobol"), ("map", 4))),
-    )
-    _, by_light = run_cast_and_shade(lit)  # the lit surface before shadows, of each point
-    lanes = np.array(sum(by_light[0]), dtype=np.float64).T
-    unshadowed = np.empty_like(lanes)
-    unshadowed[np.array(lit.pixel)] = lanes
-    unshadowed = unshadowed.reshape(surface.shape)[..., 1]
+    bare = frame_renderer(scene, _WithoutShadows, points=_FEW, pattern="sobol")
+    unshadowed = np.asarray(render_frame(bare).surface, dtype=np.float64)[..., 1]
     reached = unshadowed > 0
     fraction = np.where(reached, surface[..., 1], 0) / np.where(reached, unshadowed, 1)
     return (fraction > 0.02) & (fraction < 0.98)
+
+
+@dataclass(frozen=True)
+class _WithoutShadows(Method):
+    """No airlight, and all light reaches the surfaces."""
+
+    name = "without-shadows"
+    provides_visibility = True
+    uses_kernel = False
+
+    def airlight(self, view, light, state, kernel):
+        """Return no airlight, and that the light reaches every surface."""
+        return type(view.medium.albedo)(0), True
 
 
 def _exact(points: int = POINTS) -> Configuration:

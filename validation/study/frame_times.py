@@ -14,12 +14,12 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.analytic.clock import Spent
+from airlight.realtime.frame.image import frame_with_part
 from airlight.realtime.frame.incremental import FrameCache, next_frame, next_parts
 from airlight.realtime.frame.light_on_ray import check_radiance
 from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
-    frame_with_part,
     parts,
     run_cast_and_shade,
     run_method,
@@ -130,8 +130,8 @@ def whole_turn(renderer: FrameRenderer) -> Turn:
         # The preparation on the host goes on while the device is busy with the
         # surface: no sum of stages.
         (_, cache), light_moved = timed(moved_light(renderer))
-        (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, renderer))
-        airlight = timed(partial(_ready, run_method, renderer, cache.state, cast, by_light))[1]
+        (cast, lit), surface = timed(partial(_ready, run_cast_and_shade, renderer))
+        airlight = timed(partial(_ready, run_method, renderer, cache.state, cast, lit))[1]
         frame = timed(lambda: run_stages(renderer, cache.state))[1]
         camera_cached = timed(_step(renderer, cache, light_moved=True))[1]
         colours = timed(_step(renderer, cache, light_moved=False))[1]
@@ -150,10 +150,10 @@ def staged_turn(renderer: FrameRenderer) -> Turn:
         state, prepare = timed(partial(renderer.prepare, renderer.scene))
         surface, shade, airlight = Spent(), Spent(), Spent()
         for part in in_parts:
-            (cast, by_light), spent = timed(partial(_ready, run_cast_and_shade, part))
+            (cast, lit), spent = timed(partial(_ready, run_cast_and_shade, part))
             surface += spent
             shade += timed(partial(_ready, run_shade, part, cast))[1]
-            airlight += timed(partial(_ready, run_method, part, state, cast, by_light))[1]
+            airlight += timed(partial(_ready, run_method, part, state, cast, lit))[1]
         frame, nothing = surface + airlight, Spent()
         camera_cached = shade + airlight + (prepare if needed & {"light", "look"} else nothing)
         colours = shade + airlight + (prepare if "look" in needed else nothing)
@@ -171,9 +171,9 @@ def brief_turn(renderer: FrameRenderer) -> Turn:
         # camera rays and surfaces take little of it, and it takes too long to ask
         if frame.ms >= _BRIEF_SLOW:
             return [FrameSpent(frame, frame, prepare=prepare)]
-        cast, by_light = run_cast_and_shade(renderer)
-        dr.eval(cast, by_light)
-        airlight = timed(lambda: evaluated(cast, run_method(renderer, state, cast, by_light)))[1]
+        cast, lit = run_cast_and_shade(renderer)
+        dr.eval(cast, lit)
+        airlight = timed(lambda: evaluated(cast, run_method(renderer, state, cast, lit)))[1]
         return [FrameSpent(frame, airlight, prepare=prepare)]
 
     return turn

@@ -23,13 +23,8 @@ from numpy.typing import NDArray
 
 from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import (
-    Frame,
-    FrameRenderer,
-    render_frame,
-    run_stages,
-    unchecked_frame,
-)
+from airlight.realtime.frame.image import Frame, render_frame, unchecked_frame
+from airlight.realtime.frame.renderer import FrameRenderer, run_stages
 from airlight.realtime.methods.interface.method import method_parameters
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.source import is_shader

@@ -22,7 +22,8 @@ import numpy as np
 
 from airlight.analytic.clock import Spent
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import FrameRenderer, parts, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import FrameRenderer, parts
 from airlight.realtime.methods.shader.source import is_shader
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.storage.store import date

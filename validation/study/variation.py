@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import FrameRenderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.validation.arrays import Array, Counted
 from airlight.validation.clock import Piece, in_turns

@@ -50,8 +50,9 @@ class View(Rays):
     pixel: PerRay  #: pixel number of every ray: row times width plus column
     #: the Mitsuba scene, for casting rays; None where the method says that it casts none
     scene: Any = None
-    #: by light, what the visible surface sends back unshadowed
-    surfaces: tuple[PerRay, ...] | None = None
+    #: of a light, what the visible surfaces send back unshadowed [W/(m^2 sr)]; None where there
+    #: are none, or where shadow rays light them
+    reflected: Callable[[Light], PerRay] | None = None
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
     extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
@@ -203,9 +204,10 @@ class Layers:
     """The results of a method for every ray. Layers that it leaves out cost nothing."""
 
     in_scattered: PerRay  #: radiance that the media scatter into the ray, a colour [W/(m^2 sr)]
-    #: By light, or by source (`Method.by_source`), which fraction of it reaches the surface: 0 to
-    #: 1, or a mask; None: shadow rays say it.
-    visibility: tuple[PerRay, ...] | None = None
+    #: By light, or one for all samples of each area light, which fraction of it reaches the
+    #: surface: 0 to 1, a mask, or a function of a sample and its number that returns one of
+    #: these; None: shadow rays say it.
+    visibility: tuple[PerRay | Callable[[Light, Any], PerRay], ...] | None = None
     #: of what the method adds to the scene's media; None: all passes
     transmittance: PerRay | None = None
     #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
@@ -244,10 +246,6 @@ class Method(Parameters):
     frozen: ClassVar[bool] = True  #: whether Dr.Jit can record it once and replay it
     #: whether it is given all lights and light samples of a frame at once
     at_once: ClassVar[bool] = False
-    #: whether `airlight` has no state: lights that are alike are then one loop
-    by_table: ClassVar[bool] = False
-    #: whether its visibility has one entry for all samples of an area light
-    by_source: ClassVar[bool] = False
     #: whether it hands arrays on to the next frame, as `Layers.carried`
     carries: ClassVar[bool] = False
     #: how frames are averaged (`realtime.methods.history.History`); None: not at all
@@ -295,8 +293,13 @@ class Method(Parameters):
         """Return the layers of every ray: the sum over the lights."""
         if self.by_table:
             total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
-            for table in view.tables:
-                total = table.sum(lambda light, _: self.airlight(view, light, None, kernel), total)
+            for table, states in zip(view.tables, state or (None,) * len(view.tables), strict=True):
+
+                def scattered(light: Light, number: Any, states: Any = states) -> Any:
+                    own = None if states is None else states.of(number, light)
+                    return self.airlight(view, light, own, kernel)
+
+                total = table.sum(scattered, total)
             return Layers(total)
         total, visibility = type(view.medium.albedo)(0), []
         for light, own in zip(view.lights, state or (None,) * len(view.lights), strict=True):
@@ -306,6 +309,21 @@ class Method(Parameters):
                 visibility.append(reached)
             total += found
         return Layers(total, tuple(visibility) if self.provides_visibility else None)
+
+    @property
+    def by_table(self) -> bool:
+        """Whether lights that are alike are one loop: by default, if `airlight` needs no state and
+        returns the radiance alone.
+
+        A method whose `preparation` makes a state for each table says so; each state has a
+        function `of(number, light)`, which returns that of a light for `airlight`.
+        """
+        own, other = type(self), Method
+        return not self.provides_visibility and (own.prepare, own.preparation, own.render) == (
+            other.prepare,
+            other.preparation,
+            other.render,
+        )
 
     @property
     def uses_kernel(self) -> bool:

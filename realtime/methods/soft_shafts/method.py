@@ -137,7 +137,7 @@ class SoftShafts(SoftShaftsParameters):
         total, visibility = dr.zeros(type(view.medium.albedo), dr.width(view.pixel)), []
         for number, lights in enumerate(lights_apart(view.tables, by_source=True)):
             total += frame.airlight(number, lights)
-            visibility += frame.visibility(number, lights)
+            visibility.append(frame.visibility(number, lights))
         return Layers(total, tuple(visibility))
 
 
@@ -202,27 +202,24 @@ class _Frame:
             )
         return view.medium.radiance(like, integral)
 
-    def visibility(self, number: int, lights: LightTable) -> list[Any]:
-        """Return the fraction of a source that reaches the surfaces, or
-        one for each of its lights.
+    def visibility(self, number: int, lights: LightTable) -> Any:
+        """Return the fraction of a source that reaches the surfaces, or a function for
+        that of each of its lights.
         """
         view, p, whole = self.view, self.parameters, self.whole
         if not view.features.shadows or not view.features.surfaces:
-            count = 1 if p.by_source else lights.count
-            return [dr.full(mi.Bool, True, self.raster.count) for _ in range(count)]
+            return True
         there = dr.isfinite(view.distance)
         point = view.origin + view.direction * dr.select(there, view.distance, 0)
         if lights.rows.facing is None:
             # Twenty units in the last place towards the camera: rounded behind its surface,
             # a point is in its shadow.
             before = view.origin + view.direction * dr.select(there, view.distance * (1 - 2e-6), 0)
-            return [there & view.visible(before, lights.rows)]
+            return there & view.visible(before, lights.rows)
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
-            return [
-                there & self._reached(state, place, lights[place], point)
-                for place in range(lights.count)
-            ]
+            # Without a filter each point keeps its own fraction, and the sum is exact.
+            return lambda light, place: there & self._reached(state, place, light, point)
         if p.interleave:
             number = self._fraction(self.raster, lights.count).number
             own = reached_surfaces(whole, state, lights, lambda _: number, 1, p)
@@ -255,8 +252,7 @@ class _Frame:
             )
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
-        lit = dr.gather(type(lit), lit, view.pixel)
-        return [lit]
+        return dr.gather(type(lit), lit, view.pixel)
 
     def _penumbra_width(self, state: SourceState, lights: LightTable) -> Any:
         few, step = few_pixels(self.raster)
@@ -322,11 +318,11 @@ class _Frame:
         assert maps is not None
         return lambda x: lit_in_map(maps, light, view.at(x))
 
-    def _reached(self, state: SourceState, number: int, light: Light, point: Any) -> Any:
+    def _reached(self, state: SourceState, number: Any, light: Light, point: Any) -> Any:
         if self.parameters.surfaces == "ray":
             return self.view.visible(point, light)
         assert isinstance(state.maps, HemisphereMaps)
-        return state.maps.of(mi.UInt32(number), light).lit_surface(point)
+        return state.maps.of(number, light).lit_surface(point)
 
     def _fraction(self, raster: Raster, samples: int) -> Fraction:
         """Return which light sample each pixel takes, and how far its steps are shifted."""

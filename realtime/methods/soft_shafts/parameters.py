@@ -127,13 +127,6 @@ class SoftShaftsParameters(Method):
         """The standard deviation of the filter [pixels], not a number for `auto`."""
         return math.nan if self.hd == AUTO else float(self.hd)
 
-    @property
-    def by_source(self):
-        """All points of a light have one fraction: without filter each has its
-        own, and the sum is exact.
-        """
-        return self.filter != "none" or self.interleave
-
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
         plain = {"filter": "none"} | ({"hd": "5"} if self.hd == AUTO else {})

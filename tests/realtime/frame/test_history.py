@@ -11,8 +11,9 @@ import pytest
 from scipy.stats import kstest
 
 from airlight.errors import InputError
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.history import with_history
 from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.registry import METHODS, find_method

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import airlight.realtime.frame.renderer as module
+from airlight.realtime.frame.image import image_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
+from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer, run_stages
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.methods.registry import METHODS
@@ -184,17 +185,18 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
 
 
 @pytest.mark.claim("frames-are-replayed")
-def test_frames_replay_whatever_moves(variant):
-    """No stage is recorded again, except for the camera rays, once, where part of
-    Mitsuba's scene is another.
+@pytest.mark.parametrize(("method", "shades"), [("shadow-planes", 0), ("ray-march", 1)])
+def test_frames_replay_whatever_moves(variant, method, shades):
+    """No stage is recorded again, except for the camera rays, once, where part of Mitsuba's scene
+    is another. Shadow planes light the surfaces themselves: nobody else shades them.
     """
-    renderer = made(built_in("two-pens"), "shadow-planes")
+    renderer = made(built_in("two-pens"), method)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)
     stages = renderer.stages
     assert stages.surface.n_recordings <= 2
-    assert [stage.n_recordings for stage in (stages.shade, stages.render)] == [1, 1]
+    assert [stage.n_recordings for stage in (stages.shade, stages.render)] == [shades, 1]
 
 
 # Large images in parts ----------------------------------------------------------------------------
@@ -251,7 +253,7 @@ def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch
     expected, cache = [], None
     for now, moved in moves:
         stages, cache = next_frame(made, now, cache, **(STILL | moved))
-        expected.append(module.image_frame(replace(made, scene=now), stages))
+        expected.append(image_frame(replace(made, scene=now), stages))
     assert np.any(expected[0].airlight != expected[1].airlight) or not read.lights
     monkeypatch.setattr(module, "_LARGE", 2048)
     monkeypatch.setattr(module, "_PART", 1024)

@@ -10,11 +10,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import airlight.realtime.frame.renderer as renderer_module
+import airlight.realtime.frame.light_groups as groups_module
 import airlight.realtime.scene.light_table as module
 from airlight.realtime.area_lights.shape import turned_area_light
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import image_frame, render_frame, run_stages
+from airlight.realtime.frame.renderer import run_stages
 from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.animate import with_area_lights
@@ -160,7 +161,7 @@ def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(
     assert len(Prepared.made) == 40
     assert len(placed) == 1
     # A state beyond the room for all is made when it is needed.
-    monkeypatch.setattr(renderer_module, "_ROOM", 3 * 12)
+    monkeypatch.setattr(groups_module, "_ROOM", 3 * 12)
     assert [state is None for state in drawn.prepare(scene)] == [False] * 3 + [True] * 37
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.samples import render_samples
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.scene.read_scene import read_scene

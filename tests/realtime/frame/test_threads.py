@@ -17,7 +17,7 @@ activate()
 import drjit as dr
 import numpy as np
 import pytest
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.parameters import defaults
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import read_scene

@@ -11,7 +11,8 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.phase import Phase

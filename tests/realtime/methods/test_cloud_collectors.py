@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from airlight.realtime.clouds.canonical.coordinates import fraction_of_peak
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import ray_directions

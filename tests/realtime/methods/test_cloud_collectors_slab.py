@@ -14,7 +14,8 @@ import pytest
 import airlight.realtime.clouds.canonical.transport_grid as grid
 from airlight.realtime.clouds.canonical import coordinates
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.camera import ray_directions
 from airlight.realtime.scene.read_scene import read_scene

@@ -12,8 +12,9 @@ import pytest
 
 from airlight.errors import InputError
 from airlight.realtime.clouds.canonical.coordinates import OPACITY
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.scene.animate import thicker_medium

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.interface.method import Layers
 from airlight.realtime.scene.animate import coloured_light
 from airlight.realtime.scene.media.medium import Medium

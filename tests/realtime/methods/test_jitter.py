@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.methods.registry import find_method
 from tests.helpers.frames import reference_of, renderer
 from tests.helpers.scenes import spot, tiny_scene

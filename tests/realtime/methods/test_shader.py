@@ -11,8 +11,9 @@ import pytest
 
 from airlight.errors import InputError
 from airlight.realtime.errors import NoDriverError
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.incremental import next_frame
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.client import ShaderHost
 from airlight.realtime.methods.shader.source import Pass, read_shader

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.numerics.recorded import Frozen
@@ -150,7 +151,7 @@ def test_arguments_with_defaults_are_parameters(render):
         ("nothing", "returned a NoneType; expected the radiance of every pixel"),
         ("turned", "returned an array of shape (3, 192) for 192 pixels"),
         ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
-        ("Lights", "returned the visibility of 0 lights, expected that of 1"),
+        ("Lights", "returned the visibility of 0 lights, expected 1: one for each light"),
         ("unready", "`prepare` returned a NoneType; expected a function of the scene"),
     ],
 )

@@ -44,10 +44,11 @@ def rendered(scene, method, points):
     parameters = SETTINGS.get(method.name, {}) | {"points": points, "pattern": "sobol"}
     renderer = frame_renderer(scene, method, kernel=KERNELS["exact"], **parameters)
     state = renderer.prepare(renderer.scene)
-    cast, by_light = run_cast_and_shade(renderer)
+    cast, lit = run_cast_and_shade(renderer)
+    dr.eval(run_method(renderer, state, cast, lit))  # records, and makes the tables of lights
     dr.kernel_history_clear()
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-        airlight = run_method(renderer, state, cast, by_light).airlight
+        airlight = run_method(renderer, state, cast, lit).airlight
         dr.eval(airlight)
         kernels = [launch for launch in dr.kernel_history() if launch["type"] == dr.KernelType.JIT]
     pixel = np.array(renderer.pixel)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.mesh_adjacency import make_occluders, read_occluders
 from airlight.realtime.scene.read_scene import read_scene

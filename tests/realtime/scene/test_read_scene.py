@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import (
     pixel_grid,

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reports.plotting.pictures import NOT_FINITE, tone_mapped
 from airlight.reports.view.live_scene import LiveScene

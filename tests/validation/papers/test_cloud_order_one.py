@@ -6,7 +6,8 @@ share no code with them.
 import numpy as np
 import pytest
 
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.estimates.images import Budget, monte_carlo_reference

@@ -6,7 +6,7 @@ filter, sizes of quads, a push.
 import numpy as np
 import pytest
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.methods.published.billeter2010.mesh import VolumeMesh, volume_mesh
 from airlight.realtime.methods.published.billeter2010.tessellation import divide, triangles
 from airlight.realtime.scene.read_scene import read_scene

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.kernels.stepping import quadrature
 from airlight.realtime.methods.registry import FOG_METHODS

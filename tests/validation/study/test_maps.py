@@ -43,7 +43,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import error_metrics

@@ -211,7 +211,7 @@ class ShadowPlanes2006(Method):
                 reached = reaches(planes.index, rays, view.distance)
             # The lit surfaces are drawn first.
             surface = (
-                Color(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
+                Color(0) if view.reflected is None else dr.select(reached, view.reflected(light), 0)
             )
             surfaces += surface
             total = buffer.stored(total + surface)

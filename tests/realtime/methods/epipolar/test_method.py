@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.methods.epipolar.min_max_tree import slice_heights
 from airlight.realtime.methods.epipolar.slices import (
     image_slices,

@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import image_frame, run_stages
+from airlight.realtime.frame.image import image_frame
+from airlight.realtime.frame.renderer import run_stages
 from airlight.realtime.methods.light_volumes.jump_search import _JUMP, with_walls
 from airlight.realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
 from airlight.realtime.methods.published.billeter2010.mesh import volume_mesh

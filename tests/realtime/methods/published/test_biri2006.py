@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import airlight.realtime.methods.published.biri2006.mesh as module
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.parts import mitsuba_mesh

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference

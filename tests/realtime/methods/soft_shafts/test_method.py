@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airlight.realtime.frame import renderer
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.image_filters import Raster, depth_guide
 from airlight.realtime.methods.soft_shafts.sources import AUTO_WIDTH, few_pixels, penumbra_width
 from airlight.realtime.numerics.array_types import two_numbers

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates.quadrature import reference_image

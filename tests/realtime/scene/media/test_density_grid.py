@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.scene.media.density_grid import GridMedium

@@ -16,7 +16,8 @@ from airlight.analytic.height_fog import Layer as HostLayer
 from airlight.analytic.height_fog import height_fog_segments
 from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
-from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.numerics.array_types import array_types
