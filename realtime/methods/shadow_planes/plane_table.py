@@ -478,8 +478,10 @@ def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
     frame, three arrays; `ray_end`: d/x at the end of each; w = 0: 1/x.
     """
     x, y, z = way
-    # About a light at the camera an azimuth is no number: whole numbers have the upper bound.
-    wedge = dr.minimum(mi.UInt32(azimuth * index.scale), dr.width(index.start) - 2)
+    # About a light at the camera an azimuth is no number: whole numbers have the upper bound. It
+    # comes from an array, as the size of one would be a constant of the recording, whose next light
+    # may have more wedges.
+    wedge = dr.minimum(mi.UInt32(azimuth * index.scale), mi.UInt32(TURN * index.scale) - 1)
     first, last = (dr.gather(mi.UInt32, index.start, wedge + step) for step in (0, 1))
     asked = dr.fma(-_SLACK, ray_end + 1, ray_end + z) if index.w else ray_end
     asked *= dr.rsqrt(dr.fma(x, x, y * y))
