@@ -22,9 +22,7 @@ from typing import Any
 
 from airlight.errors import InputError
 
-# that a user's method may take for one scene or command [s]
-_LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"
-_LONGEST = 2e6  # s: the system waits for an answer 2^31 ms at most, which are 24 days
+LIMIT_VARIABLE = "AIRLIGHT_METHOD_LIMIT"
 
 
 class EndedError(InputError):
@@ -33,12 +31,13 @@ class EndedError(InputError):
 
 def method_limit() -> float:
     """Return how long a user's method may take for one scene, or one command [s]."""
-    given = os.environ.get(LIMIT_VARIABLE) or str(_LIMIT)
+    longest = 2e6  # s: the system waits for an answer 2^31 ms at most, which are 24 days
+    given = os.environ.get(LIMIT_VARIABLE) or "300.0"  # s, if the user names no limit
     with suppress(ValueError):
-        if 0 < float(given) <= _LONGEST:
+        if 0 < float(given) <= longest:
             return float(given)
     raise InputError(
-        f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0 up to {_LONGEST:g}, such as 300 "
+        f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0 up to {longest:g}, such as 300 "
         "[s]"
     )
 
@@ -77,16 +76,19 @@ class ChildProcess:
         """
         self._name, self._limit = name, method_limit() if limit is None else limit
         self._hint = f"; {LIMIT_VARIABLE}={2 * self._limit:g} allows more" if limit is None else ""
-        self._connection, there = Pipe()
-        with there:
+        # The end of the pipe that the child inherits is closed here once the child has it: after
+        # that the end of the child is the end of the connection, and `recv` raises EOFError.
+        self._connection, child_end = Pipe()
+        with child_end:
             self._process = subprocess.Popen(
                 # -P: modules of ours come before those of the user's folder.
-                [sys.executable, "-P", "-m", module, str(os.getpid()), str(there.fileno())],
+                [sys.executable, "-P", "-m", module, str(os.getpid()), str(child_end.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL if silent else 2,
                 stderr=subprocess.DEVNULL if silent else None,
                 env=environment,
-                pass_fds=[there.fileno()],
+                pass_fds=[child_end.fileno()],
+                # The child leads a group of its own, which `_end` kills as a whole.
                 start_new_session=True,
             )
         self.end = weakref.finalize(self, _end, self._process, self._connection)
@@ -101,6 +103,7 @@ class ChildProcess:
         """
         try:
             self._connection.send(message)
+            # poll takes no infinite time: None waits without end.
             if self._connection.poll(None if self._limit == math.inf else self._limit):
                 return self._connection.recv()
         except (EOFError, OSError):
@@ -108,6 +111,7 @@ class ChildProcess:
             raise EndedError(
                 f"{self._name}: ended its process, {how}; expected an answer or an exception"
             ) from None
+        # No answer in time: the work may hang, and a later answer would be taken for the next one.
         self.end()
         raise EndedError(
             f"{self._name}: no answer within {self._limit:g} s; its process was ended{self._hint}"
@@ -118,6 +122,7 @@ def _end(process: subprocess.Popen, connection: Connection) -> None:
     """End a process and all that it started."""
     connection.close()
     process.kill()
+    # A process that `ask` has waited for is gone, and its group with it unless children are left.
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -142,6 +147,7 @@ def connection_to_caller() -> Connection:
 
 
 def _follow(caller: int) -> None:
+    # An orphan gets another parent: then the caller has ended, however it did.
     while os.getppid() == caller:
         time.sleep(0.5)
     end_group()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Sums over the lit intervals of rays, as a walk along them finds their ends.
 
-A walk comes to the boundaries of shadow in the order of a ray. At each the light comes back, or
-ends, or nothing changes (two shadows overlap). With :math:`[a_i, b_i]` the intervals between, the
-sum is
+A walk meets the boundaries of shadows in the order in which they lie along a ray. At each boundary
+the light comes back, or ends, or nothing changes (two shadows overlap). With :math:`[a_i, b_i]` the
+intervals between, the sum is
 
 .. math:: \sum_i \int_{a_i}^{b_i} f(x) dx :
 
@@ -28,14 +28,14 @@ rays whose intervals end a few steps apart are served at once:
 `realtime.methods.epipolar.walk` when every ray has an interval or is at its end, and
 `realtime.methods.light_volumes.walk` when an interval does not go on in the next face of the map.
 
-Places are whatever rises or falls along a ray, distances or quotients D/x;
-`integral` takes them as they are.
+A place may be any number that rises or falls along a ray, a distance or a quotient D/x;
+`integral` takes places as they are.
 
 **A queue of the nearest crossings** puts boundaries in order where a walk meets them out of order,
 in registers, with the nearest first. A crossing has a key, which says how near it is, and may have
 a gain, which says what changes there. Every place of the queue is compared at every insertion,
-without branches: two to five instructions a place. A crossing that finds no place is returned, so a
-caller knows that it must go over its crossings again for the farther ones. Crossings of one key
+without branches: two to five instructions a place. A crossing that finds no place is returned,
+which tells the caller to go over its crossings again for the farther ones. Crossings of one key
 stay in the order in which they came.
 """
 
@@ -60,8 +60,12 @@ class LitIntervals:
 def no_intervals(zero, start) -> LitIntervals:
     """Return the state of rays at their start.
 
-    `zero`: the sum of nothing, one for each ray; `start`: where rays start, one for each [m]: there
-    an interval opens if they are lit.
+    Parameters
+    ----------
+    zero
+        The sum of nothing, one for each ray.
+    start
+        Where rays start, one for each [m]: an interval opens there if they are lit.
     """
     return LitIntervals(zero, start, +start, dr.full(mi.Bool, False, dr.width(zero)))
 
@@ -71,6 +75,7 @@ def open_interval(intervals: LitIntervals, begin, opens) -> LitIntervals:
 
     Valid where nothing waits.
     """
+    # Only `begin` changes: the end of an interval that is already in the sum is never read again.
     return replace(intervals, begin=dr.select(opens, begin, intervals.begin))
 
 
@@ -78,10 +83,20 @@ def close_interval(intervals: LitIntervals, end, closes, *, begin=None) -> LitIn
     """Return intervals behind the place `end` [m] where the light ends if it `closes` one;
     no other may have waited.
 
-    `begin` is where it began [m], None for where `open_interval` put it.
+    Parameters
+    ----------
+    intervals
+        The state of the rays.
+    end
+        The place where the light ends [m].
+    closes
+        Rays whose interval ends there.
+    begin
+        Where the interval began [m]; None: where `open_interval` put it.
     """
     if begin is not None:
         intervals = open_interval(intervals, begin, closes)
+    # The interval is not integrated here: it waits, so that many rays are served by one call.
     return replace(
         intervals, end=dr.select(closes, end, intervals.end), waits=intervals.waits | closes
     )
@@ -92,9 +107,17 @@ def add_waiting(
 ) -> LitIntervals:
     """Return intervals with what waits added to the sum where it is `due`.
 
-    `integral` is a function (begin, end) -> value of one interval; rays that
-    add nothing step over it.
+    Parameters
+    ----------
+    intervals
+        The state of the rays.
+    integral
+        A function (begin, end) -> value of one interval [m]; rays that add nothing step over it.
+    due
+        Rays whose waiting interval is added.
     """
+    # A branch, not a mask: the integral costs as much as many steps, and a packet of rays in which
+    # none waits leaves it out.
     total = dr.if_stmt(
         args=(intervals.total, intervals.begin, intervals.end),
         cond=intervals.waits & due,
@@ -107,15 +130,28 @@ def add_waiting(
 def sum_at_end(
     intervals: LitIntervals, integral: Callable[[Any, Any], Any], end, *, opened, lit, active
 ):
-    """Return the sum at the end of rays that are `active`: with what waits, and where `lit`
-    what is open up to there.
+    """Return the sum at the end of rays, with the waiting interval and the open one.
 
-    `integral` is the function of both ends [m] of an interval, `end` that of the rays, and `opened`
-    where the last interval began [m]. A loop, not two branches: most rays have one of the two and
-    are served at once.
+    A loop, not two branches: most rays have one of the two intervals and are served at once.
+
+    Parameters
+    ----------
+    intervals
+        The state of the rays.
+    integral
+        A function (begin, end) -> value of one interval [m].
+    end
+        The ends of the rays [m].
+    opened
+        Where the open intervals began [m].
+    lit
+        Rays that are lit up to their end, so that their last interval is open.
+    active
+        Rays to compute.
     """
 
     def body(total, waits, lit):
+        # The interval that waits first; in the next turn the one that is lit up to the end.
         begin, until = (
             dr.select(waits, intervals.begin, opened),
             dr.select(waits, intervals.end, end),
@@ -150,18 +186,23 @@ def filled(key: float, places: int, Float, width: int) -> Crossings:
 def insert(queue: Crossings, key, gain):
     """Put a crossing in its place: the larger its key, the nearer it is.
 
-    Returns `queue`: the nearest, as many as before; `key`, `gain`: of the crossing that is left
-    without a place, the farthest of all.
+    Returns
+    -------
+    queue
+        The nearest crossings, as many as before.
+    key, gain
+        The crossing without a place, the farthest of all.
     """
     keys, gains, new = [], [], key
-    for held, held_gain in zip(queue.key, queue.gain, strict=True):
-        keys.append(dr.maximum(held, key))
-        key = dr.minimum(held, key)
+    for place_key, place_gain in zip(queue.key, queue.gain, strict=True):
+        # The nearer of two crossings stays in this place, the farther one goes on to the next.
+        keys.append(dr.maximum(place_key, key))
+        key = dr.minimum(place_key, key)
         # Compare with the new key, not with the one that it displaced: equal
         # keys must keep their order.
-        before = new > held
-        gains.append(dr.select(before, gain, held_gain))
-        gain = dr.select(before, held_gain, gain)
+        before = new > place_key
+        gains.append(dr.select(before, gain, place_gain))
+        gain = dr.select(before, place_gain, gain)
     return Crossings(keys, gains), key, gain
 
 
@@ -169,9 +210,10 @@ def exchange(queue: Crossings, key, gain):
     """Put a crossing in its place and take out the nearest of all: the queue, and
     the key and gain of that.
     """
-    queue, last, last_gain = insert(queue, key, gain)
+    # The queue moves up by one place, and the crossing that found none takes the last one.
+    queue, farthest, farthest_gain = insert(queue, key, gain)
     return (
-        Crossings([*queue.key[1:], last], [*queue.gain[1:], last_gain]),
+        Crossings([*queue.key[1:], farthest], [*queue.gain[1:], farthest_gain]),
         queue.key[0],
         queue.gain[0],
     )

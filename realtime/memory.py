@@ -35,6 +35,7 @@ def usable_memory() -> Memory | None:
     if (mi.variant() or "").startswith("cuda"):
         size = _gpu_memory()
         return None if size is None else Memory(size, "the GPU has")
+    # The least of the machine and the groups counts: a container sees all of the machine.
     sizes = []
     with suppress(AttributeError, ValueError, OSError):
         sizes.append(
@@ -47,9 +48,19 @@ def usable_memory() -> Memory | None:
 def check_memory(what: str, needed: int, advice: str) -> None:
     """Raise an error if work needs more memory than there is.
 
-    `what`: what the user asked for, as the message begins; `needed`: memory that the work needs
-    [bytes]; `advice`: what the user can do, as the message ends. Raises InputError if there is less
-    memory.
+    Parameters
+    ----------
+    what
+        The work that the user asked for, as the message begins.
+    needed
+        Memory that the work needs [bytes].
+    advice
+        A way out for the user, as the message ends.
+
+    Raises
+    ------
+    InputError
+        If there is less memory.
     """
     memory = usable_memory()
     if memory is not None and needed > memory.size:
@@ -63,15 +74,16 @@ def _cgroup_limits() -> list[int]:
     limits = []
     with suppress(OSError):
         for line in _OWN_CGROUPS.read_text().splitlines():
-            _, controllers, own = line.split(":", 2)
+            # "hierarchy:controllers:path"; version 2 has one hierarchy, which names no controllers.
+            _, controllers, path = line.split(":", 2)
             if controllers == "":
                 root, name = _CGROUPS, "memory.max"
             elif "memory" in controllers.split(","):
                 root, name = _CGROUPS / "memory", "memory.limit_in_bytes"
             else:
                 continue
-            # In a container the path may be the machine's, of which only the root can be seen.
-            for group in (PurePosixPath(own), *PurePosixPath(own).parents):
+            # In a container the path may be the machine's, and the container sees its root alone.
+            for group in (PurePosixPath(path), *PurePosixPath(path).parents):
                 with suppress(OSError, ValueError):  # no such file; 'max'
                     limits.append(int((root / str(group).lstrip("/") / name).read_text()))
     return limits

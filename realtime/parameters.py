@@ -65,8 +65,16 @@ class Limits:
 
 
 def parameter(default: Any, help: str, **limits: Any) -> Any:
-    """Return the field of a parameter with its `default`; `help` and `limits`
-    are the fields of `Limits`.
+    """Return the field of a parameter, for a frozen dataclass of them.
+
+    Parameters
+    ----------
+    default
+        The value if the user gives none; its type is the type of the parameter.
+    help
+        A sentence for `airlight list methods`.
+    limits
+        The other fields of `Limits`, by name: choices, a range, a unit, a check.
     """
     return field(default=default, metadata={"limits": Limits(help, **limits)})
 
@@ -96,22 +104,39 @@ def read_parameters(
 ) -> Any:
     """Return the parameters of a method from values or words, the others with their defaults.
 
-    `method`: its name, for messages; `kind`: the class of its parameters; `given`: values by name;
-    a word is converted to the type of the default; `others`: names that are known elsewhere, and
-    `see`: a method that has more, for messages. Raises InputError for an unknown name (the nearest
-    is named), a value of the wrong type, and what `Parameters` refuses.
+    Parameters
+    ----------
+    method
+        The name of the method, for messages.
+    kind
+        The class of its parameters.
+    given
+        Values by name; a word is converted to the type of the default.
+    others
+        Names of parameters that other code reads, for messages.
+    see
+        A method that has more parameters, for messages.
+
+    Raises
+    ------
+    InputError
+        For an unknown name (the nearest is named), a value of the wrong type, and values that
+        `Parameters` refuses.
     """
-    known = defaults(kind)
+    of_method = defaults(kind)
     converted = {}
+    # A word from the command line becomes a value of the type of the default.
     for name, value in given.items():
-        if name not in known:
-            names = [*known, *others]
-            wanted = ", ".join(names) or "none"
+        if name not in of_method:
+            # The message names the nearest spelling, or else the method that has such parameters.
+            names = [*of_method, *others]
+            expected = ", ".join(names) or "none"
             more = nearest(name, names) or (see and f"; for what its paper does, see {see}")
             raise InputError(
-                f"method {method}: got a parameter {name!r}, expected one of: {wanted}{more}"
+                f"method {method}: got a parameter {name!r}, expected one of: {expected}{more}"
             )
-        converted[name] = _converted(f"method {method}: {name}", value, known[name])
+        converted[name] = _converted(f"method {method}: {name}", value, of_method[name])
+    # The class checks ranges, and values against one another, as it is made.
     return kind(**converted)
 
 
@@ -128,6 +153,7 @@ def wanted_values(item: Field) -> str:
 def _range(limits: Limits, default: Any) -> str:
     if isinstance(default, bool | str):
         return "true or false" if isinstance(default, bool) else "a word"
+    # A bool is an int in Python: it is sorted out above.
     words = "a whole number" if isinstance(default, int) else "a finite number"
     if limits.least is not None:
         words += (
@@ -144,6 +170,7 @@ def _range(limits: Limits, default: Any) -> str:
 
 def _check_value(item: Field, value: Any) -> None:
     limits = limits_of(item)
+    # A check by a function has its own message.
     if limits.check is not None:
         limits.check(value)
     elif not _allowed(limits, item.default, value):
@@ -154,6 +181,8 @@ def _check_value(item: Field, value: Any) -> None:
 def _allowed(limits: Limits, default: Any, value: Any) -> bool:
     if not _of_kind(value, default):
         return False
+    # Choices are complete in themselves; ranges are for numbers alone, and `also` lists values
+    # outside the range with a special meaning.
     if limits.choices:
         return value in limits.choices
     if isinstance(default, bool | str) or value in limits.also:
@@ -178,6 +207,7 @@ def _of_kind(value: Any, default: Any) -> bool:
 
 def _converted(what: str, value: Any, default: Any) -> int | float | str:
     """Return a value in the type of the default."""
+    # The bool first: it is an int in Python.
     if isinstance(default, bool):
         word = str(value).strip().lower()
         if word not in _TRUE + _FALSE:

@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The geometry of a ray and a light: the foot of the perpendicular, the height, the lit part
-of the ray, and how much.
+of the ray, and the relative intensity there.
 
 With v = l - w origin, the homogeneous vector from the camera to the light
 (`realtime.scene.lights`), and a unit direction d, ``foot = v . d`` and ``height = |v x d|``. For a
-light at infinity, w = 0, v has unit length, and they are the cosine and the sine of the angle
-between ray and light. The textbook form sqrt(|v|^2 - foot^2) cancels where the ray passes close to
-the light: at height 1e-3 |v| it has no correct digit left in float32, and so has a difference of
-products of rounded numbers. Foot, height and the ends of what a light reaches are found once for a
-ray and light: all of that is computed in float64, from the aim of the ray as the camera has it
-(`realtime.scene.camera`), and rounded at the end. Each component of the cross product is a
-difference of two products, a b - c d, and Kahan's form with fused multiply-add gives it to 1.5
-units in the last place, so that v x d is at right angles to d however close to the light the ray
-passes:
+light at infinity, w = 0, v has unit length, and foot and height are the cosine and the sine of the
+angle between ray and light. The textbook form sqrt(|v|^2 - foot^2) cancels where the ray passes
+close to the light: at height 1e-3 |v| it has no correct digit left in float32, and a difference of
+products of rounded numbers has none either. Foot, height and the ends of the lit part are computed
+once for a ray and a light, in float64, from the aim of the ray as the camera has it
+(`realtime.scene.camera`), and are rounded at the end. Each component of the cross product is a
+difference of two products, a b - c d. Kahan's form with fused multiply-add gives this difference to
+1.5 units in the last place, so that v x d is at right angles to d however close to the light the
+ray passes:
 
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
 
-A light sample with the normal n lights what lies before its plane, with the cosine of the angle to
-n for a profile. From the light to the point of the ray at x, s = x - foot from the foot, leads (v x
-d) x d + s d, hence
+A light sample with the normal n lights the half space before its plane; its profile is the cosine
+of the angle to n. The vector from the light to the point of the ray at x, s = x - foot from the
+foot, is (v x d) x d + s d, hence
 
     r cos = axial s + offset,     axial = n . d,     offset = n . ((v x d) x d).
 
-Where that is 0 the ray meets the plane. The vector in brackets has the length of the height, so
+The ray meets the plane where r cos = 0. The vector in brackets has the length of the height, so
 that the cosine is right to rounding as close to the light as v x d is.
 
 **Where a ray enters and leaves a cone about a spot's axis.**
@@ -35,33 +35,36 @@ The point at the distance s from the foot lies in the cone of half angle b where
 
 Squared, this is A s^2 + 2 B s + C >= 0 with
 
-    A = axial^2 - cos^2,   B = axial offset,   C = offset^2 - cos^2 h^2,   B^2 - A C = cos^2 D,   D = offset^2 + h^2 A.
+    A = axial^2 - cos^2,   B = axial offset,   C = offset^2 - cos^2 h^2,
+    B^2 - A C = cos^2 D,   D = offset^2 + h^2 A.
 
 **The discriminant.** A ray that grazes the cone has two roots close to each other, and D cancels.
 But d, (w x d)/h and w/h are three unit vectors at right angles, so with across = a . w
 
     axial^2 + (offset/h)^2 + (across/h)^2 = 1,     hence     D = h^2 sin^2 - across^2.
 
-One difference is left, zero where the ray is tangent. A fraction e of h^2 that rounding adds to it
-changes a chord that is sqrt(e) of the distance from nothing to that: half of float64's digits are
-lost there, and float32 has its own. A common factor of d is one of h and across both.
+One difference remains, and it is zero where the ray is tangent. If rounding adds the fraction e of
+h^2 to it, a chord of length 0 becomes one of sqrt(e) times the distance: half of float64's digits
+are lost there, and the other half is as many as float32 has. An error in the length of d is a
+common factor of h and across.
 
 **The roots.** The end where A s + B > 0 is where the ray enters the cone, the
 other where it leaves it,
 
     enter = (-B + cos sqrt(D)) / A,     leave = (-B - cos sqrt(D)) / A.
 
-Where A is close to 0 one of them cancels, which then is C/q, q = -B - sign(B) cos sqrt(D) the
-numerator of the other. But C cancels too, by up to axial^2 where the ray is tangent. The first form
-therefore serves for A < -cos^2/2, that is axial^2 < cos^2/2, and C/q elsewhere: neither loses more
-than 2/cos^2. A itself cancels for rays along lines on the cone. From h^2 A = D - offset^2 it has
-all digits where the ray is tangent, and keeps those that axial^2 - cos^2 loses of rays along a
-narrow beam, where axial and cos are both close to 1.
+Where A is close to 0 one of the two roots cancels. That root is computed as C/q instead, with the
+numerator of the other root, q = -B - sign(B) cos sqrt(D). But C cancels too, by up to axial^2 where
+the ray is tangent. The first form therefore serves for A < -cos^2/2, which means axial^2 < cos^2/2,
+and C/q elsewhere: neither loses more than 2/cos^2. A itself cancels for rays along lines on the
+cone. The form h^2 A = D - offset^2 gives A with all digits where the ray is tangent; for rays along
+a narrow beam, where axial and cos are both close to 1, it keeps the digits that axial^2 - cos^2
+loses.
 
 **The nappe.** Squaring adds the nappe behind the light. For A < 0 both roots are on the same one,
-where axial s + offset has the sign it has in their middle s = -B/A, hence that of offset: the
-solution is the interval between them, or nothing. For A >= 0 there is one root on each, and the
-solution is a half line: from `enter` on if axial > 0, else up to `leave`.
+where axial s + offset has the sign that it has in their middle s = -B/A, which is the sign of
+offset: the solution is the interval between them, or nothing. For A >= 0 there is one root on each,
+and the solution is a half line: from `enter` on if axial > 0, else up to `leave`.
 """
 
 from dataclasses import dataclass
@@ -71,8 +74,6 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.scene.lights import Cone, Light
-
-_TINY = 2.0**-100
 
 
 @dataclass(frozen=True)
@@ -100,25 +101,34 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
     Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is
     in the cone on one side of it, or nowhere.
     """
+    # D = h^2 sin^2 - across^2: below 0 the ray misses the cone as a line.
     discriminant = ray.square * cone.square_sin - dr.square(ray.across)
-    # For a ray through the light only the signs remain, times `_TINY`.
+    # B, and C as a product: the difference of the squares would cancel near the edge of the cone.
     b = ray.axial * ray.offset
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)
-    root = cone.cos * dr.sqrt(dr.maximum(discriminant, _TINY))
+    # A ray through the light has B = C = D = h = 0. `tiny` stands for its D and its h^2, so that
+    # the signs of the roots remain.
+    tiny = 2.0**-100
+    root = cone.cos * dr.sqrt(dr.maximum(discriminant, tiny))
     q = -(b + dr.mulsign(root, b))
+    # h^2 A = D - offset^2, which has all digits where the ray is tangent; `inverse` is 1/A.
     scaled = dr.fma(
-        _TINY, dr.abs(ray.axial) - cone.cos, dr.fma(-ray.offset, ray.offset, discriminant)
+        tiny, dr.abs(ray.axial) - cone.cos, dr.fma(-ray.offset, ray.offset, discriminant)
     )
-    inverse = dr.maximum(ray.square, _TINY) / scaled
+    inverse = dr.maximum(ray.square, tiny) / scaled
+    # Where A is close to 0, q/A is the root far from the foot and C/q the near one, without
+    # cancellation. Rays steeper to the axis take (-B +- cos sqrt(D))/A, as C cancels for them.
     far, near = q * inverse, c / q
     middle, half = -b * inverse, root * inverse
     steep, swapped = dr.square(ray.axial) < 0.5 * dr.square(cone.cos), q < 0
     enter = dr.select(steep, middle + half, dr.select(swapped, near, far))
     leave = dr.select(steep, middle - half, dr.select(swapped, far, near))
+    # For A > 0 there is one root on each nappe: the cone before the light is a half line.
     half_line, forward = inverse > 0, ray.axial > 0
     enter = dr.select(half_line & ~forward, -dr.inf, enter)
     leave = dr.select(half_line & forward, dr.inf, leave)
-    # A ray parallel to a line on the cone meets it at infinity, if at all.
+    # A ray parallel to a line on the cone meets it at infinity, if at all. For A < 0 both roots are
+    # on the nappe of the sign of `offset`.
     hit = dr.select(half_line, enter < dr.inf, (discriminant >= 0) & (ray.offset >= 0))
     return dr.select(hit, enter, -dr.inf), dr.select(hit, leave, -dr.inf)
 
@@ -135,18 +145,16 @@ def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
     With n^2 = (offset/h)^2 + (across/h)^2 = 1 - axial^2 this is the sum of squares above for
     slant = n, slide = axial offset / n, gap = |across| / n.
     """
+    # n h = sqrt(offset^2 + across^2).
     size = dr.sqrt(dr.fma(ray.offset, ray.offset, dr.square(ray.across)))
     # For a ray through the light only the sine remains, which loses digits only near the axis.
     sine = dr.sqrt(dr.maximum(dr.fma(-ray.axial, ray.axial, 1), 0))
     slant = dr.select(ray.height > 0, size / ray.height, sine)
+    # A ray parallel to the axis is everywhere as far from the axis as from the light.
     parallel = size == 0
     slide = dr.select(parallel, 0, ray.axial * ray.height * (ray.offset / size))
     gap = dr.select(parallel, ray.height, ray.height * (dr.abs(ray.across) / size))
     return {"slant": slant, "slide": slide, "gap": gap}
-
-
-#: sine between a ray and the axis of a spot below which their distance is the same everywhere
-_PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -158,7 +166,8 @@ class RayGeometry:
     foot: Any
     height: Any  #: distance from the light to the ray [m]; w = 0: a sine
     axial: Any = None  #: spot, light sample: cosine between the ray and the axis, or the normal
-    #: spot, light sample: component along that of the vector from the light to the foot [m]
+    #: spot, light sample: component along the axis, or the normal, of the vector from the light to
+    #: the foot [m]
     offset: Any = None
     #: spot, light sample: distance at which the ray enters what is lit, -inf if it misses it [m]
     enter: Any = None
@@ -176,7 +185,12 @@ class RayGeometry:
         """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
 
         All of the ray is lit, except for a spot, which lights the part inside its cone, and a light
-        sample, which lights what lies before its plane. `x1` may be infinite.
+        sample, which lights the part before its plane.
+
+        Parameters
+        ----------
+        x0, x1
+            Distances along the rays [m]; `x1` may be infinite.
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
 
@@ -199,10 +213,13 @@ class RayGeometry:
         if light.beam is None:
             return [(x0, x1)]
         inner0, inner1 = _clip(self.beam_enter, self.beam_leave, x0, x1)
-        crosses = self.slant > _PARALLEL
+        # The distance from the axis is least at s = slide/slant. Below a sine of 1e-6 between ray
+        # and axis this distance is the same everywhere, and the ray has no closest point.
+        crosses = self.slant > 1e-6
         closest = dr.clip(self.foot + dr.select(crosses, self.slide / self.slant, 0), x0, x1)
         misses = crosses & (inner0 >= inner1)
         inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
+        # The beam ends at infinity: the piece behind it is empty.
         stays = dr.isinf(inner1)
         return [
             (x0, inner0),
@@ -224,30 +241,40 @@ class RayGeometry:
 
         A light sample has the cosine at its normal, 0 behind its plane. A spot has Mitsuba's
         profile, linear in the angle: one inside the beam, zero outside the cut-off; between the
-        two, (cutoff - angle) / (cutoff - beam). The angle is that of the distances from the axis
+        two, (cutoff - angle) / (cutoff - beam). The angle follows from the distances from the axis
         and along it: near the axis a cosine alone has lost it.
         """
         s = x - self.foot
         if light.facing is not None:
             return self.falloff_beside(light, s)
+        # Distances of the point from the axis and along it [m].
         t = dr.fma(self.slant, s, -self.slide)
         away = dr.sqrt(dr.fma(t, t, dr.square(self.gap)))
         along = dr.fma(self.axial, s, self.offset)
-        # Compute one angle: at the dim edge the difference of two angles would cancel.
+        # `away` and `along` are R sin and R cos of the angle at the light, the arguments below R
+        # sin and R cos of the cut-off minus this angle. Compute one angle: at the dim edge the
+        # difference of two angles would cancel.
         cos, sin = (type(x)(value) for value in (light.cone.cos, dr.sqrt(light.cone.square_sin)))
         within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
         return dr.clip(within * light.inverse_transition, 0, 1)
 
 
 def ray_geometry(origin, direction, light: Light) -> RayGeometry:
-    """Return foot and height of rays with respect to one light, and where
-    they are in what it lights.
-
-    `origin`, `direction`: camera rays [m] in any precision; `direction` may have any length, and
-    its errors are those of the height; `light`: any light; the result has its precision.
+    """Return foot and height of rays with respect to one light, and the part that it lights.
 
     Valid for any ray. A ray through the light, or parallel to the light, has height 0.
+
+    Parameters
+    ----------
+    origin
+        Where rays start, one for all or one each, a three-vector in any precision [m].
+    direction
+        Directions of any length, in any precision; their errors are those of the height.
+    light
+        Any light; the result has the precision of its arrays.
     """
+    # All in float64: v = l - w origin, the unit direction d, and v x d by Kahan's form, which is
+    # taken of the aim as the camera has it and divided by its length afterwards.
     aim = mi.Vector3d(direction)
     v = mi.Vector3d(light.position) - mi.Vector3d(origin) if light.w else -light.exact_axis
     inverse = dr.rcp(dr.norm(aim))
@@ -258,6 +285,8 @@ def ray_geometry(origin, direction, light: Light) -> RayGeometry:
             dr.dot(light.facing.exact_normal, d),
             dr.dot(light.facing.exact_normal, dr.cross(w, d)),
         )
+        # The plane of the light sample is where axial s + offset = 0; the ray is before it on the
+        # side where the cosine grows.
         meets = fields["foot"] - offset / axial
         # A ray along the plane is before it as a whole, or nowhere.
         along = axial == 0
@@ -265,18 +294,21 @@ def ray_geometry(origin, direction, light: Light) -> RayGeometry:
         leave = dr.select(axial < 0, meets, dr.select(along & (offset <= 0), -dr.inf, dr.inf))
         fields |= {"axial": axial, "offset": offset, "enter": enter, "leave": leave}
     elif light.cone is not None:
+        # A spot lights the ray inside its cone, and with full intensity inside its beam.
         ray = axis_geometry(w, d, light.exact_axis)
         enter, leave = (fields["foot"] + s for s in cone_interval(ray, light.cone))
         fields |= {"axial": ray.axial, "offset": ray.offset, "enter": enter, "leave": leave}
         if light.beam is not None:
             begin, end = (fields["foot"] + s for s in cone_interval(ray, light.beam))
             fields |= {"beam_enter": begin, "beam_leave": end, **axis_distance(ray)}
+    # All of it was computed in float64; now it gets the precision of the light.
     Float = type(light.position.x)
     return RayGeometry(**{name: Float(value) for name, value in fields.items()})
 
 
 def _cross(a, b):
     def difference(i, j):
+        # `w` is the rounded product, and the second fma is exactly what its rounding lost.
         w = a[j] * b[i]
         return dr.fma(a[i], b[j], -w) + dr.fma(-a[j], b[i], w)
 
@@ -284,6 +316,7 @@ def _cross(a, b):
 
 
 def _clip(enter, leave, x0, x1):
+    # A segment beside the interval becomes a point at its own nearer end.
     begin = dr.clip(enter, x0, x1)
     return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
 

@@ -30,6 +30,7 @@ def spot_axis(emitter: Any) -> Array:
     matrix = host_matrix(emitter.world_transform())[:3, :3]
     squares = matrix.T @ matrix  # a multiple of the identity where angles stay as they are
     scale = np.trace(squares) / 3
+    # The square of a scale differs by twice the fraction of the scale; `not <=` refuses NaN, too.
     if not np.abs(squares - scale * np.eye(3)).max() <= 2 * _UNEVEN * scale:
         scales = " x ".join(f"{length:g}" for length in np.sqrt(np.diag(squares)))
         raise InputError(
@@ -48,6 +49,7 @@ def beam_axis(emitter: Any) -> Array:
     Raises InputError for one that is scaled: Mitsuba multiplies the light on surfaces by
     the length of the vector.
     """
+    # A directional emitter shines along +z of its own frame.
     axis = host_matrix(emitter.world_transform())[:3, 2]
     length = float(np.linalg.norm(axis))
     if not abs(length - 1) <= _UNEVEN:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Motion from frame to frame: lights, the medium, objects.
 
-A scene with something moved is a new `Scene` that shares all the rest. Its arrays have the types
-and sizes of the old ones and are opaque, so a frame that was recorded once serves for all. Only
-objects move in Mitsuba's own scene, too, so that rays meet them; methods prepare their state from
-`Scene.positions`.
+A moved scene is a new `Scene` that shares what did not move. Its arrays have the types and sizes of
+the old ones and are opaque, so a frame that was recorded once serves for all. Objects alone move in
+Mitsuba's scene, too, so that rays meet them; methods prepare their state from `Scene.positions`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,10 +38,12 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     """
     if light.sky is not None:
         return light
+    # The rectangle across a light at infinity is fitted to the media again: they do not turn.
     if light.extent is not None:
         return replace(light, **_turned_directional(light, light.extent, turn))
     position = np.array(light.position, dtype=np.float64).ravel()
     arrays = {"position": _like(light.position, about + turn @ (position - about))}
+    # A spot turns with its place.
     if light.exact_axis is not None:
         arrays["exact_axis"] = _like(light.exact_axis, turn @ np.array(light.exact_axis).ravel())
     return replace(light, **arrays)
@@ -69,9 +70,11 @@ def coloured_light(light: Light, fraction: float) -> Light:
 
 
 def _rotated(colour: Array, fraction: float) -> Array:
+    # A third of a turn moves each value to the next channel. Between two such turns the colours mix
+    # linearly, which leaves their sum as it is.
     whole, part = divmod(3 * fraction, 1)
-    here, there = (np.roll(colour, int(whole) + step) for step in (0, 1))
-    return (1 - part) * here + part * there
+    before, after = (np.roll(colour, int(whole) + step) for step in (0, 1))
+    return (1 - part) * before + part * after
 
 
 def coloured_area_light(light: AreaLight, fraction: float) -> AreaLight:
@@ -85,6 +88,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
     """Return a scene with its area lights elsewhere; the shapes of black ones
     move in its Mitsuba scene.
     """
+    # Black lights are opaque: their shapes are in Mitsuba's scene, where rays meet them.
     black = [light for light in area_lights if light.opaque]
     if not black:
         return replace(scene, area_lights=tuple(area_lights))
@@ -94,12 +98,15 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
             replace_positions(parameters, {light.name: light.vertices.astype(np.float32)})
             continue
         key = f"{light.name}.to_world"
+        # The columns of to_world: both axes of the shape, a third one across them that is as long
+        # as the first, and the middle.
         third = np.cross(light.across, light.up)
         third *= np.linalg.norm(light.across) / np.linalg.norm(third)
         matrix = np.eye(4)
         matrix[:3] = np.stack([light.across, light.up, third, light.middle], axis=1)
         parameters[key] = type(parameters[key])(mi.Matrix4f(matrix.astype(np.float32)))
     parameters.update()
+    # Methods that read triangles find the shapes of black lights by their names, too.
     moved = {light.name: occluder_vertices(light) for light in black}
     return replace(scene, area_lights=tuple(area_lights), positions={**scene.positions, **moved})
 
@@ -147,11 +154,13 @@ def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
         # Objects may have moved before in Mitsuba's scene: as it is now, vertices and
         # normals are of one place.
         facets = read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
+    # The table of triangles knows shapes by their numbers in the scene.
     numbers = _numbers(parameters, names, scene.geometry.shapes()) if facets is not None else {}
     middles = {
-        name: 0.5 * (own.min(axis=0).astype(float) + own.max(axis=0))
-        for name, own in vertices.items()
+        name: 0.5 * (corners.min(axis=0).astype(float) + corners.max(axis=0))
+        for name, corners in vertices.items()
     }
+    # The same places in aligned arrays: the first frame is recorded with what later ones have.
     replace_positions(parameters, vertices)
     return Objects(parameters, vertices, middles, numbers, facets)
 
@@ -162,9 +171,11 @@ def _numbers(parameters, names: Sequence[str], shapes) -> dict[str, int]:
     """
     numbers = {}
     for number, shape in enumerate(shapes):
-        own = mi.traverse(shape)
-        if "vertex_positions" in own:
-            numbers[own["vertex_positions"].index] = number
+        # One mesh has one Dr.Jit variable of positions in both traversals: its index finds the
+        # shape.
+        of_shape = mi.traverse(shape)
+        if "vertex_positions" in of_shape:
+            numbers[of_shape["vertex_positions"].index] = number
     return {name: numbers[parameters[f"{name}.vertex_positions"].index] for name in names}
 
 
@@ -185,6 +196,8 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 
     `turn` is a rotation matrix, (3, 3). The scene's Mitsuba scene is changed.
     """
+    # From where the objects stood when they were read: turns of many frames do not add up their
+    # rounding.
     positions = {
         name: ((vertices - objects.middles[name]) @ turn.T + objects.middles[name]).astype(
             np.float32
@@ -203,6 +216,7 @@ def closed_shapes(occluders: Occluders) -> tuple[str, ...]:
     things, not floors and walls.
     """
     component_shape = occluders.component_shape
+    # One open component makes its shape open.
     open_shapes = component_shape[~occluders.closed]
     closed = np.setdiff1d(component_shape, open_shapes)
     return tuple(occluders.shapes[number] for number in closed)

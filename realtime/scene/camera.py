@@ -5,8 +5,8 @@ Mitsuba's perspective sensor looks along +z of its own frame, with +x to the lef
 +y up. With the pixel (i, j) counted from the upper left corner of a W x H image, and a plane before
 the pinhole on which pixels are squares of size 1,
 
-    direction ~ forward + ((W - 1)/2 - i) left + ((H - 1)/2 - j) up,   |left| = |up| = 2 tan(fov_x/2) / W,  |forward| =
-    1.
+    direction ~ forward + ((W - 1)/2 - i) left + ((H - 1)/2 - j) up,
+    |left| = |up| = 2 tan(fov_x/2) / W,     |forward| = 1.
 
 Rays start at the pinhole; the near clip plane does not cut the medium away (DESIGN section 6.3).
 
@@ -29,7 +29,6 @@ from airlight.realtime.numerics.array_types import ArrayTypes, host_numbers
 from airlight.realtime.transforms import host_matrix
 
 TILE = 16  #: rays in a tile of neighbouring pixels
-SIDE = 4  #: of a tile [pixels]
 
 
 @dataclass(frozen=True)
@@ -68,14 +67,16 @@ class Camera:
         return type(self.origin)(self.axes[2])
 
     def project(self, away) -> tuple[Any, Any, Any]:
-        """Return how many pixels left of and above the middle of the image vectors from the
-        pinhole point, and how far.
+        """Return the pixels, left of and above the middle of the image, to which vectors `away`
+        from the pinhole point, and their depths.
 
-        The third is their part along `forward`, in the unit of `away`; where it is not above 0
-        the others mean nothing.
+        The depth is the component along `forward`, in the unit of `away`; where it is not above 0
+        the pixels mean nothing.
         """
         forward, left, up = (type(away)(axis) for axis in self.axes)
         depth = dr.dot(away, forward)
+        # `left` and `up` are as long as a pixel at distance 1, so products with them have their
+        # square.
         i, j = (dr.dot(away, side) / (depth * dr.squared_norm(side)) for side in (left, up))
         return i, j, depth
 
@@ -99,6 +100,7 @@ class HostCamera:
 
 def pixel_grid(width: int, height: int) -> PixelGrid:
     """Return the pixels of an image for a `Camera`."""
+    # (W - 1)/2 and (H - 1)/2: the pixel numbers of the middle of the image.
     halves = (mi.Float64(0.5 * (side - 1)) for side in (width, height))
     grid = PixelGrid(mi.UInt32(width), mi.Float64(1 / width), *halves)
     dr.make_opaque(grid)
@@ -119,6 +121,7 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
             f"the scene's sensor is a {sensor.class_name()}; expected a sensor of type "
             "'perspective'"
         )
+    # The whole film, with the pinhole before its middle.
     parameters = mi.traverse(sensor)
     width, height = (int(n) for n in parameters["film.size"])
     if list(parameters["film.crop_size"]) != [width, height]:
@@ -130,12 +133,15 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
         raise InputError(
             "the camera has a principal point offset; remove principal_point_offset_x and _y"
         )
+    # Columns of the camera's to_world: +x is left in the image, +y up, +z into the scene. Pixels
+    # are squares, 2 tan(fov_x/2)/W wide at distance 1.
     matrix = host_matrix(sensor.world_transform())
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
     pixel = 2 * tangent / width
     basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
     forward, left, up = (mi.Vector3d(*(float(c) for c in column)) for column in basis)
     origin = types.vector(*(float(c) for c in matrix[:3, 3]))
+    # Opaque: a kernel for one camera serves for all of its places.
     dr.make_opaque(origin, forward, left, up)
     return Camera(width, height, origin, (forward, left, up), pixel_grid(width, height)), sensor
 
@@ -166,6 +172,7 @@ def shifted_camera(camera: Camera, right: float, down: float) -> Camera:
     `camera`: the camera; `right`, `down`: how far beside [pixels].
     """
     host = read_camera(camera)
+    # The place (i + right, j + down) of the image: `forward` moves to the right and down.
     forward = mi.Vector3d(*(float(c) for c in host.forward - right * host.left - down * host.up))
     dr.make_opaque(forward)
     return replace(camera, axes=(forward, *camera.axes[1:]))
@@ -177,6 +184,7 @@ def resized_camera(camera: Camera, width: int, height: int) -> Camera:
     `camera`: the camera; `width`, `height`: of its image [pixels].
     """
     forward, left, up = camera.axes
+    # The same picture in other pixels: left W and up H stay.
     left, up = left * (camera.width / width), up * (camera.height / height)
     dr.make_opaque(left, up)
     return replace(
@@ -193,7 +201,9 @@ def tiled_pixels(width: int, height: int):
     """
     row, column = np.divmod(np.arange(width * height, dtype=np.uint32), width)
     keys: list[np.ndarray] = [column, row]
-    for side in (SIDE, 4 * SIDE, 16 * SIDE):
+    # `lexsort` sorts by its last key first: by squares of 64 x 64 pixels, in each by 16 x 16, by
+    # tiles of 4 x 4, and in a tile by row and column.
+    for side in (4, 16, 64):
         keys += [column // side, row // side]
     return np.lexsort(keys).astype(np.uint32)
 
@@ -207,5 +217,7 @@ def ray_directions(camera: Camera, pixel):
     row, column = row_and_column(camera, pixel)
     i, j = camera.grid.half_width - mi.Float64(column), camera.grid.half_height - mi.Float64(row)
     forward, left, up = camera.axes
+    # The aim keeps float64 for what lies near a light; the unit direction has the precision of the
+    # scene.
     aim = dr.fma(left, i, dr.fma(up, j, forward))
     return type(camera.origin)(aim * dr.rcp(dr.norm(aim))), aim

@@ -77,12 +77,18 @@ def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
     InputError
         Where an edge is not met once each way, with its name.
     """
-    joined, own, number = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    mesh = ClosedMesh(name, joined, number.reshape(-1)[np.asarray(faces, dtype=np.int64)], own)
+    # Meshes come with seams, where texture coordinates differ: equal vertices become one.
+    joined, source, number = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    mesh = ClosedMesh(name, joined, number.reshape(-1)[np.asarray(faces, dtype=np.int64)], source)
+
+    # Each triangle runs along three edges, from the tail to the head of each.
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     if np.any(tail == head):
         first = int(np.argmax(tail == head)) // 3
         raise _open(mesh, mesh.faces[first, 0], mesh.faces[first, 2], f"triangle {first} is a line")
+
+    # An edge and its way have one number, tail times count plus head. The mesh is closed if each
+    # such number occurs once, and the number of the opposite way, too.
     count = len(joined)
     forward, backward = tail * count + head, head * count + tail
     _, first, met = np.unique(forward, return_index=True, return_counts=True)
@@ -111,9 +117,11 @@ def winding_number(corners: Array, point: Array) -> float:
     """
     a, b, c = np.moveaxis(corners - point, 1, 0)
     lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
+    # Numerator a . (b x c) and denominator of tan(angle/2), by triangle.
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))
     products = [np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))]
     turned = products[0] * lengths[2] + products[1] * lengths[0] + products[2] * lengths[1]
+    # arctan2 is half of the solid angle: the sum over 4 pi has 2 pi here.
     return float(
         np.sum(np.arctan2(volume, lengths[0] * lengths[1] * lengths[2] + turned)) / (2 * np.pi)
     )
@@ -121,6 +129,7 @@ def winding_number(corners: Array, point: Array) -> float:
 
 def encloses(mesh: ClosedMesh, point: Array) -> bool:
     """Return whether a `point` [m] lies within a mesh."""
+    # The box first: the winding number needs all triangles.
     if np.any(point < mesh.vertices.min(axis=0)) or np.any(point > mesh.vertices.max(axis=0)):
         return False
     return winding_number(mesh.corners, point) > 0.5
@@ -131,12 +140,8 @@ def shape_number(shape: Any) -> int:
     return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
 
 
-_OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
 FLAT = 1e-5  #: how far a surface may lie from a convex one, relative to the size of the body
 CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
-# of the largest coordinate: four times the rounding of a float32, as three of them add up
-_ROUNDING = 2.0**-22
-_CHUNK = 1 << 22  # distances of points from planes that are in memory at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
 
 
@@ -189,6 +194,8 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
         raise _refusal(
             name, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh"
         )
+    # flip_normals turns Mitsuba's normals and not the order of vertices: the order follows them
+    # here.
     vertices, faces = mesh_triangles(shape)
     faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
     mesh = closed_mesh(name, vertices, faces)
@@ -201,6 +208,7 @@ def _read_sphere(shape) -> Bounds:
         np.array(box.min, dtype=np.float64).ravel(),
         np.array(box.max, dtype=np.float64).ravel(),
     )
+    # Mitsuba says the box of a sphere and not its scales: unequal sides show an ellipsoid.
     size = high - low
     if np.ptp(size) > FLAT * size.max():
         raise _refusal(
@@ -240,11 +248,18 @@ def mesh_bounds(mesh: ClosedMesh) -> Bounds | None:
         raise _refusal(mesh.name, "has no volume", "a closed mesh around a body")
     if volume < 0:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
-        raise _refusal(mesh.name, flaw, _OUTWARDS)
+        raise _refusal(
+            mesh.name,
+            flaw,
+            "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh "
+            "asks for too",
+        )
 
     # The hull is made around the centre, so that it adds no rounding. Qhull repeats the plane of
-    # each facet for all triangles that it divides the facet into.
-    rounding = _ROUNDING * float(np.abs(mesh.vertices).max())
+    # each facet for all triangles that it divides the facet into. It merges facets whose planes
+    # differ by four times the rounding of a float32 of the largest coordinate, as three of them add
+    # up.
+    rounding = 2.0**-22 * float(np.abs(mesh.vertices).max())
     hull = ConvexHull(mesh.vertices - centre, qhull_options=f"Qt C{rounding:g}")
     planes, plane = np.unique(hull.equations, axis=0, return_inverse=True)
     if not _on_surface(mesh, hull.simplices, planes, centre, max(FLAT * size, rounding)):
@@ -276,14 +291,17 @@ def _on_surface(
     `simplices`: numbers of the vertices of the hull's triangles; `planes`: rows (normal,
     -offset) about the `centre`.
     """
-    # Most triangles of smooth bodies are triangles of the hull.
+    # Most triangles of smooth bodies are triangles of the hull: their three vertex numbers, sorted
+    # and put into one number, are found among those of the hull.
     count = len(mesh.vertices)
-    own, of_hull = (
+    of_mesh, of_hull = (
         np.sort(part, axis=1) @ [count**2, count, 1]
         for part in (mesh.faces, simplices.astype(np.int64))
     )
-    others = np.flatnonzero(~np.isin(own, of_hull))
-    rows = max(1, _CHUNK // len(planes))
+    others = np.flatnonzero(~np.isin(of_mesh, of_hull))
+    # The centroids of the others may lie 2/3 `depth` below the hull: no point of a triangle is more
+    # than three times as deep. At most 2^22 distances from planes are in memory at once.
+    rows = max(1, (1 << 22) // len(planes))
     for first in range(0, len(others), rows):
         points = mesh.corners[others[first : first + rows]].mean(axis=1) - centre
         nearest = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
@@ -303,6 +321,8 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
     plane, neighbour = bounds.neighbours.T
     counts = np.bincount(plane, minlength=len(bounds.offsets))
     table = np.repeat(np.arange(len(counts), dtype=np.uint32)[:, None], counts.max(), axis=1)
+    # Pairs are in the order of their first plane: the place of a pair in its row is its number less
+    # the number of pairs of all planes before.
     table[plane, np.arange(len(plane)) - np.repeat(np.cumsum(counts) - counts, counts)] = neighbour
     return table
 
@@ -311,11 +331,13 @@ def radial_planes(bounds: Bounds) -> NDArray[np.uint32]:
     """Return by cell of directions from the centre a plane that is met there; cells are
     `CELLS` along each axis.
     """
+    # The middle of a cell stands for its directions, in the cube from -1 to 1 along each axis.
     places = (np.arange(CELLS) + 0.5) * (2 / CELLS) - 1
     distance = bounds.offsets - bounds.normals @ bounds.centre
     x, y, z = bounds.normals.T
     first = np.empty((CELLS, CELLS, CELLS), dtype=np.uint32)
     for layer, row, column in np.ndindex(first.shape):  # one at a time: there may be many planes
+        # A ray from the centre leaves the body at the nearest of the planes that it approaches.
         along = places[layer] * z + places[row] * y + places[column] * x
         with np.errstate(divide="ignore"):
             at = distance / along
@@ -336,6 +358,7 @@ def touches(bounds: Bounds, point: Array) -> bool:
     margin = 1e-6 * (bounds.radius + float(np.abs(point).max()))
     if bounds.is_sphere:
         return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin)
+    # The largest signed distance from a plane: below 0 within the body, 0 on its surface.
     beyond = float((bounds.normals @ point - bounds.offsets).max())
     return abs(beyond) < margin
 
@@ -355,11 +378,15 @@ def mean_distance(bounds: Bounds) -> float:
         return 1.2 * bounds.radius
     random = np.random.default_rng(20_061)
     corner = bounds.corners
+    # Twice the area of each triangle as a vector along its normal, and with it six times the volume
+    # of the tetrahedron between the triangle and the middle.
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     middle = np.unique(corner.reshape(-1, 3), axis=0).mean(axis=0)
     volume = np.sum((corner[:, 0] - middle) * area, axis=1)
+    # Triangles are chosen by area for the boundary, tetrahedra by volume for the body.
     boundary = _on_triangles(corner, np.linalg.norm(area, axis=1), random)
-    # The body is the tetrahedra from its middle to its triangles.
+    # A point of a tetrahedron lies on the way from its apex to a point of its base; the cube root
+    # makes it uniform, as the cross-section grows with the square of the way.
     inside = middle + np.cbrt(random.random((_SAMPLES, 1))) * (
         _on_triangles(corner, volume, random) - middle
     )
@@ -371,4 +398,6 @@ def _on_triangles(corner: Array, fraction: Array, random) -> Array:
     fraction = np.maximum(fraction, 0)
     chosen = corner[random.choice(len(corner), _SAMPLES, p=fraction / fraction.sum())]
     u, v = np.sqrt(random.random((_SAMPLES, 1))), random.random((_SAMPLES, 1))
+    # sqrt makes the point uniform: the width of the triangle grows with the way from its first
+    # corner.
     return (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Clouds whose density differs from place to place: the grids of Mitsuba's `heterogeneous` media.
 
-A grid of values of which the largest is rho_max gives the extinction
+A grid of values with the maximum rho_max gives the extinction
 
     sigma_t(p) = scale rho_max rho(p),        rho = values / rho_max  in [0, 1],
 
@@ -10,11 +10,11 @@ constant beyond the outermost ones. `Clouds.sigma_t` is scale rho_max, the large
 bound for code that knows extinctions alone. `Clouds.density` holds rho.
 
 Mitsuba tells Python a volume's values and its box, and not its transform. The transform is
-measured: the middle of the box is that of the grid, and a grid of two voxels a side, 0 at one end
-of an axis and 1 at the other, has the coordinate along this axis as its value. Such a grid takes
-the place of the volume's own for each axis in turn, while it is read at places around the middle.
-The densities are then compared with Mitsuba's own at some points, so nothing else can be taken for
-a grid that is linear between voxels.
+measured. Box and grid have the same middle. A grid of two voxels a side, 0 at one end of an axis
+and 1 at the other, has the coordinate along this axis as its value. Such a grid takes the place of
+the volume's own for each axis in turn, while it is read at places around the middle. The densities
+are then compared with Mitsuba's own at some points, so nothing else can be taken for a grid that is
+linear between voxels.
 """
 
 import math
@@ -39,13 +39,8 @@ from airlight.realtime.scene.closed_mesh import ClosedMesh
 
 Array = NDArray[np.float64]
 
-_POINTS = 512  # at which a grid is compared with Mitsuba's
-# from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
-_DIFFERENCE = 2e-3
 # of the grid, by which float32 leaves its sides beside the axes; more far from the origin
 _TURNED = 1e-5
-_HALVINGS = 20  # of steps from the middle of a grid: sides of one to a million
-_BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a fraction of that
 
 
 @dataclass(frozen=True)
@@ -84,12 +79,16 @@ class Density:
         """Return rho at places [m] in clouds of some numbers [1]."""
         Float = type(point.x)
         Four = four_numbers(Float)
+        # The cell of eight voxel centres around the place, by its first voxel (i, j, k), and the
+        # place (u, v, w) in it.
         x, y, z = self.rows_at(point, cloud, active)
         nx, ny, nz = (dr.gather(mi.UInt32, count, cloud, active) for count in self.counts)
         (i, u), (j, v), (k, w) = (
             _cell(place, count) for place, count in ((x, nx), (y, ny), (z, nz))
         )
         voxel = dr.gather(mi.UInt32, self.first, cloud, active) + (k * ny + j) * nx + i
+        # A row of the table has four of the eight values: the row at k and the one at k + 1, or the
+        # same row again in the last layer.
         near = dr.gather(Four, self.table, voxel, active)
         far = dr.gather(Four, self.table, voxel + dr.select(k + 1 < nz, nx * ny, 0), active)
         four = dr.lerp(near, far, w)
@@ -98,6 +97,7 @@ class Density:
     def rows_at(self, point, cloud: PerRay, active: Any) -> tuple[Any, Any, Any]:
         """Return places in voxels."""
         Float = type(point.x)
+        # The three rows of four of the transform of the cloud.
         row = [dr.gather(Float, number, cloud, active) for number in self.rows]
         x, y, z = (
             dr.fma(
@@ -115,8 +115,10 @@ class Density:
         """
         count = int(np.prod([int(count[cloud]) for count in self.counts]))
         voxel = dr.arange(mi.UInt32, count) + int(self.first[cloud])
+        # The first of the four numbers of a voxel is its density.
         rho = dr.gather(type(self.table), self.table, 4 * voxel)
         above = rho > threshold
+        # In float64: float32 loses the small terms of a sum over millions of voxels.
         total = float(dr.sum(mi.Float64(dr.select(above, rho, 0)))[0])
         fraction = int(dr.count(above)[0])
         return total / fraction if fraction else 1.0
@@ -136,8 +138,11 @@ def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
     """
     name = f"the heterogeneous medium of shape '{mesh.name}'"
     grid = read_density(medium, name)
+    # Vertices in coordinates of the grid, 0 to 1 inside of it; the hull may reach beyond the grid
+    # by a ten-thousandth of it.
+    beyond_side = 1e-4
     reach = grid.to_grid[:, :3] @ mesh.vertices.T + grid.to_grid[:, 3:]
-    beyond = (reach < -_BEYOND) | (reach > 1 + _BEYOND)
+    beyond = (reach < -beyond_side) | (reach > 1 + beyond_side)
     if beyond.any():
         vertex = int(np.argmax(beyond.any(axis=0)))
         place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
@@ -177,7 +182,7 @@ def read_density(medium: Any, name: str) -> DensityGrid:
             "colour: a 'constvolume'"
         )
 
-    # One channel of finite values, of which one at least is above 0.
+    # One channel of finite values, at least one of them above 0.
     values = np.array(parameters["sigma_t.data"], dtype=np.float32)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
@@ -201,7 +206,8 @@ def read_density(medium: Any, name: str) -> DensityGrid:
             f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere"
         )
 
-    # The largest value is that of the extinction; what is read has to be what Mitsuba reads.
+    # rho is relative to the largest value, which goes into the extinction. The grid has to read as
+    # Mitsuba reads it.
     values /= np.float32(largest)
     grid = DensityGrid(values, largest * scale, _transform(medium, name))
     _compare(name, medium, grid)
@@ -234,6 +240,7 @@ def along_the_axes(grid: DensityGrid, name: str) -> DensityGrid:
 def _transform(medium: Any, name: str) -> Array:
     """Return the transform of the grid of a medium, (3, 4); messages call the medium by `name`."""
     parameters = mi.traverse(medium)
+    # Box and grid have the same middle, however the grid is turned (see the module).
     volume = next(part for part in parameters.hierarchy if part.class_name() == "GridVolume")
     low, high = (
         np.array(corner, dtype=np.float64).ravel()
@@ -241,11 +248,11 @@ def _transform(medium: Any, name: str) -> Array:
     )
     middle, size = 0.5 * (low + high), high - low
     # a copy: `parameters` writes into what it has returned
-    own = mi.TensorXf(parameters["sigma_t.data"])
+    values = mi.TensorXf(parameters["sigma_t.data"])
     try:
         matrix = _measured(parameters, volume, middle, size)
     finally:
-        parameters["sigma_t.data"] = own
+        parameters["sigma_t.data"] = values
         parameters.update()
     if matrix is None:
         raise InputError(
@@ -270,14 +277,19 @@ def _measured(parameters: Any, volume: Any, middle: Array, size: Array) -> Array
     """
     # along the axes of coordinates; the values are linear for 0.25 of the grid from its middle
     steps = 0.2 * size
-    for _ in range(_HALVINGS):
+    # A thin grid that is turned is left by a step of its box: the steps are halved up to 20 times,
+    # which serves sides of one to a million.
+    for _ in range(20):
         offsets = np.concatenate([np.diag(steps), -np.diag(steps)])
         values = np.empty((3, 6))  # by axis of the grid, and by place
         for axis in range(3):
+            # A grid of two voxels a side: 0 at one end of this axis and 1 at the other.
             ends = np.indices((2, 2, 2), dtype=np.float32)[2 - axis]
             parameters["sigma_t.data"] = mi.TensorXf(ends[..., None])
             parameters.update()
             values[axis] = _values(volume, middle + offsets)
+        # Where a value is 0 or 1 the place lies beyond the outermost centres, and the value is
+        # constant there. A step counts if both of its ends are between the centres on all axes.
         linear = ((values > 0) & (values < 1)).all(axis=0).reshape(2, 3).all(axis=0)
         if linear.all():
             # From end to end a value goes from 0 to 1 in half of the grid.
@@ -295,14 +307,17 @@ def _values(volume: Any, places: Array) -> Array:
 
 def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
     """Refuse a medium whose extinction is another one than the grid's."""
-    fraction = np.random.default_rng(1).random((_POINTS, 3))
+    # 512 places of the unit cube, drawn once for all, and where they are in the scene.
+    count = 512
+    fraction = np.random.default_rng(1).random((count, 3))
     places = np.linalg.solve(grid.to_grid[:, :3], (fraction.T - grid.to_grid[:, 3:]))
-    interaction = dr.zeros(mi.MediumInteraction3f, _POINTS)
+    interaction = dr.zeros(mi.MediumInteraction3f, count)
     interaction.p = mi.Point3f(*(mi.Float(row) for row in places))
     _, _, sigma_t = medium.get_scattering_coefficients(interaction)
-    own = grid.largest * density_at(grid.values, fraction)
-    worst = float(np.abs(np.array(sigma_t)[0] - own).max()) / grid.largest
-    if worst > _DIFFERENCE:
+    of_grid = grid.largest * density_at(grid.values, fraction)
+    worst = float(np.abs(np.array(sigma_t)[0] - of_grid).max()) / grid.largest
+    # A grid read well differs by rounding: by 1e-4 of its largest value where voxels are noise.
+    if worst > 2e-3:
         raise InputError(
             f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its "
             "largest value; expected a "
@@ -313,11 +328,13 @@ def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
 def density_at(values: NDArray[np.float32], fraction: Array) -> Array:
     """Return the values of a grid (z, y, x) at places in the unit cube, (n, 3)."""
     counts = np.array(values.shape[::-1])
+    # Places in voxels, whole numbers at their centres, constant beyond the outermost ones.
     place = np.clip(fraction * counts - 0.5, 0, counts - 1)
     cell = np.minimum(place.astype(np.int64), np.maximum(counts - 2, 0))
     offset = place - cell
     total = np.zeros(len(fraction))
     for corner in np.ndindex(2, 2, 2):
+        # Trilinear: each of the eight corners of the cell by the product of its three weights.
         x, y, z = np.minimum(cell + corner, counts - 1).T
         total += np.where(corner, offset, 1 - offset).prod(axis=1) * values[z, y, x]
     return total

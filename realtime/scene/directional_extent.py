@@ -2,9 +2,9 @@
 """The extent of a directional light: the smallest rectangle across it through which all
 light of the media comes.
 
-Light enters there before all shapes, and leaves through the same rectangle behind the media.
-Heights above that end are small numbers where depths may be large ones, so its middle stands for
-the place of the light.
+Light enters through this rectangle before all shapes, and leaves through the same rectangle behind
+the media. Heights above the rear rectangle are small numbers where depths from the front may be
+large ones, so the middle of the rear one stands for the place of the light.
 
 The media lie in the hull of some spheres: the corners of the hull of meshes, which are spheres of
 radius 0, and media that are spheres. Without media that end somewhere the spheres are those about
@@ -26,17 +26,14 @@ from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 
-_ANGLES = 90  # that are tried, in a quarter of a turn
-_BITS = 14  # of the numbers of a sphere
-_BORDER = 0.05  # of the size of all shapes
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
 def media_spheres(boundaries: Sequence[Any]) -> Array:
     """Return spheres whose hull holds media: middles and radii, (spheres, 4) [m].
 
-    Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in
-    their last digits must not move the rays of a map.
+    Numbers are rounded, and the spheres grown by as much: the precision of the media changes last
+    digits, which must not move the rays of a map.
 
     Parameters
     ----------
@@ -48,6 +45,7 @@ def media_spheres(boundaries: Sequence[Any]) -> Array:
     spheres = [_sphere_about(shape, touching=True) for shape in boundaries if not shape.is_mesh()]
     meshes = [mesh_triangles(shape)[0] for shape in boundaries if shape.is_mesh()]
     if meshes:
+        # Corners of the hull suffice: the hull of the spheres is the same with all vertices.
         vertices = np.concatenate(meshes)
         corners = vertices[ConvexHull(vertices).vertices]
         spheres.append(np.column_stack([corners, np.zeros(len(corners))]))
@@ -63,14 +61,13 @@ def shape_spheres(shapes) -> Array:
     Parameters
     ----------
     shapes
-        Mitsuba's opaque shapes; without any the rectangle is that of a sphere
-        of 1 m about the origin.
+        Mitsuba's opaque shapes; without any the rectangle fits a sphere of 1 m about the origin.
     """
     spheres = np.array(
         [_sphere_about(shape) for shape in shapes] or [np.array([0.0, 0.0, 0.0, 1.0])]
     )
     size = np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()
-    return _rounded(spheres + np.array([0, 0, 0, _BORDER * size]))
+    return _rounded(spheres + np.array([0, 0, 0, 0.05 * size]))
 
 
 def _sphere_about(shape: Any, *, touching: bool = False) -> Array:
@@ -86,8 +83,11 @@ def _sphere_about(shape: Any, *, touching: bool = False) -> Array:
 
 
 def _rounded(spheres: Array) -> Array:
+    # Numbers of 14 bits, in steps of a power of two. Rounding moves a middle by sqrt(3)/2 steps and
+    # a radius by half a step at most: radii grow by two steps to hold what they held.
+    bits = 14
     grain = 2.0 ** np.ceil(
-        np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS
+        np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - bits
     )
     return grain * (np.round(spheres / grain) + np.array([0, 0, 0, 2]))
 
@@ -106,6 +106,7 @@ def distance_before(spheres: Array, shapes) -> float:
     """
     middle = _middle(spheres)
     everything = np.vstack([spheres, *(_sphere_about(shape) for shape in shapes)])
+    # In any direction: a light that turns keeps the distance.
     reach = np.linalg.norm(everything[:, :3] - middle, axis=1) + everything[:, 3]
     return float(np.float32(_MARGIN * reach.max()))
 
@@ -113,8 +114,7 @@ def distance_before(spheres: Array, shapes) -> float:
 def directional_fields(
     axis: Array, spheres: Array, back: float, types: ArrayTypes
 ) -> dict[str, Any]:
-    """Return the fields of a directional `Light` that follow from where it comes
-    from and what it lights.
+    """Return the fields of a directional `Light` that follow from its direction and the media.
 
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that
     its map is the same in all.
@@ -132,14 +132,16 @@ def directional_fields(
     """
     middle = _middle(spheres)
     across, up, corner = _least_rectangle(axis, spheres[:, :3] - middle, spheres[:, 3])
+    # How far behind their middle the media end, along the light; the rectangle lies there.
     behind = _MARGIN * float(((spheres[:, :3] - middle) @ axis + spheres[:, 3]).max())
     vectors = {"position": middle + corner + behind * axis, "across": across, "up": up}
-    made = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
-    position = made.pop("position")
+    # Rounded to float32 in any precision, and then of its type: the map is the same in all.
+    arrays = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
+    position = arrays.pop("position")
     media = types.vector(*(aligned_array(types.scalar, column) for column in spheres[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
     extent = DirectionalExtent(
-        **made, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3])
+        **arrays, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3])
     )
     fields = {
         "position": position,
@@ -166,24 +168,28 @@ def _least_rectangle(axis: Array, points: Array, radii: Array) -> tuple[Array, A
     """Return half the sides of the rectangle of least area across an axis, and
     its middle; all (3,) [m].
     """
+    # Two unit vectors across the axis, the first from the axis of coordinates that is farthest from
+    # it: no cross product near 0.
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
 
     # By angle the directions of one side, and behind them those of the other, a
-    # quarter of a turn ahead.
-    angle = np.linspace(0, 0.5 * np.pi, _ANGLES, endpoint=False)[:, None]
+    # quarter of a turn ahead. A rectangle is the same after a quarter of a turn: 90 angles there.
+    count = 90
+    angle = np.linspace(0, 0.5 * np.pi, count, endpoint=False)[:, None]
     cosine, sine = np.cos(angle), np.sin(angle)
     sides = np.concatenate([cosine * first + sine * second, cosine * second - sine * first])
+    # The width of the spheres along each side.
     along = points @ sides.T
     low, high = (along - radii[:, None]).min(axis=0), (along + radii[:, None]).max(axis=0)
     width = high - low
-    area = width[:_ANGLES] * width[_ANGLES:]
+    area = width[:count] * width[count:]
     # The first of equal areas: what rounds must not choose between them.
     least = int(np.argmax(area <= area.min() * (1 + 1e-9)))
 
-    chosen = [least, least + _ANGLES]
+    chosen = [least, least + count]
     across, up = sides[chosen] * (0.5 * _MARGIN * width[chosen])[:, None]
     return across, up, 0.5 * (low + high)[chosen] @ sides[chosen]
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights of one structure as a table, a light a row, and the samples of area lights.
 
-A loop over lights in Python makes a kernel that grows with them. A table makes all of them one: its
-rows are gathered, and `LightTable.sum` is the one loop over lights.
+A loop over lights in Python makes a kernel that grows with them. A table holds all of them in one
+light of arrays: its rows are gathered, and `LightTable.sum` is the one loop over lights.
 
 The power of a light is its intensity times the solid angle that it shines into, and a table draws a
 light by the inverse of the sum of powers: the least number whose sum of powers is above a fraction
@@ -31,10 +31,19 @@ from airlight.realtime.scene.read_scene import Scene
 
 
 def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
-    """Return the points of the area lights of a scene, light after light.
+    """Return the light samples of the area lights of a scene, light after light.
 
-    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightSamples`. Raises
-    InputError for a number or a pattern that there is not.
+    Parameters
+    ----------
+    scene
+        The scene.
+    points, pattern
+        Fields of `realtime.area_lights.points.LightSamples`.
+
+    Raises
+    ------
+    InputError
+        For a number or a pattern that does not exist.
     """
     types = types_of(type(scene.camera.origin.x))
     placed = [place_points(light, points, pattern) for light in scene.area_lights]
@@ -50,6 +59,7 @@ def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Lig
     # moved makes all arrays again.
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
+    # The samples of a flat light have one normal: one array serves all.
     alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))
     normals = placed.normals[:1] if alike else placed.normals
     facings = [
@@ -87,6 +97,7 @@ class LightTable:
 
         The code of a kernel has the term once, however many lights there are.
         """
+        # One light needs no loop, and its number no gather.
         if self.count == 1:
             return zero + term(self.rows, mi.UInt32(0))
         return summed(self.count, lambda number: term(self[number], number), zero)
@@ -100,8 +111,14 @@ def structure(light: Light) -> Any:
 
 
 def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
-    """Return the tables of some lights, in the order of the first of each; one at
-    infinity is a table by itself.
+    """Return the tables of some lights, in the order of the first light of each.
+
+    A light at infinity is a table by itself.
+
+    Parameters
+    ----------
+    lights
+        Lights of any kind.
     """
     return tuple(map(_table, alike(lights)))
 
@@ -110,6 +127,7 @@ def alike(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
     """Return the lights of each table."""
     several: dict[Any, list[Light]] = {}
     for number, light in enumerate(lights):
+        # A light at infinity has its number for a key, which no other light shares.
         several.setdefault(structure(light) if light.w else number, []).append(light)
     return list(map(tuple, several.values()))
 
@@ -130,6 +148,8 @@ def _table(lights: tuple[Light, ...]) -> LightTable:
     arrays = list(_arrays(lights[0]))
     read = host_numbers(*(array for light in lights for array in _arrays(light)))
     columns = []
+    # `read` has the arrays of the first light, then those of the second, and so on. The numbers of
+    # all lights at one place of a light become a column of the table, by component of a vector.
     for place, array in enumerate(arrays):
         scalar = type(array.x) if dr.depth_v(array) > 1 else type(array)
         columns.append(
@@ -151,6 +171,7 @@ class LightChoice:
         number if fractions are even.
         """
         number, count = dr.zeros(mi.UInt32, dr.width(fraction)), dr.width(self.sums)
+        # The least number whose sum of powers is above the fraction.
         if count > 1:
             number = dr.binary_search(
                 0, count - 1, lambda place: dr.gather(type(fraction), self.sums, place) <= fraction
@@ -159,11 +180,19 @@ class LightChoice:
 
 
 def light_choice(table: LightTable) -> LightChoice:
-    """Return what draws the lights of a table by their powers; evenly where none has any."""
+    """Return the choice of a light of a table by its power; all alike where none has any.
+
+    Parameters
+    ----------
+    table
+        One of the tables that `light_tables` returns.
+    """
     light = table.rows
+    # Intensity as the mean of red, green and blue; an array of one entry serves all rows.
     power = np.stack([np.array(channel) for channel in light.intensity]).mean(axis=0) * np.ones(
         table.count
     )
+    # A cone has the solid angle 2 pi (1 - cos): all lights of a table have one, or none has.
     if light.cone is not None:
         power = power * (1 - np.array(light.cone.cos))
     power = power if power.sum() > 0 else np.ones(table.count)
@@ -181,14 +210,17 @@ def _arrays(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _with_arrays(value: Any, made: Callable[[Any], Any]) -> Any:
+def _with_arrays(value: Any, new_array: Callable[[Any], Any]) -> Any:
     """Return a light with other arrays, each made of the old one, in the order of its fields."""
     if is_dataclass(value) and not isinstance(value, type):
         return replace(
             value,
-            **{item.name: _with_arrays(getattr(value, item.name), made) for item in fields(value)},
+            **{
+                item.name: _with_arrays(getattr(value, item.name), new_array)
+                for item in fields(value)
+            },
         )
-    return made(value) if dr.is_array_v(value) else value
+    return new_array(value) if dr.is_array_v(value) else value
 
 
 def _gathered(rows: Light, number: Any) -> Light:
@@ -197,6 +229,7 @@ def _gathered(rows: Light, number: Any) -> Light:
     def gathered(array: Any) -> Any:
         if dr.depth_v(array) == 1:
             return dr.gather(type(array), array, number)
+        # A vector is gathered component by component.
         return type(array)(*(dr.gather(type(array.x), component, number) for component in array))
 
     return _with_arrays(rows, gathered)

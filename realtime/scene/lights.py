@@ -3,9 +3,9 @@
 
 A light is a homogeneous position (l, w): a place l with w = 1, or with w = 0 the direction l
 towards a light at infinity. The vector from a point P towards it is l - w P, in metres for w = 1
-and of unit length for w = 0. All that follows from it alone holds for both: the foot and the height
-of a ray (`realtime.rays`), the projection of its shadow map (`realtime.shadow_maps.projection`),
-silhouettes and shadow planes, epipolar slices.
+and of unit length for w = 0. All that follows from this vector alone holds for both kinds: the foot
+and the height of a ray (`realtime.rays`), the projection of its shadow map
+(`realtime.shadow_maps.projection`), silhouettes and shadow planes, epipolar slices.
 
 A directional light lights media with bounds; its place is the middle of a rectangle across it where
 the media end (`realtime.scene.directional_extent`).
@@ -122,8 +122,12 @@ class Light:
         return None if self.cone is None else type(self.position.x)(self.cone.cos)
 
     def toward(self, point) -> Any:
-        """Return l - w P: the vector from points to the light [m], or the unit
-        direction to a light at infinity.
+        """Return l - w P: the vector to the light [m], or the unit direction to one at infinity.
+
+        Parameters
+        ----------
+        point
+            Points P, a three-vector [m].
         """
         return self.position - point if self.w else -self.axis
 
@@ -131,7 +135,10 @@ class Light:
         """Return the Mitsuba ray that is blocked where the light does not reach a point; a
         surface there blocks none.
 
-        `point`: points [m].
+        Parameters
+        ----------
+        point
+            Points, a three-vector [m].
         """
         if not self.w:
             # From the point on, where a ray is exact, though not from the
@@ -156,15 +163,19 @@ class Light:
         return interaction.spawn_ray(mi.Vector3f(-self.axis))
 
     def rays_from(self, unit) -> tuple[Any, Any]:
-        """Return where rays from a light that has a place start, and how far from
-        it that is along them [m].
+        """Return the origins of rays from a light at a place, and how far they are from it [m].
 
-        Those of a light sample start beyond the shape that it lies on, so that they do not meet it.
+        Rays from a light sample start beyond the shape on which it lies: they do not meet it.
 
-        `unit`: unit directions, in any precision.
+        Parameters
+        ----------
+        unit
+            Unit directions, in any precision.
         """
         if self.facing is None:
             return self.position, 0
+        # A ray to the side that shines starts `lift` before the shape. A ray to the other side
+        # starts behind the shape, at the end of its chord through it.
         cosine = dr.dot(unit, self.normal)
         skipped = dr.maximum(-self.facing.chord * cosine, 0)
         return self.position + self.normal * dr.mulsign(
@@ -172,7 +183,7 @@ class Light:
         ) + unit * skipped, skipped
 
     def without_cone(self) -> "Light":
-        """Return the light all around of which a spot shows a cone."""
+        """Return the light without its cone: a point light."""
         return Light(self.position, self.intensity)
 
 
@@ -193,15 +204,23 @@ def place_and_weight(position: Array) -> tuple[Array, int]:
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a `Light` that only a spot has.
 
-    `axis`: unit vector from the light along its axis, in float64; `cutoff`, `beam`: half angles
-    beyond which there is no light, and up to which the intensity is full [rad]; `types`: of the
-    arrays.
+    Parameters
+    ----------
+    axis
+        Unit vector from the light along its axis, in float64.
+    cutoff
+        Half angle beyond which there is no light [rad].
+    beam
+        Half angle up to which the intensity is full [rad].
+    types
+        Types of the arrays.
     """
     fields = {
         "exact_axis": mi.Vector3d(*(float(component) for component in axis)),
         "cutoff": types.scalar(cutoff),
         "cone": _cone(cutoff),
     }
+    # A spot whose beam fills its cone has an edge, and no transition to divide by.
     if beam < cutoff:
         fields |= {"beam": _cone(beam), "inverse_transition": types.scalar(1 / (cutoff - beam))}
     return fields

@@ -86,6 +86,7 @@ def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
     InputError
         For a shape that has no triangles, with its name.
     """
+    # Area lights say their triangles themselves; boundaries of media cast no shadow.
     lights = {light.name: light for light in area_lights}
     meshes = []
     for shape in scene.shapes():
@@ -119,6 +120,7 @@ def make_occluders(meshes: Sequence[tuple[str, Array, NDArray[Any]]]) -> Occlude
     repeated = np.delete(vertex_shape[triangles[:, 0]], first)
     triangles = triangles[np.sort(first)]
 
+    # How triangles hang together stays when shapes move; planes and boxes follow the vertices.
     edges, incidence, component, closed = _hang_together(triangles, len(vertices))
     normals, offsets = _planes(vertices, triangles)
     occluders = Occluders(
@@ -153,6 +155,7 @@ def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occl
         if name in positions:
             moved = occluders.vertex_shape == number
             vertices[moved] = positions[name][occluders.vertex_source[moved]]
+    # How triangles hang together stays: only planes and boxes are of the new places.
     normals, offsets = _planes(vertices, occluders.triangles)
     boxes = _boxes(vertices, occluders.triangles, occluders.component, len(occluders.closed))
     return replace(occluders, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
@@ -239,6 +242,8 @@ def _hang_together(
         connected_components(links, directed=False) if nodes else (0, np.zeros(0, dtype=np.int32))
     )
     component = component[: len(triangles)]
+    # A row sum of the matrix that is not 0 is an edge that is met more often one way than the
+    # other: it opens the component of its triangles.
     closed = np.ones(count, dtype=bool)
     closed[component[triangle[incidence.sum(axis=1)[edge] != 0]]] = False
     return edges, incidence, component, closed
@@ -249,6 +254,7 @@ def _warnings(occluders: Occluders, repeated: Index) -> tuple[str, ...]:
     the number of its shape.
     """
     warnings = []
+    # By edge how many triangles meet there, whichever way they run.
     meeting = abs(occluders.incidence).sum(axis=1)
     edge_shape, component_shape = (
         occluders.vertex_shape[occluders.edges[:, 0]],
@@ -290,6 +296,7 @@ def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
 
 
 def _boxes(vertices: Array, triangles, component, components: int) -> Array:
+    # Triangles in the order of their components, so that each component is one run of rows.
     order = np.argsort(component, kind="stable")
     starts = np.searchsorted(component[order], np.arange(components))
     corners = vertices[triangles[order]]

@@ -5,11 +5,11 @@
 Biri 2006 (annex, after Nishita 1987), 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2
 and 83/33 and are divided by them.
 
-A phase function is a class: its code is the class, its parameters are data. Kernels ask it for what
-they need, its values, the widths of its lobe, its power series, and know none by name. A new one
-derives from `Phase` and says its name and its values. How far rules of few nodes reach is tried on
-these (`realtime.scene.rule_reach`); what it does not have (a polynomial, a series) the kernels that
-need it refuse.
+A phase function is a class: its code is the class, its parameters are data. Kernels ask it for its
+values, the widths of its lobe, its power series, and know none by name. A new one derives from
+`Phase` and gives its name and its values. How far rules of few nodes reach is tried on these values
+(`realtime.scene.rule_reach`). Kernels that need a polynomial or a series refuse a phase function
+without one.
 """
 
 import math
@@ -53,17 +53,18 @@ class Phase:
         return self.evaluate_half(1 - up, up)
 
     def density(self, f, c, scale) -> Any:
-        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), as
-        `realtime.kernels.exact` wants.
+        """Return p/(1 + E^2) cosh v at E = scale f, c = cosh v = sqrt(1 + f^2), the integrand of
+        `realtime.kernels.exact`.
         """
+        # E is the tangent of half the scattering angle: cos^2 of it is 1/(1 + E^2).
         square = dr.square(scale * f)
         up = dr.rcp(square + 1)
         return c * up * self.evaluate_half(square * up, up)
 
     @property
     def reach(self) -> Reach:
-        """How far rules of few nodes reach; a function with arrays for
-        parameters says it in another way.
+        """How far rules of few nodes reach; a phase function whose parameters are arrays has
+        another way to say it.
         """
         return _reach(self)
 
@@ -120,10 +121,12 @@ class Rayleigh(Phase):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
+        # up - down is the cosine.
         return 0.75 * dr.fma(up - down, up - down, 1)
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients of 3 (1 + sin^2)/4."""
+        # The argument is -sin theta: its square is sin^2.
         sine = _sine(degree)
         return [0.75 * (a + b) for a, b in zip(_one(degree), series_product(sine, sine, degree))]
 
@@ -137,6 +140,7 @@ class _Power(Phase):
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients by squaring those of (1 - sin)/2."""
+        # (1 + cos)/2 at cos = -sin theta is (1 - sin)/2; each squaring doubles the power.
         constant = _one(degree)
         power = [0.5 * (a - b) for a, b in zip(constant, _sine(degree))]
         for _ in range(self.doublings):
@@ -155,6 +159,7 @@ class Hazy(_Power):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
+        # ((1 + cos)/2)^(2^3), with the mean 2 divided out.
         return 0.5 + 4.5 * _power(up, 3)
 
 
@@ -169,6 +174,7 @@ class Murky(_Power):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
+        # ((1 + cos)/2)^(2^5), with the mean 83/33 divided out.
         return (33 / 83) * dr.fma(50.0, _power(up, 5), 1)
 
 
@@ -183,11 +189,13 @@ class HenyeyGreenstein(Phase):
     @staticmethod
     @lru_cache(maxsize=1)
     def reaches() -> tuple[Reach, Reach]:
-        """Return how far rules reach for all forward lobes, and for all backward ones:
-        g may be another by lane.
+        """Return how far rules reach for all forward lobes, and for all backward ones: g may differ
+        between lanes.
         """
+        # Rules are judged at g = 0 and at |g| = 0.95: of sharper lobes they reach as far.
+        sharp = 0.95
         even = _reach(HenyeyGreenstein(0.0))
-        forward, backward = (_reach(HenyeyGreenstein(g)) for g in (_SHARP, -_SHARP))
+        forward, backward = (_reach(HenyeyGreenstein(g)) for g in (sharp, -sharp))
         return shortest(even, forward), shortest(even, backward)
 
     @property
@@ -197,6 +205,8 @@ class HenyeyGreenstein(Phase):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
+        # (1 - |g|)^2 + 4 |g| sin^2 of half the angle from the lobe's axis: a sum, which does not
+        # cancel.
         g = type(up)(self.g)
         base = dr.fma(4 * dr.abs(g), dr.select(g >= 0, down, up), dr.square(1 - dr.abs(g)))
         return (1 - g) * (1 + g) / (base * dr.sqrt(base))
@@ -241,6 +251,7 @@ class HenyeyGreenstein(Phase):
         from b y' = -(3/2) b' y.
         """
         g = self.g
+        # The coefficients of theta^(n-1) on both sides give n b_0 y_n from the ones before.
         b = [1 + g * g] + [2 * g * s for s in _sine(degree)[1:]]
         y = [(1 - g) * (1 + g) * dr.rsqrt(b[0]) / b[0]]
         for n in range(1, degree + 1):
@@ -276,6 +287,7 @@ class Tabulated(Phase):
 
     def evaluate(self, cos_scatter) -> Any:
         """Return the value."""
+        # The cosine from -1 to 1 as a place from 0 to 1.
         (value,) = between_entries(self.values, [(0.5 * (cos_scatter + 1), dr.width(self.values))])
         return value
 
@@ -304,6 +316,7 @@ class HgDraine(Phase):
         function, then of Draine's.
         """
         d = self.diameter
+        # The paper's fits, by the diameter in um.
         fraction = math.exp(-0.665888 - 0.599085 / (d - 0.641583))
         narrow, wide = (
             math.exp(-0.0990567 / (d - 1.67154)),
@@ -313,7 +326,7 @@ class HgDraine(Phase):
 
     @property
     def rise(self) -> tuple[float, float]:
-        """What Draine's function has of 1 and of cos^2 times the fraction of its lobe."""
+        """The factors of 1 and of cos^2 in Draine's function, times the fraction of its lobe."""
         (_, _), (fraction, wide) = self.lobes
         alpha = math.exp(3.62489 - 8.29288 / (self.diameter + 5.52825))
         mean = 1 + alpha * (1 + 2 * wide * wide) / 3
@@ -324,6 +337,7 @@ class HgDraine(Phase):
         (fraction, narrow), (_, wide) = self.lobes
         constant, square = self.rise
         cos = up - down
+        # Henyey and Greenstein's narrow lobe, then Draine's: the wide lobe times 1 + alpha cos^2.
         first = HenyeyGreenstein(narrow).evaluate_half(down, up)
         second = HenyeyGreenstein(wide).evaluate_half(down, up)
         return dr.fma(fraction, first, dr.fma(square * cos, cos, constant) * second)
@@ -338,6 +352,7 @@ class HgDraine(Phase):
         (fraction, narrow), (_, wide) = self.lobes
         constant, square = self.rise
         sine = _sine(degree)
+        # The factor with cos^2 = sin^2 theta as a series.
         rise = [
             constant * a + square * b
             for a, b in zip(_one(degree), series_product(sine, sine, degree))
@@ -367,12 +382,14 @@ class Mie(Phase):
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2, Hermite's cubic between two entries."""
+        # Entries are even in sin/(sin + cos) of half the angle, which is 0 forward and 1 backward.
         near, far = dr.sqrt(down), dr.sqrt(up)
         count = dr.width(self.entries) // 2
         cell, t = cell_of(near / (near + far) * (count - 1), count)
         value, slope, next_value, next_slope = (
             dr.gather(type(t), self.entries, 2 * cell + number) for number in range(4)
         )
+        # Hermite's cubic with the values and the slopes of both entries.
         rise = next_value - value
         cubic = slope + next_slope - 2 * rise
         return dr.fma(t, dr.fma(t, dr.fma(t, cubic, rise - slope - cubic), slope), value)
@@ -401,7 +418,7 @@ class ModifiedMie(Mie):
         )
 
 
-#: Those of the toolkit.
+#: The phase functions of the toolkit.
 PHASES: tuple[type[Phase], ...] = (
     Isotropic,
     Rayleigh,
@@ -414,22 +431,26 @@ PHASES: tuple[type[Phase], ...] = (
     ModifiedMie,
 )
 
-#: |g| by which rules for Henyey and Greenstein's function are judged, beside 0: of more they reach as far.
-_SHARP = 0.95
-
-#: Errors that rules may leave where a table leaves more between its entries.
-_LEFT_TABLE, _LEFT_DROPLETS = 1e-3, 1e-5
-
 
 def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     """Return a phase function of the toolkit.
 
-    `words`: the name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter
-    [um], for 'mie' and 'mie-modified' the effective radius [um], gamma and the wavelength [um];
-    `g`: 'hg': mean cosine, in (-1, 1), where the words do not say it; `values`: 'tabulated': values
-    of mean 1 at regularly spaced cosines from -1 to 1; `Float`: array type of the tables of
-    droplets, that of the variant by default. Raises InputError for words that name no phase
-    function, a cell that is no number, or droplets out of range.
+    Parameters
+    ----------
+    words
+        The name of one of `PHASES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um],
+        for 'mie' and 'mie-modified' the effective radius [um], gamma and the wavelength [um].
+    g
+        'hg': mean cosine, in (-1, 1), where the words do not say it.
+    values
+        'tabulated': values of mean 1 at regularly spaced cosines from -1 to 1.
+    Float
+        Array type of the tables of droplets; None: `mi.Float`.
+
+    Raises
+    ------
+    InputError
+        For words that name no phase function, a cell that is no number, or droplets out of range.
     """
     name, *cells = words.split(":")
     by_name = {phase.name: phase for phase in PHASES}
@@ -441,6 +462,7 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
         raise InputError(
             f"the phase function is '{words}'; expected numbers after '{name}:'"
         ) from None
+    # The most numbers that the words of each may have.
     if len(numbers) > {
         HenyeyGreenstein.name: 1,
         HgDraine.name: 1,
@@ -448,6 +470,7 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
         ModifiedMie.name: 3,
     }.get(name, 0):
         raise InputError(f"the phase function is '{words}'; it has fewer numbers: leave some out")
+    # Phase functions with parameters, one by one; the others have none.
     if name in (Mie.name, ModifiedMie.name):
         return _droplets(name, Float or mi.Float, *numbers)
     if name == HgDraine.name:
@@ -469,21 +492,26 @@ def tabulated(values) -> Tabulated:
     to 1, an array of Dr.Jit.
     """
     host = np.array(values, dtype=np.float64)
+    # The lobe ends at the last cosine whose value is less than half of that at 1, at
+    # E = tan(angle/2), and at E = 1 if it is wider.
     below = host < 0.5 * host[-1]
     cosine = np.linspace(-1.0, 1.0, len(host))[np.flatnonzero(below)[-1]] if below.any() else -1.0
     lobe = min(math.sqrt((1 - cosine) / max(1 + cosine, 1e-6)), 1.0)
+    # Rules may leave 1e-3: a table leaves more between its entries.
     eager = Tabulated(ArrayXf64(host))
-    return Tabulated(values, lobe, reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_TABLE))
+    return Tabulated(values, lobe, reach_of(eager.evaluate_half, (lobe, 1.0), 1e-3))
 
 
 def _droplets(
     name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
 ) -> Phase:
+    # Rules are tried on the whole function on the host, to 1e-5: the table of droplets leaves more
+    # between its entries. Without its peak the lobe ends where the peak was cut.
     table = droplet_table(radius, gamma, wavelength)
     eager, entries = Mie(ArrayXf64(table.entries), table.peak), Float(table.entries)
     modified = name == ModifiedMie.name
     lobe = math.tan(math.radians(0.5 * CUT)) if modified else table.peak
-    reach = reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_DROPLETS)
+    reach = reach_of(eager.evaluate_half, (lobe, 1.0), 1e-5)
     if modified:
         return ModifiedMie(entries, lobe, reach, 1 - fraction_cut(radius, gamma, wavelength))
     return Mie(entries, lobe, reach)

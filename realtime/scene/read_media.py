@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading the media of a Mitsuba scene: what surrounds the camera, and what shapes bound.
 
-A shape with the material `null` and an interior medium is the boundary of a medium: light passes,
-nothing is seen of it. All of them lie in one medium, the camera's own or, for a camera inside one
-of them, its exterior; none is a vacuum. In vacuum a boundary may be any closed mesh, a cloud, and
-its medium may have a density from place to place.
+A shape with the material `null` and an interior medium is the boundary of a medium: light passes
+it, and nothing of it is visible. All of them lie in one medium, the camera's own or, for a camera
+inside one of them, its exterior; none is a vacuum. In vacuum a boundary may be any closed mesh, a
+cloud, and its medium may have a density from place to place.
 """
 
 from collections.abc import Sequence
@@ -44,7 +44,6 @@ from airlight.realtime.scene.mesh_adjacency import scene_of
 from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 from airlight.realtime.transforms import host_matrix
 
-_FEW = 4  # lights of a scene that every call may go over
 _PHASES = {
     "IsotropicPhaseFunction": "isotropic",
     "HGPhaseFunction": "hg",
@@ -54,16 +53,18 @@ _PHASES = {
 
 
 def sort_shapes(scene):
-    """Return the opaque shapes of a scene and those that bound a medium.
+    """Return the opaque shapes of a scene and the shapes that bound a medium.
 
     Raises InputError for a shape that is transparent or bounds a medium in a way that no method
     can render, with its name.
     """
+    # Any other shape is refused by name, with the reason.
     opaque, boundaries = [], []
     for shape in scene.shapes():
         bsdf, name = shape.bsdf(), shape.id()
         if shape.is_emitter() and bsdf.class_name() == "Null":
             continue  # light and nothing else: `realtime.area_lights.shape` says what it must be
+        # An opaque shape has no media on its sides, and a transparent one has one inside of it.
         bounds = shape.interior_medium() is not None or shape.exterior_medium() is not None
         if bsdf.class_name() != "Null":
             if bounds:
@@ -98,7 +99,8 @@ def opaque_scene(scene, opaque):
 
     A call of a recorded function goes over all lights of the scene in it: 512 took 20 ms.
     """
-    if len(opaque) == len(scene.shapes()) and len(scene.emitters()) <= _FEW:
+    few = 4  # lights of a scene that every call may go over
+    if len(opaque) == len(scene.shapes()) and len(scene.emitters()) <= few:
         return scene
     return scene_of(opaque)
 
@@ -123,6 +125,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     InputError
         For media that no method can render, with the name of what is in the way.
     """
+    # One medium without bounds, around the camera: height fog, a grid, or the same everywhere.
     if not boundaries:
         if sensor.get_medium() is None:
             raise InputError(
@@ -138,18 +141,23 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
             return _grid_medium(sensor.get_medium(), types)
         return _homogeneous(sensor.get_medium(), types)
     for shape in boundaries:
-        for own in (shape.interior_medium(), shape.exterior_medium()):
-            if _is_height_fog(own):
+        for medium in (shape.interior_medium(), shape.exterior_medium()):
+            if _is_height_fog(medium):
                 raise InputError(
                     f"shape '{shape.id()}' bounds a medium in height fog, or height fog; expected "
                     "height fog alone, in "
                     "the sensor: remove the medium of the shape"
                 )
+
+    # Convex bounds of homogeneous media are half spaces, which rays are clipped to. One concave
+    # shape, or one medium with a density, makes all of them clouds within meshes.
     shapes = [read_bounds(shape) for shape in boundaries]
     bounds = [convex for convex, _ in shapes if convex is not None]
     uneven = [shape.id() for shape in boundaries if not shape.interior_medium().is_homogeneous()]
     all_convex = len(bounds) == len(boundaries) and not uneven
     meshes = () if all_convex else _closed_meshes(shapes, uneven)
+
+    # All bounded media lie in one, or in vacuum; clouds lie in vacuum.
     around = _surrounding(sensor, boundaries, meshes or bounds)
     if around is not None and not all_convex:
         raise InputError(
@@ -158,6 +166,8 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
             "medium is not homogeneous; expected vacuum around it: remove the exterior medium, and "
             "the camera's"
         )
+
+    # The medium inside of each boundary, with the grid of its density if it has one.
     grids = [
         read_cloud_density(shape.interior_medium(), meshes[number])
         if meshes and meshes[number].name in uneven
@@ -168,6 +178,8 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
         _filling(shape.interior_medium(), grid, types)
         for shape, grid in zip(boundaries, grids, strict=True)
     ]
+
+    # If one medium is coloured, all have three extinctions; vacuum is a medium without any.
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
     media = [_in_channels(medium, channels) for medium in media]
@@ -179,6 +191,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
         if all_convex
         else ()
     )
+    # In vacuum all of them are clouds as well, for methods that render clouds.
     clouds = _clouds(media, boundaries, types) if around is None else None
     if clouds is not None and uneven:
         clouds = replace(clouds, density=density_on_device(grids, types))
@@ -190,7 +203,8 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
 def _closed_meshes(
     shapes: Sequence[tuple[Bounds | None, ClosedMesh | None]], uneven: Sequence[str]
 ) -> tuple[ClosedMesh, ...]:
-    """Return the meshes of shapes of which one at least is not convex, or named in `uneven`."""
+    """Return the meshes of shapes; one shape at least is not convex, or is named in `uneven`."""
+    # Rays are cast at clouds as meshes: a sphere has none.
     for bounds, mesh in shapes:
         if mesh is None and bounds is not None:
             cloud = _first_cloud(shapes, uneven)
@@ -212,8 +226,10 @@ def _first_cloud(
 
 def _clouds(media: list[Homogeneous], boundaries, types: ArrayTypes) -> Clouds:
     """Return bounded media as tables with an entry for each; equal phase functions are one."""
+    # A cloud has the number of its phase function: several clouds may share one.
     keys = [_phase_key(shape.interior_medium().phase_function()) for shape in boundaries]
     distinct = list(dict.fromkeys(keys))
+    # By channel one extinction for each cloud, and by colour one albedo.
     sigma_t = tuple(
         types.scalar([float(medium.sigma_t[channel][0]) for medium in media])
         for channel in range(len(media[0].sigma_t))
@@ -242,6 +258,7 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
     """
     camera = host_matrix(sensor.world_transform())[:3, 3]
     around = sensor.get_medium()
+    # The medium around is the camera's, or the exterior one of the boundary that the camera is in.
     for shape, own_bounds in zip(boundaries, bounds):
         if isinstance(own_bounds, Bounds) and touches(own_bounds, camera):
             raise InputError(
@@ -261,6 +278,7 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
                     "reference that shape's interior medium in the sensor"
                 )
             around = shape.exterior_medium()
+    # Every boundary has the same medium outside.
     for shape, own_bounds in zip(boundaries, bounds):
         if shape.exterior_medium() != around:
             raise InputError(
@@ -281,8 +299,12 @@ def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) 
     bounded_medium = BoundedMedium(medium, None, len(bounds.offsets), centre, radius, distance)
     if bounds.is_sphere:
         return bounded_medium
+    # Half spaces about the centre of the body, from which paths are computed: normal and distance
+    # side by side.
     distances = bounds.offsets - bounds.normals @ bounds.centre
     rows = np.column_stack([bounds.normals, distances])
+    # For walks from facet to facet: the numbers of neighbours, their planes once more beside each
+    # other, and where walks begin.
     table = plane_neighbours(bounds)
     neighbours = aligned_array(mi.UInt32, table.ravel().astype(np.uint32))
     starts = aligned_array(mi.UInt32, radial_planes(bounds))
@@ -299,6 +321,7 @@ def make_bounded_medium(medium: Homogeneous, bounds: Bounds, types: ArrayTypes) 
 
 
 def _clear(types: ArrayTypes) -> Homogeneous:
+    # Vacuum as a medium without extinction.
     albedo = types.color(0.0)
     dr.make_opaque(albedo)
     return Homogeneous((dr.opaque(types.scalar, 0.0),), albedo, Isotropic())
@@ -374,6 +397,7 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
     """Read a medium whose extinction is a volume of type `heightfog`, which
     answers for its numbers.
     """
+    # Mitsuba multiplies the extinctions of the volume by the medium's scale.
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
     for name in ("sigma_0", "sigma_1", "sigma_2"):
@@ -382,6 +406,7 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
     def number(name: str, factor: float = 1.0):
         return dr.opaque(types.scalar, factor * float(parameters[f"sigma_t.{name}"][0]))
 
+    # Layers without extinction are left out: they cost an exponential each.
     layers = tuple(
         Layer(number(f"sigma_{i}", scale), number(f"z_{i}"), number(f"H_{i}"))
         for i in "12"
@@ -399,6 +424,8 @@ def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
     """Read a grid around the camera, in a box along the axes of coordinates."""
     name = f"medium '{medium.id()}'"
     albedo, grid = _constant_albedo(medium, types), along_the_axes(read_density(medium, name), name)
+    # Along the axes the transform to the unit cube is u = side x + constant: u = 0 is the low
+    # corner of the box, and 1/side its width.
     sides = np.diag(grid.to_grid)
     corner = -grid.to_grid[:, 3] / sides
     low, high = (
@@ -417,12 +444,14 @@ def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     _require_constant(medium, "sigma_t", "albedo")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
     dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it
+    # The albedo is the quotient of both coefficients, 0 where nothing is extinguished.
     scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
     _check_coefficient("sigma_t", extinction)
     _check_coefficient("sigma_s = albedo sigma_t", scattering)
     albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
     _check_albedo(albedo)
+    # Grey media compute with one extinction instead of three.
     grey = extinction[0] == extinction[1] == extinction[2]
     sigma = tuple(
         dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction)
@@ -439,6 +468,7 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
             f"the phase function is a {phase.class_name()}; expected one of isotropic, hg, "
             "rayleigh, tabphase"
         )
+    # Isotropic and Rayleigh functions have no parameters; the other two have them read and checked.
     parameters = mi.traverse(phase)
     if name == "hg":
         g = float(parameters["g"][0])

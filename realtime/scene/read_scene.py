@@ -34,9 +34,6 @@ from airlight.realtime.scene.rounding import rounding_notes
 from airlight.realtime.scene.triangle_table import Facets, read_facets
 from airlight.realtime.transforms import beam_axis, host_matrix, spot_axis
 
-# cosine between a camera's left, or its up, and an axis that counts as upright in the image
-_UPRIGHT = 1e-3
-
 
 @dataclass(frozen=True)
 class SceneFeatures:
@@ -56,12 +53,12 @@ class Scene:
     geometry: Any
     camera: Camera
     medium: Medium
-    lights: tuple[Light, ...]  #: those without extent
+    lights: tuple[Light, ...]  #: point, spot and directional lights, and skies over clouds
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     #: vertices of shapes that moved, by name [m]
     positions: Mapping[str, Any] = field(default_factory=dict)
-    area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
+    area_lights: tuple[AreaLight, ...] = ()  #: methods render samples of them
     #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms
     #: of shading show its light
     sky: Any = None
@@ -91,6 +88,7 @@ def read_scene(scene, precision: str = "single") -> Scene:
     InputError
         For a scene that no method can render, with the name of what it cannot do.
     """
+    # Rays meet opaque shapes alone: boundaries of media and shapes of light are read and left out.
     types = array_types(precision)
     parts, opaque = _read_parts(scene, types)
     geometry = opaque_scene(scene, opaque)
@@ -119,6 +117,7 @@ def read_again(known: Scene, scene) -> Scene:
 
 def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     """Return the fields of a `Scene` except for its shapes, and the opaque shapes."""
+    # The medium first: it says which lights it lets in.
     camera, sensor = sensor_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
     medium = read_medium(sensor, boundaries, types)
@@ -127,6 +126,8 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
             "the scene has no light; expected at least one emitter of type 'point', 'spot', "
             "'directional' or 'area'"
         )
+    # Lights from infinity need to know what they light. A constant emitter lights clouds, as a
+    # beam, or it is one of the backgrounds.
     bodies = _Bodies(medium, boundaries, opaque)
     behind = backgrounds(scene, clouds=medium.clouds is not None)
     lights = tuple(
@@ -138,9 +139,10 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         for emitter in scene.emitters()
         if emitter.class_name() != "AreaLight" and emitter not in behind
     )
-    here = np.array(camera.origin, dtype=np.float64).ravel()
+    # Area lights are emitters of shapes, and are read as shapes.
+    origin = np.array(camera.origin, dtype=np.float64).ravel()
     area_lights = tuple(
-        read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter()
+        read_area_light(shape, origin) for shape in scene.shapes() if shape.is_emitter()
     )
     parts = {
         "camera": camera,
@@ -164,6 +166,7 @@ class _Bodies:
 
     def beam(self, axis, types: ArrayTypes) -> dict[str, Any]:
         """Return the fields of a `Light` from infinity, which travels along a unit vector."""
+        # Without bounded media the beam lights all that is between the opaque shapes.
         spheres = media_spheres(self.boundaries) if self.boundaries else shape_spheres(self.opaque)
         return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
 
@@ -177,6 +180,7 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
             f"'{word.get(emitter.class_name(), emitter.class_name())}' lights no fog; "
             "expected lights of type 'point', 'spot', 'directional' or 'area'"
         )
+    # One colour for all directions, and one value for a spot's texture.
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (
         kind == "spot" and "texture.value" not in parameters
@@ -186,10 +190,12 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
             "give one 'rgb' value"
         )
     intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
+    # A point light says its place, which its transform may not.
     place = (
         parameters["position"] if kind == "point" else host_matrix(emitter.world_transform())[:3, 3]
     )
     position = np.array(place, dtype=np.float64).reshape(-1)
+    # Opaque arrays: a light that moves or fades recompiles nothing.
     arrays: dict[str, Any] = {
         "position": types.vector(*(float(c) for c in position)),
         "intensity": types.color(*(float(c) for c in intensity)),
@@ -204,6 +210,7 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     axis = beam_axis(emitter)
     bodies.medium.check_beam(axis, emitter.id())
+    # The irradiance of a plane across the light stands for its intensity.
     parameters = mi.traverse(emitter)
     if "irradiance.value" not in parameters:
         raise InputError(
@@ -234,6 +241,7 @@ def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTyp
     radiance = _read_colour(
         parameters["radiance.value"], "the constant emitter's radiance", "W/(m^2 sr)"
     )
+    # The integral of L cos over a half space is pi L.
     arrays: dict[str, Any] = {
         "intensity": types.color(*(math.pi * float(c) for c in radiance)),
         "sky": types.color(*(float(c) for c in radiance)),
@@ -250,6 +258,7 @@ def _sky_behind(behind: list[Any], types: ArrayTypes):
         for emitter in behind
         if emitter.class_name() == "ConstantBackgroundEmitter"
     ]
+    # A sky with a texture or a spectrum counts as none.
     given = skies[0]["radiance.value"] if skies and "radiance.value" in skies[0] else 0.0
     radiance = types.color(
         *(float(c) for c in _read_colour(given, "the constant emitter's radiance", "W/(m^2 sr)"))
@@ -264,14 +273,18 @@ def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
     A camera that is not rolled has it across its left; of several such axes it is the one from
     which the suns shine most, and without suns the nearest to the camera's up.
     """
+    # Axes of coordinates across the camera's left, and at least a thousandth upwards in the image.
+    upward = 1e-3  # cosine between the camera's left, or its up, and such an axis
     left, up = (np.array(vector, dtype=np.float64).ravel() for vector in (camera.left, camera.up))
     left, up = left / np.linalg.norm(left), up / np.linalg.norm(up)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
-    upright = axes[(np.abs(axes @ left) < _UPRIGHT) & (axes @ up > _UPRIGHT)]
+    upright = axes[(np.abs(axes @ left) < upward) & (axes @ up > upward)]
+    # Suns shine downwards: the sum of their directions decides between several axes.
     falling = np.zeros(3)
     for emitter in scene.emitters():
         if emitter.class_name() == "DirectionalEmitter":
             falling += beam_axis(emitter)
+    # A rolled camera has none: then the nearest to its up.
     if not len(upright):
         return axes[np.argmax(axes @ up)]
     return upright[np.argmax(upright @ (-falling if falling.any() else up))]
@@ -280,6 +293,7 @@ def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
 def _read_colour(value, name: str, unit: str):
     """Return three values of 0 or more."""
     colour = np.array(value, dtype=np.float64).reshape(-1)
+    # One number is grey.
     colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
     if not np.all(np.isfinite(colour)) or np.any(colour < 0):
         raise InputError(
@@ -291,6 +305,7 @@ def _read_colour(value, name: str, unit: str):
 def _read_angles(parameters) -> tuple[float, float]:
     """Return the half angles of a spot's cut-off and of its beam [rad]."""
     cutoff = math.radians(float(parameters["cutoff_angle"][0]))
+    # Mitsuba's beam ends at the cut-off.
     beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
     if not 0 < cutoff < 0.5 * math.pi:
         raise InputError(
@@ -303,6 +318,8 @@ def _read_angles(parameters) -> tuple[float, float]:
 def _scene_features(
     scene, bodies: _Bodies, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
 ) -> SceneFeatures:
+    # 0x3FF are Mitsuba's flags of the kinds of scattering: a shape that has any but diffuse
+    # reflection gets a note.
     opaque = bodies.opaque
     notes = scene_notes(scene, clouds=bodies.medium.clouds is not None)
     for shape in opaque:
@@ -329,9 +346,9 @@ def _scene_features(
 
 def _axis_name(light: Light) -> str:
     """Return the axis of coordinates from which a beam comes: 'x', '-x', 'y', '-y', 'z' or '-z'."""
-    from_there = -np.array(light.exact_axis).ravel()
-    number = int(np.argmax(np.abs(from_there)))
-    return ("-" if from_there[number] < 0 else "") + "xyz"[number]
+    source = -np.array(light.exact_axis).ravel()
+    number = int(np.argmax(np.abs(source)))
+    return ("-" if source[number] < 0 else "") + "xyz"[number]
 
 
 def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
@@ -343,6 +360,7 @@ def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
     """
     around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
     lights = {emitter.class_name() for emitter in scene.emitters()} - around
+    # With directional lights alone, or by itself, a constant emitter is a light of clouds.
     around -= (
         {"ConstantBackgroundEmitter"} if clouds and lights <= {"DirectionalEmitter"} else set()
     )
@@ -353,6 +371,7 @@ def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     """Return notes on the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
     notes = rounding_notes(scene)
+    # A frame has one camera. It shows backgrounds, and leaves out their light that fog scatters.
     notes += (
         [f"the scene has {cameras} cameras: the first is used, the others are left out"]
         if cameras > 1
@@ -372,6 +391,7 @@ def describe(scene: Scene) -> dict[str, str]:
     """Return in words what a scene needs, one entry for each decision about
     the code that a frame runs.
     """
+    # Lights by kind; a sky is a beam in the list of lights, and has words for itself.
     counts = Counter(light.kind for light in scene.lights if light.sky is None)
     lights = [f"{counts[kind]} {kind}" for kind in ("point", "spot", "directional") if counts[kind]]
     extents = Counter(light.kind for light in scene.area_lights)
@@ -381,6 +401,7 @@ def describe(scene: Scene) -> dict[str, str]:
         for light in scene.lights
         if light.sky is not None
     ]
+    # A phase function that is 1 everywhere, and a spot without transition, leave code out.
     isotropic = all(phase.constant for phase in scene.medium.phases)
     soft = any(light.beam is not None for light in scene.lights)
     return {

@@ -25,10 +25,6 @@ from airlight.realtime.transforms import host_matrix
 
 Array = NDArray[np.float64]
 
-_UNIT = 2.0**-24  # the rounding of a float32 number, relative
-_NOTED = 1e-5  # some ten times the rounding of float32 arithmetic, which methods have anyway
-_LARGEST = 1e-3  # a tenth of the difference at which `compare` calls an image wrong
-
 
 @dataclass(frozen=True)
 class Rounding:
@@ -60,11 +56,12 @@ def check_rounding(scene: Any) -> None:
     InputError
         Where float32 coordinates change a length by more than 0.1 %.
     """
+    largest = 1e-3  # a tenth of the difference at which `compare` calls an image wrong
     worst = _worst(scene)
-    if worst is not None and worst.relative > _LARGEST:
+    if worst is not None and worst.relative > largest:
         middle = ", ".join(f"{value:.0f}" for value in _place(scene.sensors()[0]))
         raise InputError(
-            f"{worst}; expected {100 * _LARGEST:g} % at most: subtract an offset, such as "
+            f"{worst}; expected {100 * largest:g} % at most: subtract an offset, such as "
             f"({middle}), everywhere"
         )
 
@@ -73,8 +70,9 @@ def rounding_notes(scene: Any) -> list[str]:
     """Return a note on the rounding of coordinates in an `mi.Scene`, none
     where it does not matter.
     """
+    noted = 1e-5  # some ten times the rounding of float32 arithmetic, which methods have anyway
     worst = _worst(scene)
-    return [] if worst is None or worst.relative <= _NOTED else [str(worst)]
+    return [] if worst is None or worst.relative <= noted else [str(worst)]
 
 
 def _place(plugin: Any) -> Array:
@@ -88,6 +86,7 @@ def _worst(scene: Any) -> Rounding | None:
     if not scene.sensors():
         return None
     camera = _place(scene.sensors()[0])
+    # The distances of lights from the camera, then the size of the whole scene with the camera.
     lengths = [
         _rounding(f"light '{name}' is {{:.3g}} m from the camera", camera, place)
         for name, place in _lights(scene)
@@ -122,5 +121,6 @@ def _rounding(what: str, first: Array, second: Array) -> Rounding:
     length = float(np.linalg.norm(second - first))
     farthest = float(max(np.abs(first).max(), np.abs(second).max()))
     # Ends in one place have no length to lose; what lies on a ray is refused for that.
-    relative = 2 * np.sqrt(3) * _UNIT * farthest / length if length > 0 else 0.0
+    # Both ends move by sqrt(3) times the rounding of a float32 number, 2^-24 of the coordinate.
+    relative = 2 * np.sqrt(3) * 2.0**-24 * farthest / length if length > 0 else 0.0
     return Rounding(what.format(length), farthest, float(relative))

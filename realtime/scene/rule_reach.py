@@ -5,7 +5,7 @@ of the rules themselves.
 Kernels integrate exp(-depth) p/r^2 by rules of fixed sizes, in one variable or another. How long a
 panel may be depends on the phase function: where it has its lobe, and how steeply the lobe rises.
 The rule is therefore tried on the phase function itself, once and in float64: a panel of some
-length, with any beginning, by the rule and by a rule of `_MANY` nodes. The longest panel is the one
+length, with any beginning, by the rule and by a rule of 24 nodes. The longest panel is the one
 beyond which the two differ by more than `LEFT`. There are three kinds of panels:
 
 - in v, of `realtime.kernels.exact`, where E = d sinh v: the integrand is
@@ -41,13 +41,6 @@ FEW_NODES, FEW_DEPTH = 4, 2.0
 #: (processor time of shadow planes, 320 x 240).
 NODES, CHANGE = 6, 4.0
 
-_MANY = 24
-_ENOUGH = 20.0  # depths, behind which kernels end
-_LEAST_PANEL = 0.11  # 160 panels reach up to E = 1e7: more a coarse table would not be worth
-# between which a length is looked for; `sinh_bounded` serves half a panel
-_SHORTEST, _LONGEST = 1e-3, 2 * WIDEST
-_HALVINGS = 9  # to 1.6 %
-
 
 @dataclass(frozen=True)
 class Reach:
@@ -73,20 +66,26 @@ def reach_of(
     """
 
     def value(e: Array) -> Array:
+        # sin^2 and cos^2 of half the scattering angle at E = tan of half of it.
         up = 1 / (1 + e * e)
         values = half(ArrayXf64((e * e * up).ravel()), ArrayXf64(up.ravel()))
         return np.broadcast_to(np.array(values), e.size).reshape(e.shape)
 
+    # 160 panels of 0.11 in v reach up to E = 1e7: more a coarse table would not be worth.
+    least_panel = 0.11
     return Reach(
-        max(_longest(lambda width: _panel_error(value, ends, width), left), _LEAST_PANEL),
+        max(_longest(lambda width: _panel_error(value, ends, width), left), least_panel),
         _longest(lambda length: _segment_error(value, ends, length), left),
         _longest(lambda width: _width_error(value, ends, width), left),
     )
 
 
 def _longest(error: Callable[[float], float], left: float) -> float:
-    low, high = math.log(_SHORTEST), math.log(_LONGEST)
-    for _ in range(_HALVINGS):
+    """Return the longest panel with no larger error, by halving; errors grow with the length."""
+    # Nine halvings of the logarithm between 1e-3 and two times the widest argument of
+    # `sinh_bounded`, which serves half a panel: to 1.6 %.
+    low, high = math.log(1e-3), math.log(2 * WIDEST)
+    for _ in range(9):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if error(math.exp(middle)) <= left else (low, middle)
     return float(f"{math.exp(low):.3g}")  # the same on every machine
@@ -96,7 +95,9 @@ def _error(integrand: Callable[[Array], Array], nodes: int) -> float:
     """Return the largest error of a rule for integrals from 0 to 1; the integrand
     takes a column of places.
     """
-    few, many = (np.array(unit_nodes(count)).T for count in (nodes, _MANY))
+    # Columns of `values` are panels, rows nodes: first those of the rule, then those of the rule of
+    # 24 nodes that judges it.
+    few, many = (np.array(unit_nodes(count)).T for count in (nodes, 24))
     values = integrand(np.concatenate([few[0], many[0]])[:, None])
     return float(np.max(np.abs(few[1] @ values[:nodes] / (many[1] @ values[nodes:]) - 1)))
 
@@ -108,10 +109,13 @@ def _starts(ends: tuple[float, float]) -> Array:
 
 
 def _panel_error(value, ends, width: float) -> float:
+    # Panels from v0 on, by three depths; no panel has more than 20 up to its end, behind which
+    # kernels end.
+    enough = 20.0
     v0, depth = (
         grid.ravel() for grid in np.meshgrid(_starts(ends), PANEL_DEPTH * np.array([0, 0.3, 1]))
     )
-    rate = np.minimum(depth / (width * np.cosh(v0)), _ENOUGH / (np.sinh(v0 + width) - np.sinh(v0)))
+    rate = np.minimum(depth / (width * np.cosh(v0)), enough / (np.sinh(v0 + width) - np.sinh(v0)))
 
     def integrand(t):
         v = v0 + width * t
@@ -122,6 +126,8 @@ def _panel_error(value, ends, width: float) -> float:
 
 
 def _segment_error(value, ends, length: float) -> float:
+    # Segments before and behind the foot, over their least distance r, and segments that hold the
+    # foot, at some place `across` them, where this distance is the height.
     first, last = ends
     u = np.sinh(np.linspace(0, math.asinh(15 * max(1 / first, last)), 33))
     across = np.linspace(0, 1, 9)
@@ -145,6 +151,8 @@ def _segment_error(value, ends, length: float) -> float:
 
 
 def _width_error(value, ends, width: float) -> float:
+    # Panels from E = e0 on, e^4 before the forward lobe ends to e^3 behind the backward one; s and
+    # r are over the height.
     first, last = ends
     e0 = np.exp(np.linspace(math.log(first) - 4, math.log(last) + 3, 61))
     s0, r0 = 0.5 * (e0 - 1 / e0), 0.5 * (e0 + 1 / e0)
@@ -153,6 +161,7 @@ def _width_error(value, ends, width: float) -> float:
     for angle in (0, 0.3, 0.6, 0.9, 1.2, 1.5):
         length = widest * math.cos(angle)
         e1 = _along(s0 + length)
+        # N and D, linear in t, and the rule in t, as in `realtime.scene.media.integrate`.
         (n0, d0), (n1, d1) = ((np.sqrt(e), 1 / np.sqrt(e)) for e in (e0, e1))
         rate, scale = CHANGE * math.sin(angle) / length, length / (n0 * n1 + d0 * d1)
 

@@ -2,7 +2,7 @@
 """The shading data of every triangle of a scene, in two tables.
 
 Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and
-materials; where all of them are uniformly diffuse meshes, the number of the triangle is enough, and
+materials. Where all of them are uniformly diffuse meshes, the number of the triangle is enough, and
 reading a table costs a quarter of the calls. A scene with anything else is shaded by Mitsuba's
 interaction.
 """
@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers, types_of
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
-# length of the difference between the normals of a corner and of the triangle: float32, with room
-_FLAT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -44,11 +42,13 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     shapes = scene.shapes()
     if not shapes or not all(_is_plain(shape) for shape in shapes):
         return None
+    # By number in Mitsuba's registry, which rays that hit a shape tell, the first triangle of each.
     numbers = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
     counts = [shape.face_count() for shape in shapes]
     first = [0] * (max(numbers) + 1)
     for number, before in zip(numbers, accumulate(counts, initial=0)):
         first[number] = before
+    # One smooth shape makes all have a normal for each corner: the table has one form.
     smooth = any(_is_smooth(shape) for shape in shapes)
     rows = [_of_shape(shape, smooth, number) for number, shape in enumerate(shapes)]
     normals, albedos = (np.concatenate([row[k] for row in rows]) for k in range(2))
@@ -70,6 +70,7 @@ def turned_facets(facets: Facets, numbers: Collection[int], turn: NDArray[np.flo
     Four = four_numbers(Float)
     rotation, moved = aligned_array(Float, turn.ravel()), np.zeros(max(numbers, default=0) + 1)
     moved[list(numbers)] = 1
+    # A lane for each normal. Its shape, from the row of its triangle, says whether it turns.
     lane = dr.arange(mi.UInt32, dr.width(facets.normals) // 4)
     normal = dr.gather(Four, facets.normals, lane)
     shape = mi.UInt32(dr.gather(Four, facets.albedos, lane // 3 if facets.smooth else lane).w)
@@ -96,6 +97,7 @@ def facet_at(facets: Facets, number, uv, active):
     if not facets.smooth:
         x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
         return (x, y, z), two_sided > 0, (red, green, blue)
+    # Corners are weighted by 1 - u - v, u and v; the sum of unit normals is shorter than 1.
     Float = type(red)
     u, v = Float(uv.x), Float(uv.y)
     corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
@@ -118,9 +120,10 @@ def _is_smooth(shape) -> bool:
         return False
     flat = mi.Bool(True)
     for u, v in _CORNERS:
-        there = _interaction(shape, u, v)
-        # A triangle that is a line has no normal, and no ray meets it.
-        flat &= ~dr.all(dr.isfinite(there.n)) | (dr.norm(there.sh_frame.n - there.n) < _FLAT)
+        corner = _interaction(shape, u, v)
+        # A triangle that is a line has no normal, and no ray meets it. Others are flat if the
+        # normals of corner and triangle differ by float32's rounding, with room.
+        flat &= ~dr.all(dr.isfinite(corner.n)) | (dr.norm(corner.sh_frame.n - corner.n) < 1e-5)
     return not dr.all(flat)
 
 
@@ -133,6 +136,7 @@ def _of_shape(shape, smooth: bool, number: int) -> tuple[NDArray[np.float64], ND
     """
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
+    # Seen along the normal, from the front.
     middle.wi = mi.Vector3f(0, 0, 1)
     albedo = shape.bsdf().eval_diffuse_reflectance(middle)
     normals = (
@@ -148,8 +152,8 @@ def _of_shape(shape, smooth: bool, number: int) -> tuple[NDArray[np.float64], ND
 
 
 def _rows(three, fourth: float, count: int) -> NDArray[np.float64]:
-    """Return three numbers of each triangle, or those that all share, and
-    a fourth, (triangles, 4).
+    """Return three numbers of each triangle, or three that all triangles share, and a fourth,
+    (triangles, 4).
     """
     rows = np.empty((count, 4))
     for column, part in zip(rows.T, (*three, fourth)):
@@ -162,6 +166,7 @@ def _interaction(shape, u: float, v: float):
     barycentric coordinates u, v.
     """
     count = shape.face_count()
+    # A made-up hit of each triangle: Mitsuba fills in what it knows of the place.
     hit = dr.zeros(mi.PreliminaryIntersection3f, count)
     hit.t = dr.full(mi.Float, 1, count)
     hit.prim_uv = mi.Point2f(u, v)

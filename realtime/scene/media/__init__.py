@@ -26,12 +26,13 @@ density ramp. It may write, because it knows better,
   which shares work between nodes;
 - `check_beam`: which lights at infinity it lets in;
 - `depth_to_light`: of whole paths from points to a light;
-- `rays`: what of rays is found once, as where they enter and leave its parts, for `Rays.crossed`;
-- `source` and `unit`: what scatters, and what of it is the same everywhere and
-  is left out of integrals;
+- `rays`: what is found once for a ray, such as where it enters and leaves parts of the medium,
+  for `Rays.crossed`;
+- `source` and `unit`: what scatters, and its factor that is the same everywhere
+  and is left out of integrals;
 - `mean_source`, `last_depth`, `part`, `ambient`: of froxels, of steps, of a constant field.
 
-`realtime.scene.read_media` makes it of what Mitsuba loaded. Point, spot and area lights have a
+`realtime.scene.read_media` makes it from Mitsuba's medium. Point, spot and area lights have a
 `position`; a light at infinity (`light.w == 0`) has an `axis`, its rays' direction. Its source is
 not divided by r^2.
 

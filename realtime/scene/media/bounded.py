@@ -32,7 +32,7 @@ class Clouds:
 
     sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel; the largest of a cloud with a density
     albedo: Any  #: single-scattering albedos, RGB [1]
-    phases: tuple[Phase, ...]  #: those that differ
+    phases: tuple[Phase, ...]  #: the different phase functions
     phase: Any  #: the number of each cloud's phase function
     density: Density | None = None  #: from place to place; None where all clouds are homogeneous
 
@@ -65,7 +65,8 @@ class BoundedMedia(Homogeneous):
     def summary(self):
         """Clouds where not all bounds are convex or not all media homogeneous."""
         if self.clouds is None or self.bounded_media:
-            return f"bounded, in {'vacuum' if self.clear else 'another medium'}: rays clipped, no kernel"
+            around = "vacuum" if self.clear else "another medium"
+            return f"bounded, in {around}: rays clipped, no kernel"
         grids = self.clouds.grids
         words = (
             f"{dr.width(self.clouds.phase)} clouds in vacuum, bounded by meshes: rays cast at them"
@@ -76,51 +77,67 @@ class BoundedMedia(Homogeneous):
     def phases(self):
         """The phase functions of the bounded media, and of the medium around them."""
         bounded = (
-            self.clouds.phases if self.clouds else [own.medium.phase for own in self.bounded_media]
+            self.clouds.phases
+            if self.clouds
+            else [each.medium.phase for each in self.bounded_media]
         )
         return (*bounded, *(() if self.clear else (self.phase,)))
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave each medium [m]."""
-        crossed = tuple(chord(own, origin, direction) for own in self.bounded_media)
+        crossed = tuple(chord(bounded, origin, direction) for bounded in self.bounded_media)
         return replace(super().rays(origin, direction, aim), crossed=crossed)
 
     def extinction(self, rays, x):
         """Return the extinction of the medium in which a point lies [1/m]."""
-        at = list(self.sigma_t)
-        for own, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
+        # The bounded media are disjoint: a point lies in one of them at most.
+        extinctions = list(self.sigma_t)
+        for bounded, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
             inside = (x >= enter) & (x < leave)
-            at = [dr.select(inside, sigma, around) for sigma, around in zip(own.medium.sigma_t, at)]
-        return tuple(at)
+            extinctions = [
+                dr.select(inside, sigma, around)
+                for sigma, around in zip(bounded.medium.sigma_t, extinctions)
+            ]
+        return tuple(extinctions)
 
     def optical_depth(self, rays, x0, x1):
         """Return the optical depth of segments [m], by channel [1]."""
+        # sigma_0 times the whole length; in vacuum 0, as 0 times an infinite length is NaN.
         depths = [type(x1)(0) if self.clear else sigma * (x1 - x0) for sigma in self.sigma_t]
-        for own, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
+        for bounded, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
             begin, end = dr.maximum(enter, x0), dr.minimum(leave, x1)
-            depths = self._with_length(depths, own, dr.select(end > begin, end - begin, 0))
+            # A ray that misses the medium has both of its ends at infinity, and no length in it.
+            depths = self._with_length(depths, bounded, dr.select(end > begin, end - begin, 0))
         return tuple(depths)
 
     def last_depth(self, origin, forward):
         """Return the depth at which the last medium in vacuum ends [m]."""
         if not self.clear:
             return None
-        depths = [dr.dot(own.centre - origin, forward) + own.radius for own in self.bounded_media]
+        depths = [
+            dr.dot(bounded.centre - origin, forward) + bounded.radius
+            for bounded in self.bounded_media
+        ]
         return reduce(dr.maximum, depths, type(origin.x)(0))
 
     def depth_to_light(self, light, point, r, active=True):
         """Return the optical depth from points [m] to a light, by channel [1]."""
+        # The path to a light at infinity has no end: only its parts in bounded media have a length,
+        # with |D| = 1. Points are rays without a direction.
         zero, r = type(point.x)(0), r if light.w else type(point.x)(1)
         depths = [sigma * r if light.w and not self.clear else zero for sigma in self.sigma_t]
         for path in paths_from(self, light, point, dr.zeros(type(point)), active=active):
+            # Paths beside the sphere of the medium need no walk over its facets.
             length = replace(path, active=active & path.near_points()).length_at(zero, r)
             depths = self._with_length(depths, path.bounded, length)
         return tuple(depths)
 
-    def _with_length(self, depths, own: BoundedMedium, length):
+    def _with_length(self, depths, bounded: BoundedMedium, length):
+        """Return depths by channel with (sigma_k - sigma_0) l_k of one medium."""
+        sigma_t = bounded.medium.sigma_t
         return [
             dr.fma(sigma - around, length, depth)
-            for depth, sigma, around in zip(depths, own.medium.sigma_t, self.sigma_t, strict=True)
+            for depth, sigma, around in zip(depths, sigma_t, self.sigma_t, strict=True)
         ]
 
     def source(self, rays, x, angle):
@@ -130,7 +147,7 @@ class BoundedMedia(Homogeneous):
         )
 
     def mean_source(self, rays, x0, x1, angle):
-        """Return `source` by the part of a segment that lies in each medium: an edge dims it."""
+        """Return the mean of `source` over segments: each medium by the part that lies in it."""
 
         def part(enter, leave):
             return dr.maximum(dr.minimum(leave, x1) - dr.maximum(enter, x0), 0) / (x1 - x0)
@@ -138,9 +155,10 @@ class BoundedMedia(Homogeneous):
         return self._scattered(rays, angle, part)
 
     def _scattered(self, rays, angle, part):
+        # By medium its part, from 0 to 1; the rest is the part of the medium around.
         total, around = type(self.albedo)(0), 1
-        for own, ends in zip(self.bounded_media, rays.crossed, strict=True):
-            inside, medium = part(*ends), own.medium
+        for bounded, ends in zip(self.bounded_media, rays.crossed, strict=True):
+            inside, medium = part(*ends), bounded.medium
             total += medium.unit * (inside * angle(medium.phase))
             around = around - inside
         return total if self.clear else total + super().unit * (around * angle(self.phase))
@@ -170,6 +188,8 @@ class BoundedMedia(Homogeneous):
         """
         total = type(self.albedo)(0)
         for piece in camera_pieces(self, rays):
+            # A piece without end stops at 1e30 m, where nothing is left: infinite ends have NaN for
+            # a length. A field of radiance 1 is scattered by the albedo times what it loses.
             length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
             ends = zip(piece.medium.sigma_t, piece.before)
             channels = [
@@ -182,11 +202,12 @@ class BoundedMedia(Homogeneous):
     def thicker(self, factor):
         """Return it, the bounded media and the clouds with the extinction times a factor."""
         bounded_media = tuple(
-            replace(own, medium=own.medium.thicker(factor)) for own in self.bounded_media
+            replace(bounded, medium=bounded.medium.thicker(factor))
+            for bounded in self.bounded_media
         )
         clouds = self.clouds
         if clouds is not None:
-            sigma_t = tuple(own * factor for own in clouds.sigma_t)
+            sigma_t = tuple(sigma * factor for sigma in clouds.sigma_t)
             dr.make_opaque(sigma_t)
             clouds = replace(clouds, sigma_t=sigma_t)
         return replace(super().thicker(factor), bounded_media=bounded_media, clouds=clouds)

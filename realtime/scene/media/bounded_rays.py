@@ -35,7 +35,7 @@ from airlight.realtime.scene.media.light_paths import Envelopes, LightPaths, bey
 from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Rays, optical_reach
 from airlight.realtime.scene.rule_reach import CHANGE
 
-_MOST = 1000  # panels of a segment beside those that end where a path passes from facet to facet
+_MOST = 1000  # panels of a segment, and more where paths pass from facet to facet
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ class BoundedRays(LitRays):
         x0, x1 = self.geometry.lit_segment(x0, x1)
         Color = type(self.medium.albedo)
         total = dr.zeros(Color, dr.width(self.geometry.height, x0, x1))
+        # Lanes whose lit segment misses a piece skip its integral.
         for piece in self.pieces:
             total += dr.if_stmt(
                 args=(dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)),
@@ -77,6 +78,7 @@ class BoundedRays(LitRays):
 
     def integral(self, piece: Piece, x0, x1):
         """Return albedo sigma J over a segment [m] in one piece, a colour [1/m^2]."""
+        # Beyond its optical reach nothing is left: an unbounded piece gets an end.
         x1 = dr.minimum(x1, x0 + optical_reach(type(x0)) / piece.medium.least_extinction())
         paths = tuple(self.light_paths(piece, x0, x1))
         lit = PieceRays(self.medium, self.light, self.rays, self.geometry, None, self, piece, paths)
@@ -99,6 +101,8 @@ class BoundedRays(LitRays):
         the light's left out [1/m].
         """
         rate = reduce(dr.maximum, piece.medium.sigma_t)
+        # The distance to a light at a place grows by 1 m a metre at most, in the medium around. A
+        # sun shines through vacuum between the bounded media.
         if self.light.w and not self.medium.clear:
             rate = rate + reduce(dr.maximum, self.medium.sigma_t)
         return rate
@@ -110,6 +114,7 @@ class BoundedRays(LitRays):
         depths = []
         for channel, around in enumerate(self.medium.sigma_t):
             depth = dr.fma(piece.medium.sigma_t[channel], x - piece.begin, piece.before[channel])
+            # The path to the light: sigma_0 r, and (sigma_k - sigma_0) l_k in each medium.
             if not self.medium.clear:
                 depth = dr.fma(around, r, depth)
             for medium, length in lengths:
@@ -168,19 +173,22 @@ class PieceRays(LitRays):
         envelopes behind the panels.
         """
         x, end = start.x, start.end(self._rate(start, envelopes))
-        # The next place at which a facet takes over, or a path passes an edge:
-        # beyond a rounding error of x.
+        # The next place at which a facet takes over, or a path passes an edge: beyond a rounding
+        # error of x. The panel ends there. Spheres have no envelopes.
         at = beyond(x)
-        changes = [own and path.next_change(own, at) for path, own in zip(self.paths, envelopes)]
-        for own, change in zip(envelopes, changes):
-            if own:
-                bend = dr.minimum(dr.maximum(dr.minimum(*change[0]), at), own.crossing(at))
+        changes = [
+            lines and path.next_change(lines, at) for path, lines in zip(self.paths, envelopes)
+        ]
+        for lines, change in zip(envelopes, changes):
+            if lines:
+                bend = dr.minimum(dr.maximum(dr.minimum(*change[0]), at), lines.crossing(at))
                 end = dr.minimum(end, bend - start.foot)
 
         def values(node: Node):
+            # Within the panel the envelopes are two lines each, so that a length needs no search.
             lengths = [
-                (path.bounded.medium, path.length(own, node.x, node.r))
-                for path, own in zip(self.paths, envelopes)
+                (path.bounded.medium, path.length(lines, node.x, node.r))
+                for path, lines in zip(self.paths, envelopes)
             ]
             phase = self.phase.evaluate_half(node.down, node.up)
             return [
@@ -192,16 +200,18 @@ class PieceRays(LitRays):
             end,
             values,
             [
-                own and _after(own, change, start.foot + end)
-                for own, change in zip(envelopes, changes)
+                lines and _after(lines, change, start.foot + end)
+                for lines, change in zip(envelopes, changes)
             ],
         )
 
     def _rate(self, start: Start, envelopes):
         """Return the reciprocal of the longest panels [1/m]."""
         rate, bending = self.whole.growth(self.piece, start.x, start.r), type(start.s)(0)
-        for path, own in zip(self.paths, envelopes):
-            steepness, smooth = path.steepness(own, start.x, start.r)
+        # The rate of the depths is at most the sum of all their rates; the length of a path in a
+        # medium rises steeply where the path grazes a facet, and there the panel is short.
+        for path, lines in zip(self.paths, envelopes):
+            steepness, smooth = path.steepness(lines, start.x, start.r)
             rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
             bending = dr.maximum(bending, 1 / smooth)
         return dr.maximum(rate * (1 / CHANGE), bending)
@@ -211,9 +221,11 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
     """Return the pieces of camera rays in which something scatters."""
     Float = type(rays.direction.x)
 
-    def piece(own: Homogeneous, number, begin, end):
+    def piece(within: Homogeneous, number, begin, end):
+        # The depth from the camera to the piece is one number a ray; it is 0 for rays that miss the
+        # piece, which begin at infinity.
         before = medium.optical_depth(rays, 0, dr.select(dr.isfinite(begin), begin, 0))
-        return Piece(own, number, begin, end, before)
+        return Piece(within, number, begin, end, before)
 
     pieces = [
         piece(bounded.medium, number, *ends)
@@ -223,6 +235,8 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
     ]
     if not medium.clear:
         around = Homogeneous(medium.sigma_t, medium.albedo, medium.phase)
+        # A gap begins at the camera or behind a bounded medium, and ends where the ray enters the
+        # next.
         starts = [dr.zeros(Float, dr.width(rays.direction)), *(leave for _, leave in rays.crossed)]
         for begin in starts:
             end = Float(dr.inf)
@@ -236,14 +250,15 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
     return tuple(pieces)
 
 
-def _after(own: Envelopes, change, x) -> Envelopes:
+def _after(before: Envelopes, change, x) -> Envelopes:
     """Return the envelopes from x on, a distance not beyond the next change of either [m]."""
+    # The panel that ends where a line takes over, or behind it by rounding, hands on the new line.
     (until_low, until_high), after = change
     return Envelopes(
-        dr.select(until_low <= x, after.least, own.least),
-        dr.select(until_high <= x, after.largest, own.largest),
+        dr.select(until_low <= x, after.least, before.least),
+        dr.select(until_high <= x, after.largest, before.largest),
         (
-            dr.select(until_low <= x, after.planes[0], own.planes[0]),
-            dr.select(until_high <= x, after.planes[1], own.planes[1]),
+            dr.select(until_low <= x, after.planes[0], before.planes[0]),
+            dr.select(until_high <= x, after.planes[1], before.planes[1]),
         ),
     )

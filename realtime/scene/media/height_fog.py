@@ -4,7 +4,8 @@ and a cap, without sides.
 
 With the height z of a point and layers i
 
-    sigma_t(z) = sigma_0 + sum_i sigma_i exp(-(z - z_i)/H_i),     clamped: sigma_i exp(-max(z - z_i, 0)/H_i).
+    sigma_t(z) = sigma_0 + sum_i sigma_i exp(-(z - z_i)/H_i),
+    clamped:     sigma_0 + sum_i sigma_i exp(-max(z - z_i, 0)/H_i).
 
 **Optical depth.** A layer's mean over a segment is its density at the *lower* end times phi(u) =
 (1 - e^-u)/u, with u >= 0 the rise in scale heights: from the upper end e^u would overflow where the
@@ -16,16 +17,17 @@ density s where it begins and c = dz/H.
 E of both ways grows by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of
 the depth tau
 
-    int sigma_t exp(-E) dx = exp(-E(a)) tau phi(q),     q = (1 - dz/mu) tau;     exp(-E(b)) tau phi(-q) for q < 0
+    int sigma_t exp(-E) dx = exp(-E(a)) tau phi(q),     q = (1 - dz/mu) tau;
+                             exp(-E(b)) tau phi(-q)     for q < 0
 
 (plane-parallel single scattering, Chandrasekhar 1960). It costs two optical depths and no node.
 
 **Lights at places.** A panel (`realtime.scene.media.integrate`) is computed from its lower end:
 there a node has one exponential for each layer, e^-u - 1, for the density and for the depth from
 the camera; the depth to the light takes the density at both its ends. Panels end at the bases of
-clamped layers. Beyond a base the mean density of the way to a light goes like 1/(z - z_light), a
-panel's limit there; a layer that falls is a fraction of the density, and its fourth root counts,
-since the rule leaves about the fourth power of what it does not resolve.
+clamped layers. Beyond a base the mean density of the way to a light goes like 1/(z - z_light),
+which limits a panel there. A layer that falls along the ray counts by the fourth root of its
+fraction of the density, since the rule leaves about the fourth power of what it does not resolve.
 """
 
 from dataclasses import dataclass, replace
@@ -41,11 +43,6 @@ from airlight.realtime.scene.media.integrate import Node, Start
 from airlight.realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.rule_reach import CHANGE
-
-_WIDTH_ASKED = 6.0  # in ln E of panels with a number of nodes that was asked for
-_UNBOUNDED = 1e9  # [m]
-_AT_BASE = 1e-4  # of a scale height beside a base: panels that begin at it
-_LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
 
 
 @dataclass(frozen=True)
@@ -85,12 +82,15 @@ class HeightFog(VaryingMedium):
         """Return rays with the distances between which they are in the fog [m],
         and their heights and rise.
         """
+        # The height along a ray is start + rise x. It passes floor and cap at two distances; a
+        # level ray in the fog passes neither, and leaves it at 1e9 m.
+        unbounded = 1e9
         start, rise = dr.dot(origin, self.up), dr.dot(direction, self.up)
         ends = [(z - start) / rise for z in (self.floor, self.cap)]
         level, inside = rise == 0, (start >= self.floor) & (start <= self.cap)
         enter = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
         leave = dr.select(
-            level, dr.select(inside, _UNBOUNDED, 0), dr.clip(dr.maximum(*ends), 0, _UNBOUNDED)
+            level, dr.select(inside, unbounded, 0), dr.clip(dr.maximum(*ends), 0, unbounded)
         )
         crossed = (dr.minimum(enter, leave), leave), (start, rise)
         return replace(super().rays(origin, direction, aim), crossed=crossed)
@@ -108,6 +108,7 @@ class HeightFog(VaryingMedium):
         """Return the optical depth of segments [m], in closed form [1]."""
         (enter, leave), (start, rise) = rays.crossed
         a, b = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
+        # The mean density from the lower end up (see the module), times the length in the fog.
         length = dr.maximum(b - a, 0)
         return (
             length
@@ -117,6 +118,7 @@ class HeightFog(VaryingMedium):
     def depth_to_light(self, light, point, r, active=True):
         """Return the optical depth from points [m] to a light, in closed form [1]."""
         z = dr.dot(point, self.up)
+        # A sun shines through all of the fog above; the slant path is longer by 1/mu.
         if not getattr(light, "w", 1):
             return (self._overhead(z) / -dr.dot(light.axis, self.up),)
         return (self._between(z, dr.dot(light.position, self.up), r),)
@@ -132,6 +134,8 @@ class HeightFog(VaryingMedium):
         """
         (_, (start, rise)), end = rays.crossed, self._end(light)
         z = dr.fma(rise, x, start)
+        # The depth to the light is r times the column of the fog between both heights over their
+        # difference, `whole`; `part` of it lies within the fog.
         whole, part, low = self._to_light(z, light, end)
         r = dr.norm(light.position - rays.at(x))
         # The density here, its integral over the heights up to the light, and
@@ -139,15 +143,17 @@ class HeightFog(VaryingMedium):
         density, column, behind = self.constant, self.constant * part, type(x)(0)
         extinctions = []
         for layer in self.layers:
-            here = self._fall(layer, z)
-            of_layer = self._column(layer, low, part, (here, self._fall(layer, end)))
-            extinctions.append(layer.sigma_t * here)
+            at_point = self._fall(layer, z)
+            of_layer = self._column(layer, low, part, (at_point, self._fall(layer, end)))
+            extinctions.append(layer.sigma_t * at_point)
             density, column = density + extinctions[-1], dr.fma(layer.sigma_t, of_layer, column)
             if self.clamped:
-                # A panel may begin at the base itself, rounded.
+                # Whether the base lies between the point and the light. A panel may begin at the
+                # base itself, rounded: there the point counts as beyond it, to 1e-4 of a scale
+                # height.
                 above = end - layer.base
-                crossed = (z - layer.base) * above < _AT_BASE * layer.scale_height * dr.abs(above)
-                changes = r * layer.sigma_t * dr.abs(here - of_layer / part)
+                crossed = (z - layer.base) * above < 1e-4 * layer.scale_height * dr.abs(above)
+                changes = r * layer.sigma_t * dr.abs(at_point - of_layer / part)
                 behind = dr.maximum(behind, dr.select(crossed, _root(changes), 0))
         # Upwards a layer counts by its fraction of the density; downwards
         # any can become the largest.
@@ -157,11 +163,13 @@ class HeightFog(VaryingMedium):
             up = dr.fma(steep, _root(extinction * dr.rcp(dr.maximum(density, 1e-30))), up)
             down = dr.maximum(down, steep)
         steep = dr.abs(rise) * dr.select(rise > 0, up, down)
+        # The rates of both depths: the density here, and the mean density of the way to the light.
         thick = density + column * dr.rcp(whole)
         # Downwards depths grow as exponentials of the way, by `change` after log(1 +
         # change steep/thick)/steep.
         grown = change * steep * dr.rcp(thick)
         thick = dr.select((rise < 0) & (grown > 1e-2), change * steep / dr.log(1 + grown), thick)
+        # The three rates add up: depths, the logarithm of the density, what changes behind a base.
         return change / (thick + steep + dr.abs(rise) * (behind * dr.rcp(whole)))
 
     def length_from(self, rays, x, depth: float):
@@ -170,6 +178,8 @@ class HeightFog(VaryingMedium):
         """
         _, (start, rise) = rays.crossed
         z, longest = dr.fma(rise, x, start), depth / self.constant
+        # By layer -log(1 - c T/s)/c, c = rise/H: T/s where c T/s is small, and no length where the
+        # layer thins out before it has the depth T. The first layer to reach T decides.
         for layer in self.layers:
             fraction = depth / (layer.sigma_t * self._fall(layer, z))
             c = rise / layer.scale_height
@@ -189,6 +199,7 @@ class HeightFog(VaryingMedium):
         """
         (enter, leave), _ = rays.crossed
         begin = dr.clip(x0, enter, leave)
+        # A ray that goes on in thick fog ends where nothing is left of its light.
         end = dr.minimum(
             dr.clip(x1, enter, leave),
             begin + self.length_from(rays, begin, optical_reach(type(begin))),
@@ -212,6 +223,7 @@ class HeightFog(VaryingMedium):
         InputError
             For other kernels, which are those of homogeneous media.
         """
+        # The kernel `quadrature` alone names a number of nodes, which the panels take over.
         nodes = None if kernel is None or kernel.exact else kernel.asinh_nodes
         if light.w and not (kernel is None or kernel.exact or nodes is not None):
             raise InputError(
@@ -229,9 +241,9 @@ class HeightFog(VaryingMedium):
         """Return how far a light is from heights upwards, how far within the fog, and
         the lower end of that [m].
         """
+        # Columns are divided by these differences of heights: 1e-20 m stands for none.
         whole, part = (
-            dr.maximum(dr.abs(other - z), _LEVEL)
-            for other in (dr.dot(light.position, self.up), end)
+            dr.maximum(dr.abs(other - z), 1e-20) for other in (dr.dot(light.position, self.up), end)
         )
         return whole, part, dr.minimum(z, end)
 
@@ -247,6 +259,8 @@ class HeightFog(VaryingMedium):
         """Return the integral of a layer over heights, `rise` [m] from `low` up, by its
         densities at the `ends` [m].
         """
+        # Densities are over that at the base. Below the base of a clamped layer they are 1; above,
+        # the mean over heights is the density at the lower end, the larger one, times phi.
         below = dr.clip(layer.base - low, 0, rise) if self.clamped else 0
         above, largest = rise - below, dr.maximum(*ends)
         u = above / layer.scale_height
@@ -272,6 +286,8 @@ class HeightFog(VaryingMedium):
                     rise / layer.scale_height
                 )
                 continue
+            # The part of the rise below the base has the density 1; a level segment lies below the
+            # base or above it.
             below = dr.clip(layer.base - low, 0, rise)
             part = dr.select(rise > 0, below / rise, dr.select(low < layer.base, 1, type(rise)(0)))
             above = self._fall(layer, low) * phi((rise - below) / layer.scale_height)
@@ -284,6 +300,7 @@ class HeightFog(VaryingMedium):
         """
         a, b = dr.clip(z, self.floor, self.cap), dr.clip(other, self.floor, self.cap)
         low, rise, whole = dr.minimum(a, b), dr.abs(b - a), dr.abs(other - z)
+        # The part of the path between floor and cap, by heights; within the fog it is all of r.
         inside = (a == z) & (b == other)
         length = dr.select(inside, r, dr.select(whole > 0, r * (rise / whole), 0))
         return length * self._mean(low, rise)
@@ -305,12 +322,13 @@ class HeightRays(LitRays):
         """Return the integral over lit segments [x0, x1] [m]."""
         if self.light.w:
             return super().airlight(x0, x1)
+        # A sun in closed form, without nodes.
         x0, x1 = self.within(*self.geometry.lit_segment(x0, x1))
         return self.medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
 
     def within(self, x0, x1):
-        """Return the part of segments between floor and cap [m]: the light's path may
-        lose as the camera's gains.
+        """Return the part of segments between floor and cap [m]. It goes on beyond the camera's
+        optical reach: the depth to the light may fall as the depth to the camera grows.
         """
         enter, leave = self.rays.crossed[0]
         return dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
@@ -318,6 +336,8 @@ class HeightRays(LitRays):
     def _sun(self, x0, x1):
         medium, (start, rise) = self.medium, self.rays.crossed[1]
         mu = -dr.dot(self.light.axis, medium.up)
+        # exp(-E) tau phi(|q|), with the exponent E of both ways at the end where it is smaller: at
+        # the beginning if E grows along the ray, q >= 0, else at the end.
         (tau,) = medium.optical_depth(self.rays, x0, x1)
         q = (1 - rise / mu) * tau
         x = dr.select(q >= 0, x0, x1)
@@ -334,7 +354,8 @@ class HeightRays(LitRays):
         """Return the width of panels with the nodes that were asked for,
         otherwise the usual one.
         """
-        return Float(_WIDTH_ASKED) if self.nodes_asked else super().panel_width(Float)
+        # 6.0 in ln E for panels with a number of nodes that was asked for.
+        return Float(6.0) if self.nodes_asked else super().panel_width(Float)
 
     def bends(self):
         """Return the bends of the fog; panels with nodes that were asked
@@ -367,6 +388,9 @@ class HeightRays(LitRays):
         z_low = dr.fma(slope, dr.select(up, start.x, x1), origin)
         across, layers, at_light = medium.constant * length, [], medium._end(light)
         for layer in medium.layers:
+            # Scale heights a metre of the ray; 1e-12 stands for none, and the layer's part is then
+            # its density times the length. A clamped layer is constant below its base, where panels
+            # end.
             steep = dr.maximum(rise / layer.scale_height, 1e-12)
             if medium.clamped:
                 steep = dr.select(dr.fma(0.5 * rise, length, z_low) < layer.base, 1e-12, steep)
@@ -378,6 +402,7 @@ class HeightRays(LitRays):
         lowest, sign = dr.select(up, before, after), dr.select(up, Float(1), -1)
 
         def values(node: Node):
+            # The distance of the node from the lower end, and heights from there to the light.
             far = dr.select(up, node.far, node.rest)
             whole, part, lower = medium._to_light(dr.fma(rise, far, z_low), light, at_light)
             density, camera, segment = (
@@ -385,14 +410,18 @@ class HeightRays(LitRays):
                 medium.constant * far,
                 medium.constant * part,
             )
+            # By layer one exponential: the density at the node, the depth from the lower end to it,
+            # and the column between the node and the light.
             for layer, steep, at_low, along, at_end in layers:
                 fraction, less = exp_expm1_bounded(-steep * far)
-                here = at_low * fraction
-                density = dr.fma(layer.sigma_t, here, density)
+                at_node = at_low * fraction
+                density = dr.fma(layer.sigma_t, at_node, density)
                 camera = dr.fma(layer.sigma_t * along, less, camera)
                 segment = dr.fma(
-                    layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), segment
+                    layer.sigma_t, medium._column(layer, lower, part, (at_node, at_end)), segment
                 )
+            # From the lower end upwards the depth from the camera rises on rays that rise, else
+            # falls.
             exponent = dr.fma(sign, camera, lowest) + node.r * (segment * dr.rcp(whole))
             return [
                 density * exp_bounded(-exponent) * medium.phase.evaluate_half(node.down, node.up)

@@ -5,8 +5,8 @@ Over a lit segment of a ray and for a light at a place, at the distance r from t
 
     I = int_{x0}^{x1} sigma_s p exp(-tau_camera - tau_light) f / r^2 dx,
 
-with f the profile of a spot; for a light at infinity there is no r^2. A medium says what sigma_s, p
-and both depths are at a node, where they bend, and how far it is until they have changed much. This
+with f the profile of a spot; for a light at infinity there is no r^2. A medium gives sigma_s, p and
+both depths at a node, the places where they bend, and the length in which they change much. This
 page is the rest.
 
 **The variable.** With s = x - foot, the height h of the light and N^2 = (r + s)/2,
@@ -54,10 +54,6 @@ from airlight.realtime.numerics.functions import unit_nodes
 from airlight.realtime.scene.rule_reach import NODES
 
 _NODES_DOUBLE = 16  # rho^(-32): 1e-16 where six nodes leave 1e-6
-_SOFT = 0.85  # widest panel where the intensity of a spot falls off, linear in an angle
-# [m]: a ray through the light has an infinite integral, and so nearly is its value
-_LEAST_HEIGHT = 1e-15
-_TAIL, _TAIL_DOUBLE = 1e7, 1e12  # r + s, over its first value, behind which 1/r^2 leaves nothing
 
 
 @dataclass(frozen=True)
@@ -107,7 +103,8 @@ def integral(lit: Any, x0, x1) -> list[Any]:
     lanes = dr.width(geometry.height, x0, x1)
     # From distances to places from the foot.
     foot = geometry.foot if light.w else Float(0)
-    height = dr.maximum(geometry.height, _LEAST_HEIGHT)
+    # A ray through the light has an infinite integral, and so nearly is its value at 1e-15 m.
+    height = dr.maximum(geometry.height, 1e-15)
     s0 = x0 - foot + dr.zeros(Float, lanes)
     s1 = _finite_end(lit, s0, x1 - foot, height)
     # Where the medium bends, and where a spot begins to fall off.
@@ -120,6 +117,7 @@ def integral(lit: Any, x0, x1) -> list[Any]:
         # The light's limits to a panel first, then the medium's.
         start = _start(foot, height, s, _following(bends, s, s1), width)
         end, values, state = lit.panel(start, state)
+        # In the light of a place the weights hold dx/r^2, at infinity dx.
         nodes = (
             _at_place(lit, start, end, height)
             if light.w
@@ -135,6 +133,7 @@ def integral(lit: Any, x0, x1) -> list[Any]:
             ]
         return turn + 1, end, state, totals
 
+    # A lane walks on until its segment ends, nothing is left of the light, or its panels run out.
     _, reached, state, totals = dr.while_loop(
         state=(
             dr.zeros(mi.UInt32, lanes),
@@ -146,6 +145,7 @@ def integral(lit: Any, x0, x1) -> list[Any]:
         body=panel,
         labels=("turn", "s", "state", "totals"),
     )
+    # The sum of some panels would be a dark pixel: NaN makes the frame refuse itself.
     ran_out = (reached < s1) & lit.shines(state)
     return [dr.select(ran_out, dr.nan, total) for total in totals]
 
@@ -161,8 +161,10 @@ def _finite_end(lit: Any, s0, s1, height):
         return s1
     Float = type(s0)
     _, backward = lit.phase.lobe_scales(Float)
+    # Where r + s is so many times its first value, 1/r^2 has left nothing. A backward lobe begins
+    # at E = `backward`, and the tail of its light is longer by this factor.
     path = height + s0 + dr.sqrt(dr.fma(s0, s0, dr.square(height)))
-    tail = _TAIL if is_single(Float) else _TAIL_DOUBLE
+    tail = 1e7 if is_single(Float) else 1e12
     return dr.minimum(s1, dr.maximum(s0, 0) + tail * backward * path)
 
 
@@ -170,7 +172,8 @@ def _panel_width(lit: Any, Float) -> tuple[Any, Any]:
     """Return cosh W - 1 and sinh W of the widest panels."""
     width = lit.panel_width(Float)
     if lit.light.beam is not None:
-        width = dr.minimum(width, _SOFT)
+        # The widest panel where the intensity of a spot falls off, linear in an angle.
+        width = dr.minimum(width, 0.85)
     grown = dr.exp(width)
     sinh = 0.5 * (grown - dr.rcp(grown))
     return grown - 1 - sinh, sinh
@@ -180,6 +183,7 @@ def _start(foot, height, s, last, width: tuple[Any, Any] | None) -> Start:
     """Return where panels begin; for a light at infinity there is no `width`."""
     if width is None:
         return Start(foot, s, type(s)(1), type(s)(0), last)
+    # A panel of the width W from s has the length (cosh W - 1) s + sinh W r.
     less, sinh = width
     r = dr.sqrt(dr.fma(s, s, dr.square(height)))
     return Start(foot, s, r, dr.rcp(dr.fma(less, s, sinh * r)), last)
@@ -203,9 +207,11 @@ def _at_place(lit: Any, start: Start, end, height) -> Iterator[Node]:
         # h/(2 N D) brings N and D back to the length at which they are roots.
         total, scale = square_n + square_d, 0.5 * height * dr.rcp(n * d)
         inverse = dr.rcp(total)
+        # s - s0, s1 - s and r of the module: sums of terms of one sign.
         far = (t * fraction) * (scale * dr.fma(n, n0, d * d0))
         rest = ((1 - t) * fraction) * (scale * dr.fma(n, n1, d * d1))
         s, r = (square_n - square_d) * scale, total * scale
+        # E^2/(1 + E^2) and 1/(1 + E^2), with E = N/D.
         down, up = square_n * inverse, square_d * inverse
         yield Node(start.x + far, far, rest, s, r, down, up, weight * fraction * inverse)
 
@@ -224,12 +230,15 @@ def _half_angles(lit: Any) -> tuple[Any, Any]:
     """Return sin^2 and cos^2 of half the angle between rays and a light at
     infinity, both with all digits.
     """
+    # The cosine of the scattering angle is -axis . direction: |sum|^2 is 4 sin^2 and |difference|^2
+    # is 4 cos^2 of half of this angle.
     axis, direction = lit.light.axis, lit.rays.direction
     return 0.25 * dr.squared_norm(axis + direction), 0.25 * dr.squared_norm(axis - direction)
 
 
 def _roots(s, h):
     """Return N and D, the square roots of (r + s)/2 and (r - s)/2; 2 N D = h."""
+    # The larger root is a sum; the smaller one would cancel, and follows from 2 N D = h.
     larger = dr.sqrt(0.5 * (dr.abs(s) + dr.sqrt(dr.fma(s, s, h * h))))
     smaller = 0.5 * h * dr.rcp(larger)
     return dr.select(s > 0, larger, smaller), dr.select(s > 0, smaller, larger)

@@ -16,19 +16,19 @@ the path has in the medium the length max(0, e_1 - e_0) |D|/((1 + w e_0)(1 + w e
 Nothing cancels but e itself.
 
 e is linear in P: along a ray P = o + x d it is a line, c + s x, for a light at any place. The least
-of some lines and the largest of others, the *envelopes*, bend where another line takes over, and
-the length bends there, where one of the two is 0, and where they meet. The least of lines is
+of some lines and the largest of others, the *envelopes*, bend where another line takes over. The
+length bends at these places, where an envelope is 0, and where both meet. The least of lines is
 concave: beyond a place only steeper falling lines can take over from the one that is least there,
 and the first of them to cross it does. One pass over the planes finds it.
 
 The facets through which the light comes in tile the medium as the light sees it. A path that meets
-the medium therefore finds its plane by going from facet to facet while a neighbour has less: on the
-straight way from a point of the facet k to that of the path, the neighbour beyond the edge where k
-is left has less from there on, since the difference is linear. Where no neighbour on the light's
-side has less, and none on the other has more, the crossing lies in the facet. Otherwise the path
-misses the medium, and e_0 > e_1 says so. The walk begins at the facet in the direction, from the
-medium's centre, of the place where the path crosses the sphere around it. For points within the
-medium the next plane along a ray shares an edge with the last one, too.
+the medium therefore finds its plane by going from facet to facet while a neighbour has less: the
+straight way from a point of the facet k to the point of the path leaves k over an edge, and from
+this edge on the neighbour beyond it has less than k, since the difference of both is linear. Where
+no neighbour on the light's side has less, and none on the other has more, the crossing lies in the
+facet. Otherwise the path misses the medium, and e_0 > e_1 says so. The walk begins at the facet in
+the direction, from the medium's centre, of the place where the path crosses the sphere around it.
+For points within the medium the next plane along a ray shares an edge with the last one, too.
 
 A camera ray is the path of a light at infinity in its direction, from its origin.
 
@@ -36,7 +36,8 @@ A camera ray is the path of a light at infinity in its direction, from its origi
 linear in x too. The path is nearest to C at the distance b = -p . D/|D| from P, and half its chord
 is q, q^2 = R^2 - |p x M|^2/|D|^2. Paths graze the sphere where
 
-    |p x M|^2 = R^2 |D|^2,     with the discriminant (|M|^2 - w R^2)(R^2 |D x d|^2 - (M . (p x d))^2),
+    |p x M|^2 = R^2 |D|^2,
+    with the discriminant (|M|^2 - w R^2)(R^2 |D x d|^2 - (M . (p x d))^2),
 
 whose second factor is one difference. Before and behind these points q rises like a root.
 """
@@ -54,13 +55,6 @@ from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous, Medium
 
 _FAR = 1e30  #: e of no plane
-#: Planes that are read faster than walked over. The walk makes frames of `three-media`, with bodies
-#: of 320 and 120 facets, 6.4 times as fast as all planes: 69 and 437 ms (shadow planes, 320 x 240,
-#: 29 November 2026).
-_FEW = 16
-_UNROLLED = 4  #: neighbours of a plane, as many as facets of boxes have
-#: of the square of half a chord in a panel; panels over the radius
-_STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25
 
 
 @dataclass(frozen=True)
@@ -104,6 +98,7 @@ class Envelopes:
         low, high = _value(self.largest, x), _value(self.least, x)
         rising, falling = self.largest[1], self.least[1]
         until = type(x)(dr.inf)
+        # Three differences of lines that may reach 0: e_1 - e_0, e_1 and e_0.
         for gap, closing in ((high - low, rising - falling), (high, -falling), (low, -rising)):
             ahead = gap / closing
             until = dr.minimum(until, dr.select(ahead > 0, x + ahead, dr.inf))
@@ -136,6 +131,9 @@ class LightPaths:
         spheres have no envelopes.
         """
         if envelopes is None:
+            # A sphere: the path is nearest to the centre at b, q is half of its chord, and the path
+            # lies in the medium from b - q to b + q, as far as it is between the point and the
+            # light.
             point, away = dr.fma(self.direction, x, self.start), self.away(x)
             square = dr.squared_norm(away)
             nearest = -dr.dot(point, away) / r
@@ -147,6 +145,7 @@ class LightPaths:
             last = dr.minimum(nearest + half, r) if self.w else nearest + half
             length = dr.maximum(last - dr.maximum(nearest - half, 0), 0)
         else:
+            # A polyhedron: max(0, e_1 - e_0) |D|/((1 + w e_0)(1 + w e_1)).
             first, last = envelopes.ends(x)
             length = dr.maximum(last - first, 0)
             if self.w:
@@ -172,6 +171,8 @@ class LightPaths:
         )
 
     def _none(self, x) -> Envelopes:
+        # The envelopes of no planes: the path is in the medium up to any e, and from any e on. They
+        # are copies: each state of a loop has a variable of its own.
         width = dr.width(x, self.start, self.direction, self.toward, self.active)
         far, flat, number = (
             dr.full(type(x), _FAR, width),
@@ -183,11 +184,13 @@ class LightPaths:
     def _tighter(self, x):
         """Return the step that takes a plane for an envelope at x if it has less, or more."""
 
-        def step(number, line, found):
+        def step(number, line, envelopes):
+            # A plane through which the light comes in, line[2], limits the path from above, e_1;
+            # any other from below, e_0.
             value = dr.fma(line[1], x, line[0])
-            less = line[2] & (value < _value(found.least, x))
-            more = ~line[2] & (value > _value(found.largest, x))
-            return _replaced(found, number, line, less, more)
+            less = line[2] & (value < _value(envelopes.least, x))
+            more = ~line[2] & (value > _value(envelopes.largest, x))
+            return _replaced(envelopes, number, line, less, more)
 
         return step
 
@@ -198,52 +201,65 @@ class LightPaths:
         For points within the medium only the plane with the least e is searched.
         """
         step, sides = self._tighter(x), 1 if self.own else 2
-        if self.bounded.count <= _FEW:
+        # Up to 16 planes are read faster than walked over. The walk makes frames of `three-media`,
+        # with bodies of 320 and 120 facets, 6.4 times as fast as all planes: 69 and 437 ms (shadow
+        # planes, 320 x 240, 29 November 2026).
+        if self.bounded.count <= 16:
             return self._over_planes(self._none(x), step, self.active)
+
+        # The path crosses the sphere around the medium on the light's side and on the other. The
+        # facets in the directions of these places from the centre begin the walks.
         point, away = dr.fma(self.direction, x, self.start), self.away(x)
         length, radius = dr.norm(away), self.bounded.radius
         away = away / length
         nearest = -dr.dot(point, away)
         half = dr.sqrt(dr.maximum(dr.square(radius) - dr.squared_norm(dr.cross(point, away)), 0))
-        found = self._none(x)
+        envelopes = self._none(x)
         for side, end in enumerate((nearest + half, nearest - half)[:sides]):
             number = self._plane_towards(dr.fma(away, end, point) / radius)
             # The first walk may have met a plane of the other side: the second goes on from there.
-            unset = (found.least[0] == _FAR, found.largest[0] == -_FAR)[side]
-            planes = tuple(dr.select(unset, number, plane) for plane in found.planes)
-            found = replace(found, planes=planes)
-            found = self._descend(
-                step(number, self._line(self.bounded.planes, number, self.active), found),
+            without = (envelopes.least[0] == _FAR, envelopes.largest[0] == -_FAR)[side]
+            planes = tuple(dr.select(without, number, plane) for plane in envelopes.planes)
+            envelopes = replace(envelopes, planes=planes)
+            envelopes = self._descend(
+                step(number, self._line(self.bounded.planes, number, self.active), envelopes),
                 step,
                 side,
             )
-        # The walk may begin on the other side, with no neighbour on its own.
-        lost = found.least[0] == _FAR
-        lost = lost if self.own else lost | (found.largest[0] == -_FAR)
-        return self._over_planes(found, step, self.active & lost)
+        # The walk may begin on the other side, with no neighbour on its own: then all planes count.
+        unset = envelopes.least[0] == _FAR
+        unset = unset if self.own else unset | (envelopes.largest[0] == -_FAR)
+        return self._over_planes(envelopes, step, self.active & unset)
 
-    def _descend(self, found: Envelopes, step: Callable[..., Any], side: int) -> Envelopes:
+    def _descend(self, envelopes: Envelopes, step: Callable[..., Any], side: int) -> Envelopes:
         """Go from facet to facet while a neighbour has a tighter plane of one side: 0 for
         the least, 1 the largest.
         """
 
-        def further(turn, searches, found):
-            after = self._over_neighbours(found.planes[side], found, step)
-            return turn + 1, searches & (after.planes[side] != found.planes[side]), after
+        def further(turn, searches, envelopes):
+            # The search ends at a facet that none of its neighbours takes over from.
+            after = self._over_neighbours(envelopes.planes[side], envelopes, step)
+            return turn + 1, searches & (after.planes[side] != envelopes.planes[side]), after
 
-        width = dr.width(found.least[0])
-        *_, found = dr.while_loop(
-            state=(dr.zeros(mi.UInt32, width), dr.full(mi.Bool, True, width) & self.active, found),
-            cond=lambda turn, searches, found: searches & (turn < self.bounded.count),
+        # Each turn finds a tighter plane, so that the number of planes bounds the turns.
+        width = dr.width(envelopes.least[0])
+        *_, envelopes = dr.while_loop(
+            state=(
+                dr.zeros(mi.UInt32, width),
+                dr.full(mi.Bool, True, width) & self.active,
+                envelopes,
+            ),
+            cond=lambda turn, searches, envelopes: searches & (turn < self.bounded.count),
             body=further,
-            labels=("turn", "searches", "found"),
+            labels=("turn", "searches", "envelopes"),
         )
-        return found
+        return envelopes
 
     def _plane_towards(self, direction):
         """Return the number of a plane that is met in about a direction
         from the medium's centre.
         """
+        # From -1 to 1 along each axis to the number of a cell.
         column, row, layer = (
             mi.UInt32(dr.clip(dr.fma(part, 0.5 * CELLS, 0.5 * CELLS), 0, CELLS - 1))
             for part in direction
@@ -263,6 +279,8 @@ class LightPaths:
         def step(number, line, state):
             until_low, until_high, after = state
             constant, slope, facing = line
+            # A line takes over where its gap to the envelope closes: from the least a line that
+            # falls against it, from the largest one that rises against it.
             value = dr.fma(slope, x, constant)
             nearing = dr.select(facing, envelopes.least[1] - slope, slope - envelopes.largest[1])
             # Below 0 where rounding has let a crossing pass: the earliest is still
@@ -273,6 +291,7 @@ class LightPaths:
             after = _replaced(after, number, line, less, more)
             return dr.select(less, at, until_low), dr.select(more, at, until_high), after
 
+        # For points within the medium the next plane shares an edge with the present one.
         never = dr.full(type(x), dr.inf, dr.width(x, low))
         state = never, never + 0, envelopes
         if self.own:
@@ -287,10 +306,15 @@ class LightPaths:
         """
         Float = type(x)
         if envelopes is None:
+            # The chord of a sphere changes like a root: `_smooth_chord` limits the panel, and 1
+            # stands for the rate.
             longest = dr.select(self.active, self._smooth_chord(x), dr.inf)
             return dr.select(self.active, Float(1), 0), longest
         first, last = envelopes.ends(x)
         meets = self.active & (last > first)
+        # `rising` is the rate of the logarithms of 1 + w e_0 and 1 + w e_1 together, and no
+        # fraction of r changes faster than that; r itself grows by 1 m a metre at most. A panel
+        # ends where 1 + e has changed by about half of itself.
         w = self.w
         rising = dr.abs(envelopes.least[1]) / (1 + w * last)
         rising += dr.select(first > 0, dr.abs(envelopes.largest[1]) / (1 + w * first), 0)
@@ -307,6 +331,7 @@ class LightPaths:
         whose divisor is taken for |D|^2: panels end before it changes by much. The second term
         counts where the first is none: where a segment begins with the longest chord of its paths.
         """
+        # f, and the coefficients of its change: linear in t, `rate`, and square, `bend`.
         radius, away, w = self.bounded.radius, self.away(x), self.w
         cross = dr.cross(dr.fma(self.direction, x, self.start), self.toward)
         turned, square = dr.cross(self.direction, self.toward), dr.squared_norm(away)
@@ -315,9 +340,11 @@ class LightPaths:
             2 * (dr.dot(cross, turned) + w * distance * dr.dot(away, self.direction)) / square
         )
         bend = dr.abs(dr.squared_norm(turned) - w * distance) / square
-        change = _STEEP * dr.maximum(radius * radius - distance, 0)
+        # The length t at which rate t + bend t^2 is a fifth of q^2, in a form that does not cancel;
+        # from 0.002 to 0.25 of the radius.
+        change = 0.2 * dr.maximum(radius * radius - distance, 0)
         length = 2 * change / (rate + dr.sqrt(dr.fma(rate, rate, 4 * bend * change)))
-        return dr.select(change > 0, dr.clip(length, _LEAST * radius, _MOST * radius), dr.inf)
+        return dr.select(change > 0, dr.clip(length, 0.002 * radius, 0.25 * radius), dr.inf)
 
     def grazed_at(self) -> tuple[Any, ...]:
         """Return where the points lie whose paths graze a sphere: two distances or
@@ -325,6 +352,8 @@ class LightPaths:
         """
         if not self.round:
             return ()
+        # |p x M|^2 - R^2 |D|^2 is a t^2 + 2 half t + c along the ray, with a and c as in `ends`.
+        # Its discriminant is `inner`, the product of the module; `outside` is |M|^2 - w R^2.
         w, toward, start, direction = self.w, self.toward, self.start, self.direction
         square = dr.square(self.bounded.radius)
         away = toward - start if w else toward
@@ -338,13 +367,14 @@ class LightPaths:
         inner = square * dr.squared_norm(dr.cross(away, direction))
         inner = outside * (inner - dr.square(dr.dot(toward, dr.cross(start, direction))))
         half = dr.fma(w * square, dr.dot(away, direction), dr.dot(cross, turned))
+        # One root is t/a, the other c/t: neither cancels.
         t = -(half + dr.mulsign(dr.sqrt(dr.maximum(inner, 0)), half))
         ends = (
             t / dr.fma(-w, square, dr.squared_norm(turned)),
             (dr.squared_norm(cross) - square * dr.squared_norm(away)) / t,
         )
-        there = self.active & (inner > 0)
-        return tuple(dr.select(there & dr.isfinite(x), x, dr.inf) for x in ends)
+        grazed = self.active & (inner > 0)
+        return tuple(dr.select(grazed & dr.isfinite(x), x, dr.inf) for x in ends)
 
     def near_segment(self, x0, x1):
         """Return whether paths to points of a segment may meet the medium;
@@ -363,6 +393,8 @@ class LightPaths:
             height = dr.dot(point, normal)
             return (height < 0) & (dr.square(height) > beyond * dr.squared_norm(normal))
 
+        # The normals, in this order: across the plane of ray and light, from the ray away from the
+        # light, and across the first and the last path, away from the other one.
         beside = dr.square(dr.dot(point0, plane)) > beyond * dr.squared_norm(plane)
         behind = outside(point0, dr.cross(self.direction, plane))
         before = outside(point0, dr.cross(plane, first))
@@ -376,6 +408,8 @@ class LightPaths:
         away = self.away(type(self.start.x)(0))
         square, along = dr.squared_norm(away), -dr.dot(self.start, away)
         beyond = dr.square(1.001 * self.bounded.radius)
+        # The place of the path, from the point at 0 to the light at 1, that is nearest to the
+        # centre.
         nearest = dr.maximum(along / square, 0)
         nearest = dr.minimum(nearest, 1) if self.w else nearest
         return dr.squared_norm(dr.fma(away, nearest, self.start)) < beyond
@@ -386,6 +420,7 @@ class LightPaths:
         """
         values = dr.gather(four_numbers(type(self.start.x)), planes, number, active)
         normal, offset = values.xyz, values.w
+        # N = n . L - w c, and e = (c - n . P)/N of the module, with the centre as the origin.
         facing = dr.dot(normal, self.toward) - self.w * offset
         # A plane along the light is tilted a little.
         tilt = 16 * dr.epsilon(type(facing)) * (self.bounded.radius if self.w else 1)
@@ -414,12 +449,13 @@ class LightPaths:
         """Return a state after the planes that share an edge with one."""
         sides = self.bounded.sides
 
+        # Planes of neighbours are side by side in a table of their own: one read each.
         def at(side, state):
             place = plane * sides + side
             number = dr.gather(mi.UInt32, self.bounded.neighbours, place, self.active)
             return step(number, self._line(self.bounded.beside, place, self.active), state)
 
-        if sides <= _UNROLLED:
+        if sides <= 4:  # as many as facets of boxes have: no loop
             for side in range(sides):
                 state = at(side, state)
             return state
@@ -453,6 +489,8 @@ def paths_from(
         path = LightPaths(
             bounded, light.w, toward, origin - bounded.centre, direction, active, own=number == own
         )
+        # Paths to points within a medium always meet it. Others are left out where the triangle of
+        # all paths to the segment lies beside the medium's sphere.
         if segment is not None and not path.own:
             path = replace(path, active=active & path.near_segment(*segment))
         paths.append(path)
@@ -474,10 +512,13 @@ def chord(bounded: BoundedMedium, origin, direction) -> tuple[Any, Any]:
     """
     start = origin - bounded.centre
     nearest, across = -dr.dot(start, direction), dr.norm(dr.cross(start, direction))
+    # A sphere: half of the chord as a product, which does not cancel for grazing rays.
     if bounded.planes is None:
         half = dr.sqrt(dr.maximum((bounded.radius - across) * (bounded.radius + across), 0))
         begin, end = dr.maximum(nearest - half, 0), nearest + half
     else:
+        # A polyhedron: the ray is the path of a light at infinity in its direction. Rays that miss
+        # the sphere around it need no walk.
         near = (across < 1.001 * bounded.radius) & (nearest > -1.001 * bounded.radius)
         path = LightPaths(bounded, 0.0, direction, start, dr.zeros(type(direction)), near)
         begin, end = path.ends_at(type(across)(0))
@@ -490,10 +531,14 @@ def _value(line: tuple[Any, Any], x):
     return dr.fma(line[1], x, line[0])
 
 
-def _replaced(found: Envelopes, number, line, less, more) -> Envelopes:
+def _replaced(envelopes: Envelopes, number, line, less, more) -> Envelopes:
+    """Return envelopes with a line where it is `less` than the least or `more` than the largest."""
     least, largest = (
         (dr.select(chosen, line[0], old[0]), dr.select(chosen, line[1], old[1]))
-        for chosen, old in ((less, found.least), (more, found.largest))
+        for chosen, old in ((less, envelopes.least), (more, envelopes.largest))
     )
-    planes = (dr.select(less, number, found.planes[0]), dr.select(more, number, found.planes[1]))
+    planes = (
+        dr.select(less, number, envelopes.planes[0]),
+        dr.select(more, number, envelopes.planes[1]),
+    )
     return Envelopes(least, largest, planes)

@@ -48,7 +48,7 @@ class Rays:
 class Medium(ABC):
     """The base class of media, which are frozen dataclasses; see the page of this room."""
 
-    albedo: Any  #: single-scattering albedo, RGB [1]; its type is that of colours
+    albedo: Any  #: single-scattering albedo, RGB [1]; its type is the type of colours
     phase: Any  #: the phase function
     sums_depth = False  #: whether depths are walks, so that a march adds those of its steps up
     clear = False  #: whether nothing scatters or absorbs but bounded media
@@ -107,8 +107,16 @@ class Medium(ABC):
         """
 
     def rays(self, origin, direction, aim=None) -> Rays:
-        """Return rays [m] of unit directions, with what the medium finds of them once;
-        `aim` has twice their digits.
+        """Return rays with what the medium finds of them once.
+
+        Parameters
+        ----------
+        origin
+            Where they start, one for all rays or one each [m].
+        direction
+            Unit directions.
+        aim
+            The directions in float64; None: the unit directions.
         """
         return Rays(origin, direction, direction if aim is None else aim, ())
 
@@ -123,6 +131,7 @@ class Medium(ABC):
         active
             The lanes to compute.
         """
+        # A light at infinity: the ray from the point against its direction, without end.
         if not getattr(light, "w", 1):
             return self.optical_depth(
                 self.rays(point, -light.axis), 0, dr.full(type(point.x), dr.inf)
@@ -143,8 +152,8 @@ class Medium(ABC):
 
     @property
     def unit(self) -> Any:
-        """What `source` and all integrals of it leave out because it is the same
-        everywhere: by default nothing.
+        """The factor that is the same everywhere, which `source` and all integrals of it leave out:
+        by default 1.
         """
         return 1
 
@@ -154,6 +163,7 @@ class Medium(ABC):
 
         `uniform` steps need an end; those in the angle at a light have it at infinity.
         """
+        # Behind the optical reach nothing is left, and uniform steps would be wasted.
         return x0, dr.minimum(x1, x0 + self.length_of(OPTICAL_REACH)) if uniform else x1
 
     def last_depth(self, origin, forward) -> Any:
@@ -215,16 +225,18 @@ class Medium(ABC):
 
         `camera`: the optical depths from the camera by channel, where they are known.
         """
+        # The depths of both paths add up before the one exponential.
         depths = (
             self.optical_depth(rays, 0, x) if camera is None else camera,
             self.depth_to_light(light, rays.at(x), r),
         )
-        return self.transmittance([before + own for before, own in zip(*depths, strict=True)])
+        return self.transmittance([before + after for before, after in zip(*depths, strict=True)])
 
     def radiance(self, light: Light, integral) -> Any:
         """Return the radiance of an integral of `source` exp(-tau)/r^2 dx [W/(m^2
         sr)] (DESIGN section 2).
         """
+        # Phase functions have the mean 1: 1/(4 pi) makes them densities over the sphere.
         return light.intensity * (self.unit * (integral * (0.25 * dr.inv_pi)))
 
 
@@ -266,16 +278,27 @@ class LitRays:
         return dr.zeros(type(self.medium.albedo), width)
 
     def segment(self, distance) -> tuple[Any, Any]:
-        """Return the part of the rays that the light could reach, up to a distance,
-        in the cone of a spot [m].
+        """Return the part of the rays that the light could reach, in the cone of a spot [m].
+
+        Parameters
+        ----------
+        distance
+            How far the rays go [m]; it may be infinite.
         """
         return self.geometry.lit_segment(type(distance)(0), distance)
 
     def airlight(self, x0, x1):
-        """Return the integral over lit segments [x0, x1] [m], any that a light could
-        reach; `x1` may be infinite.
+        """Return the integral over lit segments, in parts of `Medium.unit`.
+
+        Parameters
+        ----------
+        x0, x1
+            Ends of segments without shadow [m]; `x1` may be infinite. The part that the light could
+            not reach is left out.
         """
         medium, rays = self.medium, self.rays
+        # The part of the segment that is lit and in the medium. Depths of its panels count from
+        # where it begins; the transmittance up to there is a factor.
         x0, x1 = self.within(*self.geometry.lit_segment(x0, x1))
         return medium.transmittance(medium.optical_depth(rays, 0, x0)) * self.sum(
             integral(self, x0, x1)
@@ -325,9 +348,10 @@ class LitRays:
     def shines(self, depths) -> Any:
         """Return whether something is left of the light behind panels.
 
-        Twice the usual reach: out of thick fog the way to the light may lose more depth
-        than the camera's gains.
+        The reach is twice the usual one: on the way out of thick fog the depth to the light may
+        fall by more than the depth to the camera grows.
         """
+        # The least of the channels: panels go on as long as one channel has light.
         return reduce(dr.minimum, depths) < 2 * optical_reach(type(depths[0]))
 
     def panel(self, start: Start, depths) -> tuple[Any, Callable[[Node], list[Any]], Any]:
@@ -335,17 +359,21 @@ class LitRays:
         medium, rays, light = self.medium, self.rays, self.light
 
         def after(x):
+            # Only the depth from the beginning of the panel is computed again, not that from the
+            # camera.
             return [
                 depth + more
                 for depth, more in zip(depths, medium.optical_depth(rays, start.x, x), strict=True)
             ]
 
         def values(node: Node) -> list[Any]:
+            # sigma_s p exp(-tau_camera - tau_light); the weight of the node holds 1/r^2.
             source = medium.source(
                 rays, node.x, lambda phase: phase.evaluate_half(node.down, node.up)
             )
             return [source * medium.both_ways(rays, node.x, light, node.r, after(node.x))]
 
+        # The medium limits the change of depths and extinction, `start` the width for the lobe.
         end = start.end(1 / medium.longest(rays, light, start.x, CHANGE))
         return end, values, after(start.foot + end)
 
@@ -358,12 +386,19 @@ class LitRays:
         return self.airlight(type(x)(0), x)
 
     def source(self, x, camera: Sequence[Any] | None = None):
-        """Return the integrand at distances x [m], exp(-tau) p/r^2 times what
-        `Medium.source` does not leave out.
+        """Return the integrand where the light is visible, in parts of `Medium.unit`.
 
-        `camera`: see `Medium.both_ways`.
+        It is exp(-tau)/r^2 times `Medium.source`, times the profile of a spot or a light sample.
+
+        Parameters
+        ----------
+        x
+            Distances along the rays [m].
+        camera
+            The optical depths from the camera by channel, where they are known.
         """
         light, medium = self.light, self.medium
+        # 1/r^2, or 1 for a light at infinity, whose source is not divided by r^2.
         s = x - self.geometry.foot
         square = dr.fma(s, s, dr.square(self.geometry.height)) if light.w else type(x)(1)
         inverse = dr.rsqrt(square)
@@ -371,10 +406,12 @@ class LitRays:
         value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(
             self.rays, x, light, r, camera
         )
+        # The profile of a spot or a light sample; other lights have none.
         return value * (strength * self.geometry.falloff(light, x) if light.varies else strength)
 
     def angle(self, s, r) -> Angle:
         """Return the angle by which light is scattered at s = x - foot and r from the light [m]."""
+        # Light travels away from the light, so the cosine of the scattering angle is -s/r.
         if self.light.w:
             return lambda phase: phase.evaluate(-s / r)
         # Narrow lobes need both halves of the angle between ray and light, which is one for a ray.
@@ -383,7 +420,7 @@ class LitRays:
         return lambda phase: phase.evaluate_half(down, up)
 
     def radiance(self, integral):
-        """Return the radiance of an integral [W/(m^2 sr)]."""
+        """Return the radiance of an integral, as `airlight` returns it, RGB [W/(m^2 sr)]."""
         return self.medium.radiance(self.light, integral)
 
 
@@ -405,7 +442,7 @@ class Homogeneous(Medium):
     @property
     def vacuum(self):
         """Whether an extinction is 0."""
-        return any(float(own[0]) == 0 for own in self.sigma_t)
+        return any(float(sigma[0]) == 0 for sigma in self.sigma_t)
 
     def extinction(self, rays, x):
         """Return sigma_t [1/m]."""
@@ -420,9 +457,10 @@ class Homogeneous(Medium):
         return depth / self.least_extinction()
 
     def longest(self, rays, light, x, change):
-        """Return `change` over twice the largest extinction: to the light the way may
-        grow as to the camera [m].
+        """Return `change` over twice the largest extinction [m]: the way to the light may grow as
+        fast as the way to the camera.
         """
+        # r grows by 1 m a metre at most, as x does.
         return change / (2 * reduce(dr.maximum, self.sigma_t))
 
     def depth_to_light(self, light, point, r, active=True):
@@ -444,9 +482,10 @@ class Homogeneous(Medium):
 
     def thicker(self, factor):
         """Return it with the extinction times a factor."""
+        # Opaque again: a frame with the other extinction runs the code that was recorded.
         return replace(
             self,
-            sigma_t=tuple(dr.opaque(type(own), factor * float(own[0])) for own in self.sigma_t),
+            sigma_t=tuple(dr.opaque(type(each), factor * float(each[0])) for each in self.sigma_t),
         )
 
     def per_extinction(self, function: Callable[[Any], Any]):
