@@ -3,8 +3,8 @@
 
 A slice has a fixed number of samples at equal steps from where it enters the image to where it
 leaves. One in `step` is computed, and both sides of every break of the depth between two of them;
-the others are interpolated along the slice (Yusov 2013). Which are computed is a bit each, 32 to a
-word, so the nearest on either side is found by counting bits.
+the others are interpolated along the slice (Yusov 2013). A bit says whether a sample is computed,
+32 bits to a word, so the nearest computed samples are found by counting bits.
 
 A pixel lies between two slices and on each between two samples. It takes the mean of the four,
 weighted by their nearness and by how well their depths agree with its own. Where none agrees it has
