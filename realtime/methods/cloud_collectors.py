@@ -224,8 +224,8 @@ class _Entry:
 
 
 def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene], CloudState]:
-    # Each sun has a map of each cloud, and depths where clouds have densities; their room is counted
-    # before any is made.
+    # Each sun has a map of each cloud, and depths where clouds have densities; their room is
+    # counted before any is made.
     filled, clouds = scene.medium.clouds, len(scene.boundaries)
     assert filled is not None
     suns = beams_of(scene.lights, parameters.sky, filled)
@@ -563,8 +563,8 @@ def _reaching(
     centre, fraction = entry.point + collector.centre, Float(1)
 
     def behind(number, fraction):
-        # Another cloud attenuates the part of the collector's width that lies in its shade, over the
-        # mean length there; the collector's own cloud does not shade it.
+        # Another cloud attenuates the part of the collector's width that lies in its shade, over
+        # the mean length there; the collector's own cloud does not shade it.
         cover, length = shade(of_sun.of_cloud(number), centre, collector.width)
         attenuated = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
         return number + 1, dr.select(number == entry.cloud, fraction, fraction * attenuated)

@@ -223,8 +223,8 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
 
 def mean_cosine(phase: Phase, Float: Any) -> float:
     """Return the mean cosine of a phase function [1]; `Float` is the type of its arrays."""
-    # The midpoint rule with 20 000 steps in u, the root of the angle over pi. A lobe about 0 degrees
-    # then has many steps: theta = pi u^2, d theta ~ u du.
+    # The midpoint rule with 20 000 steps in u, the root of the angle over pi. A lobe about 0
+    # degrees then has many steps: theta = pi u^2, d theta ~ u du.
     angles = 20_000
     root = (np.arange(angles) + 0.5) / angles
     angle = np.pi * root**2

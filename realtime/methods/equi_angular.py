@@ -109,7 +109,8 @@ def _sample(view: View, light: Light, at: Any) -> Any:
     """Return the radiance of one sample of a light, at a fraction of the
     angle at it [W/(m^2 sr)].
     """
-    # One step in the angle over the whole ray: its width is theta_1 - theta_0, its stretch dx/dtheta.
+    # One step in the angle over the whole ray: its width is theta_1 - theta_0, its stretch
+    # dx/dtheta.
     rays = view.lit_by(light)
     span = marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(at, span.width, span.begin))

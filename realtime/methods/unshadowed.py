@@ -114,8 +114,8 @@ class Unshadowed(Method):
         radiance = arriving * medium.ambient(view, end)
         if self.form != "quilez":
             return radiance
-        # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel. Up to
-        # tau = 1e-4, where the divisor cancels, the quotient 1 + tau/2 is taken for 1.
+        # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel.
+        # Up to tau = 1e-4, where the divisor cancels, the quotient 1 + tau/2 is taken for 1.
         depths = medium.optical_depth(view, 0, end)
         corrections = [
             dr.select(tau > 1e-4, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), 1) for tau in depths

@@ -121,8 +121,8 @@ class MinMax(Method):
         if not scene.features.shadows:
             return
         map, slices, samples = self.map, self.slices, self.samples
-        # The maps of all lights exist at once, each as distances and as heights. Slices are made for
-        # one light after another, so the largest count.
+        # The maps of all lights exist at once, each as distances and as heights. Slices are made
+        # for one light after another, so the largest count.
         map_bytes = sum(2 * map_memory(light, map) for light in scene.lights)
         slice_bytes = (
             _memory_of_slices(scene.camera, light, map, slices, samples) for light in scene.lights

@@ -127,8 +127,8 @@ def slice_coordinate(slices: Slices, i, j):
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
-    # The half line from E leads along (-di, -dj) and leaves the image through the side that it meets
-    # first: `to_i` steps reach the left or right side, `to_j` the top or bottom.
+    # The half line from E leads along (-di, -dj) and leaves the image through the side that it
+    # meets first: `to_i` steps reach the left or right side, `to_j` the top or bottom.
     to_i = dr.select(di < 0, x - i, x + i) / dr.abs(di)
     to_j = dr.select(dj < 0, y - j, y + j) / dr.abs(dj)
     t = dr.minimum(to_i, to_j)

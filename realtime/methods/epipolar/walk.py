@@ -128,9 +128,9 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(s0, s1)
     all_dark = dr.maximum(g0, g_end) < height * dr.minimum(s0, s1)
     whole, leaf = all_lit | all_dark, walk.level == 0
-    # Within a leaf, from end to end. The walk knows whether the ray is lit at the beginning, so d0 is
-    # the size of the difference alone: rounding cannot turn it round. The sign of d1 says whether
-    # the ray is lit at the end.
+    # Within a leaf, from end to end. The walk knows whether the ray is lit at the beginning, so d0
+    # is the size of the difference alone: rounding cannot turn it round. The sign of d1 says
+    # whether the ray is lit at the end.
     d0, d1 = dr.abs(g0 - height * s0), g1 - height * s1
     lit = dr.select(whole, all_lit, d1 >= 0)
     passed = whole | leaf

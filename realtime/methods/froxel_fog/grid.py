@@ -216,8 +216,8 @@ def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
     """
     Float, camera = type(view.distance), view.camera
     row, column = row_and_column(camera, view.pixel)
-    # (u, v) counts columns from the middle of the first one; a pixel behind the last slice takes the
-    # value at its end.
+    # (u, v) counts columns from the middle of the first one; a pixel behind the last slice takes
+    # the value at its end.
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)

@@ -60,8 +60,8 @@ def frame_shift(view: View) -> tuple[Any, Any, Any]:
     """Return by how much the samples of a frame are moved from the middles of
     froxels, in parts of a froxel.
     """
-    # n/g, n/g^2 and n/g^3 modulo 1 as whole numbers of 32 bits, which wrap by themselves; taken with
-    # a sign they lie from -1/2 to 1/2.
+    # n/g, n/g^2 and n/g^3 modulo 1 as whole numbers of 32 bits, which wrap by themselves; taken
+    # with a sign they lie from -1/2 to 1/2.
     growth = 1.2207440846057596  # g^4 = g + 1
     steps = tuple(round(2**32 / growth**power) % 2**32 for power in (1, 2, 3))
     Float, begin = type(view.distance), view.random.of_run()
