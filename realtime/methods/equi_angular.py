@@ -5,13 +5,13 @@ Let N lights have the airlight L_i along a ray. Light i is chosen with the proba
 fraction of the power. Let theta be an even random angle at light i between theta_0 and theta_1, the
 angles of the ends of the ray, and x = foot + h tan theta. Then
 
-    L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],        f_i the integrand with the visibility.
+    L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],
 
-One sample therefore has the mean L, and it is bounded: dx/dtheta / r^2 = 1/h leaves the product of
-exponential, phase and visibility (Kulla and Fajardo 2012, section 4). Sample k of S takes the
-fraction (k + c)/S of the power, c the shift of the pattern, and another place for each k, by the
-step of Roberts' sequence in one dimension of two; the mean of all stays the integral, since each
-sample alone is right in the mean.
+with f_i the integrand with the visibility. One sample therefore has the mean L, and it is bounded:
+dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and visibility (Kulla and Fajardo
+2012, section 4). Sample k of S takes the fraction (k + c)/S of the power, c the shift of the
+pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the
+mean of all stays the integral, since each sample alone is right in the mean.
 
 Lights of different structure (points, spots, samples of area lights) are in separate tables, and
 one of each is sampled. Lights at infinity have one sample each, even in the distance.
