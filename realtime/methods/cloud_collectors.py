@@ -358,7 +358,7 @@ def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> La
                 state.escapes, light, rays, view.visible if view.features.shadows else None
             )
             by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
-    # The clouds' own opacity is that of the full density, and not of the one without the peak.
+    # Clouds are as opaque as their full density makes them, with the peak.
     opacity = parameters.opacity_along(rays, state.stride)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
     extra = dict(zip(ORDER_LAYERS, by_set)) | {OPACITY: opacity} if view.extra_layers else None
@@ -444,8 +444,9 @@ def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
     """Return clouds without the peak of their phase functions, which scatter once as
     much as those with it (TMS).
     """
-    # With the density (1 - a f) sigma_t and the albedo a/(1 - a f), their product and so the light
-    # scattered once is that of the cloud; only its way is less dense. A grey cloud has one channel.
+    # With the density (1 - a f) sigma_t and the albedo a/(1 - a f), their product, and with it the
+    # light scattered once, is the cloud's; only the way through is less dense. A grey cloud has one
+    # channel.
     channels = range(len(state.extinction_factor))
     sigma_t = tuple(
         clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.extinction_factor[c]

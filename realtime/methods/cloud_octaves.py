@@ -185,7 +185,8 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     )
     suns = beams_of(view.lights, parameters.sky, clouds)
     beams = [_beam(view, state, number, parameters) for number in suns]
-    # By sun and octave the integral with a^n and P_n; the sum over the suns is that of an octave.
+    # By sun and octave the integral with a^n and P_n; the sum over the suns is the light of the
+    # octave.
     by_light = light_once(rays, beams, steps=parameters.steps, stride=state.stride)
     by_octave = [sum(radiances) for radiances in zip(*by_light)]
     # Octave n has the factor b^n.

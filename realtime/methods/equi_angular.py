@@ -88,8 +88,8 @@ class EquiAngular(Method):
         return Layers(total)
 
     def _mean(self, sample: Any, place: Any, choice: Any, like: Any) -> Any:
-        """Return the mean of samples, each a function of where it lies and of which
-        light it takes, from 0 to 1.
+        """Return the mean of samples; each is a function of its place on the ray and of the
+        fraction of the power at which its light stands, both from 0 to 1.
         """
         if self.samples == 1:
             return sample(place, choice)

@@ -40,7 +40,7 @@ _CLASSES: Mapping[str, tuple[str, str]] = {
     "cloud-collectors": ("airlight.realtime.methods.cloud_collectors", "CloudCollectors"),
 }
 
-#: Those of light that is scattered once, in any scene, without random numbers by default.
+#: Methods for light that is scattered once, in any scene, without random numbers by default.
 FOG_METHODS = (
     "unshadowed",
     "ray-march",
@@ -50,7 +50,7 @@ FOG_METHODS = (
     "froxel-fog",
     "soft-shafts",
 )
-#: Those that have the errors of a paper, to judge it.
+#: Methods with the errors of a paper, to judge the paper.
 PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010", "cloud-collectors-2008")
 
 

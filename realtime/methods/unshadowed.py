@@ -20,8 +20,8 @@ in these forms.
   `DirectionalInscatteringColor pow(saturate(dot), DirectionalInscatteringExponent) (1 - 2^-I)`, the
   exponent 4 by default.
 
-The depth is that of the scene's medium. Unreal's two terms of a series near level rays (8e-6 of the
-depth) and its FogMaxOpacity, StartDistance and cut-off are left out.
+The depth is the optical depth of the scene's medium. Unreal's two terms of a series near level rays
+(8e-6 of the depth) and its FogMaxOpacity, StartDistance and cut-off are left out.
 """
 
 from dataclasses import dataclass

@@ -352,7 +352,7 @@ def user_errors(what: str, file: str | None = None) -> Iterator[None]:
         yield
     except InputError:  # what it refuses by name
         raise
-    # The user's code may raise anything, and end the program: that is his to repair,
+    # The user's code may raise anything, and end the program: the author repairs that, and it is
     # never a failure of ours.
     except (Exception, SystemExit) as error:
         root = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop

@@ -152,7 +152,7 @@ def no_value(like):
 def between_samples(samples: Samples, values, point, depth):
     """Return the values of pixels from those of samples.
 
-    `samples`, `values`: the samples; by sample the values of those that are marked; `point`: image
+    `samples`: the samples; `values`: the values of the marked samples, by sample; `point`: image
     points (i, j) of the pixels; `depth`: their distances [m]. Returns `value`: the weighted mean;
     `fits`: whether enough of the samples agree in their depth.
     """

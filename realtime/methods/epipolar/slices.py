@@ -9,12 +9,12 @@ point
 
     (a, b, c) = (v . left / |left|^2,  v . up / |up|^2,  v . forward),
 
-and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 that of the
-point opposite. From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so that E may
-lie at infinity. A side of the image "faces away" from E if E lies on the inner side of it. The
-sides that do are a connected part of the border: all four where E is in the image, one to three
-otherwise. Slices leave the image at equal steps of length along them (Yusov 2013), and so each
-pixel lies on one half line from E, which leaves the image at a place along the border.
+and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 the image
+of the point opposite. From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so
+that E may lie at infinity. A side of the image "faces away" from E if E lies on the inner side of
+it. The sides that do are a connected part of the border: all four where E is in the image, one to
+three otherwise. Slices leave the image at equal steps of length along them (Yusov 2013), and so
+each pixel lies on one half line from E, which leaves the image at a place along the border.
 
 In a slice e1 = -v/|v| leads from the light to the camera, or along the light, and e2 is at right
 angles to it, on the side of the rays. With the light at the origin the rays of a slice start at (D,

@@ -120,7 +120,7 @@ def column_rays(view: View, grid: Grid) -> Rays:
 
 def _frame_depth(view: View) -> Metres:
     """Return the depth of the farthest surface; where rays meet none, the depth behind which too
-    little light comes from to matter.
+    little light is scattered back to matter.
 
     Grids, and media in vacuum, end by themselves.
     """

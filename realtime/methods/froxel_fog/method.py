@@ -138,8 +138,7 @@ class FroxelFog(Method):
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.
 
-        With a column a pixel nothing is left of the columns' error; then what is
-        left is that of the slices.
+        With a column for each pixel the columns make no error; the error of the slices remains.
         """
         return (
             ("map", {"shadow": "ray"}),

@@ -154,7 +154,25 @@ def marched_integral(
 
 
 def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) -> Steps:
-    """Return the steps of rays where a light could reach them and something scatters."""
+    """Return the steps of rays where a light could reach them and something scatters.
+
+    Parameters
+    ----------
+    airlight
+        The rays and the light.
+    distance
+        Where each ray ends, may be infinite [m].
+    steps
+        The number of steps on every ray.
+    spacing
+        'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at
+        infinity both are uniform.
+
+    Returns
+    -------
+    steps
+        The steps; their width is 0 on a ray that has none.
+    """
     light, geometry = airlight.light, airlight.geometry
     # The part of the ray in which the medium scatters, and in it the part in the light's cone or on
     # its side; a light at infinity reaches all of it.

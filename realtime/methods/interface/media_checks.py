@@ -3,7 +3,7 @@
 shape under suns and a sky.
 
 Methods of fog ask the medium for the airlight of lit segments, so it has to be homogeneous, bounded
-by convex shapes, height fog, or a grid for those that march. Methods of clouds cast rays at
+by convex shapes, height fog, or, for methods that march, a grid. Methods of clouds cast rays at
 boundaries of any shape, under lights at infinity.
 """
 

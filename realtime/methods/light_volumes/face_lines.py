@@ -15,7 +15,7 @@ On the face of a directional light u, v and s are linear in x itself, so y = x w
 place of s; the ray is cut where s = 0, and all before the largest height is lit.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray
-that stays on the border of two faces is in one of them, that of the first axis: neighbours compute
+that stays on the border of two faces is in the face of the first axis alone: neighbours compute
 the same numbers there, with opposite signs. The line t goes over the part of it beyond the nearest
 height of the face: all before that is lit.
 """
@@ -105,7 +105,7 @@ def face_ray(heights: InverseDepthField, face, away, direction, segment) -> Face
             for x in (t0, t1)
         ]
         return _face_ray(begin, end, walks, ends, parallel=True)
-    # The line begins where the planar depth c comes up to that of the nearest surface.
+    # The line begins where the planar depth c reaches the depth of the nearest surface.
     nearest = nearer / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)
     walks = (t0 < t1) & (highest > 0)
@@ -180,14 +180,16 @@ class Line:
     right: Any  #: whether columns rise along it
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
-    cells: tuple[tuple[Any, Any], tuple[Any, Any]]  #: column and row of the texels that they lie in
-    #: how far below the height field a point at t = 1 may seem that lies on what it samples
+    cells: tuple[
+        tuple[Any, Any], tuple[Any, Any]
+    ]  #: column and row of the texels that the ends lie in
+    #: how far below the height field a point at t = 1 may seem although it lies on the surface
     slack: Any
 
 
 def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
-    """Return the line of a ray in a face; D at its ends is that of the texel
-    whose borders lie about them.
+    """Return the line of a ray in a face; D at either end is read in the texel whose borders lie
+    about that end.
     """
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)

@@ -152,7 +152,7 @@ def _on_diagonal(line: Line, over: Passage):
     its end where it does not.
     """
     ray, (column, row), (begin, end), four = line.ray, over.place, over.t, over.four
-    # On the diagonal v - u is that of the texel's corner, so t follows from one division.
+    # On the diagonal v - u is the same as at the texel's corner: t follows without a division.
     middle = ((ray.u[0] - column) - (ray.v[0] - row)) * ray.per_diagonal
     bends = (middle > begin) & (middle < end)
     middle = dr.select(bends, middle, end)
@@ -161,10 +161,8 @@ def _on_diagonal(line: Line, over: Passage):
 
 
 def _on_wall(line: Line, over: Passage):
-    """Return where the line crosses that between the parts of a texel, or its end,
-    and D as the parts have it.
-
-    Where the line enters, before and behind the wall, and where it leaves.
+    """Return where the ray's line crosses the line between the parts of a texel, or its end, and
+    D by the planes of the parts: where it enters, before and behind the wall, and where it leaves.
     """
     ray, (begin, end) = line.ray, over.t
     parts = parts_of(over.four, over.walls, type(ray.begin))

@@ -164,8 +164,8 @@ def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthFie
     """Return a height field with walls in its texels, and the bounds of its
     nodes as these need them.
 
-    `heights`: the height field; `walls`: the number of each texel; `texels`: those that may have
-    walls; some may be there more than once.
+    `heights`: the height field; `walls`: the number of each texel; `texels`: the numbers of
+    the texels that may have walls, some of them more than once.
     """
     bounds = heights.bounds + 0
     if dr.width(texels):

@@ -5,7 +5,7 @@ A ray goes over the faces of the map in the order in which it passes them. Over 
 (u, v) goes from node to node of the pyramid of bounds (`realtime.shadow_maps.inverse_depth_field`).
 With D(t) = s of the ray - height, a node over which the ray is above the largest height is lit as a
 whole, one over which it is below the least is dark; the ray steps to its neighbour, one level up
-where the border is that of the parent too. Into any other node it descends, down to the texels. In
+where the border is the parent's too. Into any other node it descends, down to the texels. In
 a texel it crosses the height field not at all, once, or twice
 (`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a
 whole (`realtime.intervals`). Crossings therefore come in the order of the ray.

@@ -9,8 +9,8 @@ values, and an image or None:
             the shader that nothing sets
     again   draws the same for some seconds, and answers with the time of each frame
 
-A time is the wall clock's from the first call to the end of `finish()` where the processor draws:
-the timer queries of llvmpipe are wrong. On a GPU it is that of a query.
+Where the processor draws, a time is the wall clock's from the first call to the end of `finish()`,
+as the timer queries of llvmpipe are wrong. On a GPU a timer query measures it.
 """
 
 import signal

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A user's shader as a method, named by its file: 'fog.glsl' (`realtime.methods.shader`).
 
-It is the same to frames, reports and the view as a method in Python. Its time is that of the device
-that OpenGL draws on, which has a name, and no part of it is Dr.Jit's.
+It is the same to frames, reports and the view as a method in Python. Its time is measured on the
+device that OpenGL draws on, which has a name; Dr.Jit has no part in it.
 """
 
 from dataclasses import dataclass, make_dataclass
@@ -158,7 +158,7 @@ def shader_method(name: str) -> type[Method]:
 def drawn_again(state: Any, seconds: float) -> tuple[str, list[float]]:
     """Return the name of the device that draws, and times of the same frame there again [ms].
 
-    `state`: that of a shader, which has drawn a frame; `seconds`: how long to draw.
+    `state`: the state of a shader that has drawn a frame; `seconds`: how long to draw.
     """
     host, _ = state
     said, _ = host.ask("again", seconds=seconds)

@@ -125,7 +125,7 @@ void main() {{
 def stage_text(
     source: ShaderSource, phase: str, settings: Mapping[str, Any], stage: Pass | None
 ) -> str:
-    """Return the whole text of a stage: that of a pass, or for None of the picture.
+    """Return the whole text of a stage: a pass, or None for the picture.
 
     `phase` is the text of `phase_text`, `settings` are the values of the shader's
     parameters by their names.

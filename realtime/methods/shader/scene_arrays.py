@@ -167,8 +167,8 @@ def uniforms(view: View) -> dict[str, Any]:
         g = float(host_numbers(phase.g)[0][0])
     elif isinstance(phase, Tabulated):
         p, c = phase_table(phase), np.linspace(-1, 1, dr.width(phase.values))
-        # c p is a parabola in each cell, of which Simpson's rule is exact: four times the
-        # middle is (c0 + c1)(p0 + p1).
+        # c p is a parabola in each cell, for which Simpson's rule is exact: four times the value in
+        # the middle is (c0 + c1)(p0 + p1).
         g = float(np.mean((c * p)[:-1] + (c * p)[1:] + (c[:-1] + c[1:]) * (p[:-1] + p[1:])) / 6)
     return {
         "resolution": [camera.width, camera.height],

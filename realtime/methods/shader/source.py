@@ -126,7 +126,7 @@ class ShaderSource:
         Raises
         ------
         InputError
-            With those that are not set.
+            With the names that are not set.
         """
         unset = [
             name for name in names if not re.search(_INITIAL.format(re.escape(name)), self.text)
@@ -142,12 +142,12 @@ class ShaderSource:
 
 
 def is_shader(name: str) -> bool:
-    """Return whether the name of a method is that of a shader's file."""
+    """Return whether the name of a method is the name of a shader's file."""
     return name.endswith(SUFFIX)
 
 
 def is_users(name: str) -> bool:
-    """Return whether the name of a method, or of a kernel, is that of a user's code."""
+    """Return whether the name of a method, or of a kernel, names a user's code."""
     return ":" in name or is_shader(name)
 
 

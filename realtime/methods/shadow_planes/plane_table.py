@@ -33,7 +33,7 @@ the order within an azimuth, in the layers gained, and in the order of the paper
 middles of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the light is a point there,
 without azimuths to span, and no plane; a ray along the light crosses none.
 
-In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is
+In both cases a plane has four numbers. Two of them give the quotient q, D/x or 1/x, which is
 positive ahead of the camera and falls along the ray. `plane_crossing` is the one place where they
 differ on the device.
 
@@ -43,8 +43,8 @@ Four numbers an edge, no division but one, and no test of depth against a triang
 axis, narrower than most planes: its list holds the planes at its azimuths and few others, and
 serves every ray there, so that nothing is sorted for a frame.
 
-**Order.** In a half plane of one azimuth phi all rays cross planes in one order, that of psi, hence
-of c = A cos(phi) + B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its
+**Order.** In a half plane of one azimuth phi all rays cross planes in one order: by psi, hence
+by c = A cos(phi) + B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its
 middle; where that is wrong for a ray the walk notices (`realtime.methods.shadow_planes.sweep`).
 
 **End.** With (w_x, w_y) = sin g (cos phi, sin phi) a plane is crossed at D/x = c sin g - cos g, so
@@ -352,8 +352,8 @@ def layers_between(
     if not len(number):
         return 0
 
-    # Triangles that the line crosses, by component: those that face the light
-    # and those that are averted.
+    # Triangles that the line crosses, by component: how many face the light and how many are
+    # averted.
     crossed = number[_crosses(occluders, number, (start, direction), reach)]
     sign = np.sign(occluders.normals[crossed] @ l - w * occluders.offsets[crossed])
     component = occluders.component[crossed]

@@ -15,9 +15,9 @@ which has no area; the count over a direction is whole.
 
 Layers:
 
-* a closed component counts its triangles that face the light, w = 1, or just as well those that are
-  averted: both have the same cycle. Edges between a facing and an averted triangle get c = +-1: the
-  silhouette of the paper.
+* a closed component counts its triangles that face the light, w = 1, or just as well its averted
+  triangles: both have the same cycle. Edges between a facing and an averted triangle get c = +-1:
+  the silhouette of the paper.
 * an open component (border edges, or faces that are not consistently oriented) counts all of its
   triangles, each turned to the light: w = +1 or -1. Its folds get c = +-2, its border edges c =
   +-1.

@@ -244,8 +244,8 @@ def _walk(sweep: _Sweep, active, *, places: int):
     def body(place, waiting, passed, lost):
         reads = place < count
         quotient, gain, crossed = _read(sweep, place, reads)
-        # Where nothing is crossed the queue stays as it is: infinitely near, that comes out again.
-        # Behind the last plane those that wait come out.
+        # Where nothing is crossed the queue stays as it is: an infinite quotient goes in and, as
+        # the nearest, comes out again. Behind the last plane the waiting crossings come out.
         moves = crossed | ~reads
         key, gain = dr.select(moves, quotient, dr.inf), dr.select(moves, gain, 0)
         waiting, nearest, gained = exchange(waiting, key, gain)

@@ -48,8 +48,10 @@ class SourceState:
 def source_state(
     scene: Any, lights: LightTable, size: int, *, with_maps: bool, for_surfaces: bool = True
 ) -> SourceState:
-    """Return the state of a source of some `lights`; `size` [texels] is that of its
-    maps, also `for_surfaces`.
+    """Return the state of a source of some `lights`.
+
+    `size`: texels on a side of its maps; `with_maps`: whether it needs any; `for_surfaces`: whether
+    points on surfaces ask them, not only points in the air.
     """
     light = lights.rows
     # A source of one point has no width and no samples that face anywhere; its state is one shadow
@@ -153,7 +155,8 @@ def _reached_of_sample(
     light = lights[number]
     away = place - light.position
     square = dr.squared_norm(away)
-    # Without shared samples those that face one way count alike: the fraction has N + 1 levels.
+    # Where pixels share no samples, samples that face one way count alike: the fraction has N + 1
+    # levels.
     alike = state.flat and not p.interleave
     weight = 1 if alike else dr.maximum(dr.dot(away, light.normal), 0) / (square * dr.sqrt(square))
     if not view.features.shadows:
