@@ -263,6 +263,8 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
         assert filled is not None
         depths = sun_depths(surfaces, filled, scene.lights, stride=stride)
         settings = {"body": body, "threshold": parameters.threshold, "stride": stride}
+        # The finest level of each cloud by itself, then all levels of the sun's map from them. The
+        # number of a cloud is opaque, so that all clouds share one compiled kernel.
         maps = tuple(
             filtered_map(
                 [

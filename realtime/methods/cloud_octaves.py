@@ -64,6 +64,7 @@ def _check_phase(words: Any) -> None:
         raise InputError(
             f"phase: got {words!r}, expected scene, isotropic, hg:G or hg-draine:DIAMETER [um]"
         )
+    # `named_phase` checks the diameter of a droplet; the bounds of a mean cosine are checked here.
     if name == "hg" and not -1 < values[0] < 1:
         raise InputError(
             f"phase: got {words!r}, expected a mean cosine between -1 and 1, such as hg:0.85"
@@ -265,5 +266,6 @@ def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves)
     segment = segment_through(surfaces, clouds, light, stride=state.stride)
     if state.depths:
         segment = segment_by_lengths(clouds, [of_cloud.at for of_cloud in state.depths[number]])
+    # Opaque shapes hide the light at each step, where there are any.
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     return Beam(light.intensity, tuple(scales), tuple(phases), segment, lit)

@@ -121,6 +121,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
                 "function of the scene"
             )
 
+        # Both calls of the author's code have their errors named, in the file of `prepare`.
         def run(now):
             with user_errors(f"method {name}", _file(prepare)):
                 return make_state(now)
@@ -128,6 +129,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
         return run
 
     def render(self, view, state, kernel):
+        # The function has the state as `view.prepared`, and a kernel where it takes one.
         given = values(self) | ({"kernel": kernel} if takes_kernel else {})
         with user_errors(f"method {name}", _file(function)):
             returned = function(replace(view, prepared=state), **given)
@@ -139,6 +141,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
         "source": _file(function) or "the user",
         "uses_kernel": takes_kernel,
         "casts_rays": True,
+        # A frame is recorded only if the author says that it can be.
         "frozen": bool(getattr(function, "frozen", False)),
         "by_rays": bool(getattr(function, "by_rays", False)),
         "shadows": bool(getattr(function, "shadows", True)),

@@ -180,9 +180,8 @@ class Line:
     right: Any  #: whether columns rise along it
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
-    cells: tuple[
-        tuple[Any, Any], tuple[Any, Any]
-    ]  #: column and row of the texels that the ends lie in
+    #: column and row of the texels that hold the two ends
+    cells: tuple[tuple[Any, Any], tuple[Any, Any]]
     #: how far below the height field a point at t = 1 may seem although it lies on the surface
     slack: Any
 

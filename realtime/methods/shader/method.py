@@ -75,6 +75,7 @@ class Shader(Method):
             }
             for each in (*self.shader.passes, None)
         ]
+        # The driver's log of a mistake becomes a message with the line of the user's file.
         said, _ = host.ask("open", stages=stages)
         if "log" in said:
             raise InputError(f"method {self.name}: {self.shader.mistake(said['log'])}")

@@ -49,6 +49,7 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(
             f"the medium {what}: {wanted}; use ray-march, or write the method in Python"
         )
+    # A ray that meets nothing ends where little of its light is left: never, in a vacuum.
     if medium.vacuum:
         raise InputError(
             f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t "

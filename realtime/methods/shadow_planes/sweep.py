@@ -300,6 +300,7 @@ def _collect(sweep: _Sweep):
         # the pass ends, and the next begins at the first plane.
         nearest, at, gained = pop(nearest, 0, ~reads)
         crosses = ~reads & (at > 0)
+        # `ties` counts the crossings gone over at the last quotient, over all passes.
         ties = dr.select(crosses, dr.select(at == passed.quotient, ties + 1, 1), ties)
         passed = _pass_plane(sweep, passed, at, gained, crosses=crosses, due=mi.Bool(False))
         empty = ~reads & (at <= 0)
