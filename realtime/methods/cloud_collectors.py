@@ -239,7 +239,7 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
     )
     fillings, factors = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
-    # Every cloud is a scene of its own, in which rays of its sun meet nothing else.
+    # Every cloud is a scene of its own, so that the rays of its maps meet nothing else.
     bodies = [scene_of((shape,)) for shape in scene.boundaries]
     stride, threshold = (
         dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold)

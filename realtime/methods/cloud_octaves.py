@@ -149,8 +149,8 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
     """Return the function that makes the state of a frame."""
     clouds = scene.medium.clouds
     assert clouds is not None  # `media_checks` refuses the others
-    # Mean cosines take a quadrature on the host, and boundaries a structure of triangles: once for
-    # all frames.
+    # Mean cosines take a quadrature on the host, and boundaries a table of their facets: both are
+    # made once for all frames.
     Float = type(scene.camera.origin.x)
     means = [mean_cosine(phase, Float) for phase in _phases(clouds, parameters, Float)]
     uniform = len(beams_of(scene.lights, parameters.sky, clouds)) < len(scene.lights)

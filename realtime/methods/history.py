@@ -49,8 +49,8 @@ def with_history(method: type[Method]) -> type[Method]:
     def history(self) -> History:
         return History(*(getattr(self, name) for name in names))
 
-    # The class stays the method itself, so that frames find its other members; they read `history`
-    # to average its airlight.
+    # A class derived from the method has all of its members; frames read `history` to average its
+    # airlight.
     what = {
         "name": method.name + ENDING,
         "summary": f"{method.summary}; averaged over the frames before",

@@ -23,7 +23,6 @@ import mitsuba as mi
 from airlight.realtime.memory import check_memory
 from airlight.realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
 from airlight.realtime.methods.epipolar.samples import (
-    STEPS,
     WORD,
     Samples,
     between_samples,
@@ -107,7 +106,9 @@ class MinMax(Method):
         wanted=f"up to {_MOST}, or 0 for as many as the image needs",
     )
     step: int = parameter(
-        16, "every N-th sample is computed, besides those at breaks of the depth", choices=STEPS
+        16,
+        "every N-th sample is computed, besides those at breaks of the depth",
+        choices=(1, 2, 4, 8, 16, 32),
     )
     sampling: str = parameter(
         "slices",

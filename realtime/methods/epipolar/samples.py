@@ -27,7 +27,6 @@ from airlight.realtime.numerics.array_types import four_numbers
 from airlight.realtime.numerics.functions import cell_of
 
 WORD = 32  #: samples to a word of bits
-STEPS = (1, 2, 4, 8, 16, 32)
 AGREES = 0.1  #: relative difference of depths up to which there is no break
 
 
@@ -64,7 +63,6 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
         after = depth_at(first + b + 1)
         # Both sides of a break are computed: sample b differs from the one before it or behind it.
         breaks = _apart(before, here) | _apart(here, after)
-        # The depths move on by one sample, so each is read once.
         return b + 1, bits | (dr.select(breaks, mi.UInt32(1), 0) << b), after, here
 
     # Every `step`-th sample is marked from the start, in all words alike.

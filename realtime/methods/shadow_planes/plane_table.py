@@ -221,8 +221,8 @@ def wedge_lists(
             f"{NUMBER + 1} of {GAIN_ZERO - 1}: use simpler occluders, or light-volumes"
         )
 
-    # A wedge lists every plane that it meets. There are so many wedges that a plane spans four on
-    # average: then lists are a quarter longer than the planes at one azimuth.
+    # A wedge lists every plane that it meets. There are so many wedges that a plane spans at least
+    # four on average: then lists are up to a quarter longer than the planes at one azimuth.
     fine, least, most = 4, 1 << 6, 1 << 16
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
     count = (
