@@ -463,8 +463,6 @@ def checked_layers(
             f"method {name}: returned a {type(returned).__name__}; expected "
             "realtime.methods.interface.method.Layers"
         )
-    # One visibility for each light; with `by_source` the samples of an area light have one
-    # together.
     fractions = 0 if returned.visibility is None else len(returned.visibility)
     wanted = len(list(lights_apart(view.tables, by_source=by_source))) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
