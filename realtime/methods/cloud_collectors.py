@@ -203,8 +203,8 @@ class CloudState:
     surfaces: CloudSurfaces
     maps: tuple[LightMap | None, ...]  #: by light, None for a sky that is no beam
     fillings: tuple[Filling, ...]
-    #: by channel, what is left of the extinction of each cloud without the peak [1]
-    left: tuple[Any, ...]
+    #: by channel, the factor on the extinction of each cloud that cuts the peak, 1 - a f [1]
+    extinction_factor: tuple[Any, ...]
     stride: Any  #: longest step through a grid of densities [voxels]
     threshold: Any  #: density at the surface of a cloud with a grid [1]
     #: by sun and cloud, where clouds have densities
@@ -220,10 +220,12 @@ class _Entry:
 
     point: Any  #: on its boundary, or the camera within it [m]
     cloud: Any  #: its number
-    there: Any  #: whether there is one before the visible surface
+    hit: Any  #: whether the ray meets one before the visible surface
 
 
 def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene], CloudState]:
+    # Each sun has a map of each cloud, and depths where clouds have densities; their room is
+    # counted before any is made.
     filled, clouds = scene.medium.clouds, len(scene.boundaries)
     assert filled is not None
     suns = beams_of(scene.lights, parameters.sky, filled)
@@ -235,8 +237,9 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
         needed,
         "use a smaller map",
     )
-    fillings, left = _fillings(scene, parameters)
+    fillings, factors = _fillings(scene, parameters)
     surfaces = cloud_surfaces(scene)
+    # Every cloud is a scene of its own, so that the rays of its maps meet nothing else.
     bodies = [scene_of((shape,)) for shape in scene.boundaries]
     stride, threshold = (
         dr.opaque(Float, value) for value in (parameters.stride, parameters.threshold)
@@ -244,18 +247,24 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
     cast = Frozen(
         lambda bodies, lights: tuple(light_map(bodies, light, parameters.map) for light in lights)
     )
+    # A sky that is no beam is the only light that is not among the suns.
     escapes = sky_escapes(scene) if len(suns) < len(scene.lights) else None
 
     def state(scene: Scene) -> CloudState:
-        made = dict(zip(suns, cast(bodies, [scene.lights[number] for number in suns])))
-        maps = tuple(made.get(number) for number in range(len(scene.lights)))
-        return CloudState(surfaces, maps, fillings, left, stride, threshold, escapes=escapes)
+        # Suns move: their maps are cast for each frame, in one recorded function.
+        sun_maps = dict(zip(suns, cast(bodies, [scene.lights[number] for number in suns])))
+        maps = tuple(sun_maps.get(number) for number in range(len(scene.lights)))
+        return CloudState(surfaces, maps, fillings, factors, stride, threshold, escapes=escapes)
 
+    # The surface of a cloud with densities is where the density passes the threshold, found by a
+    # march along the light; the depths of the light come from a march too.
     def marched(scene: Scene) -> CloudState:
         filled = scene.medium.clouds
         assert filled is not None
         depths = sun_depths(surfaces, filled, scene.lights, stride=stride)
         settings = {"body": body, "threshold": parameters.threshold, "stride": stride}
+        # The finest level of each cloud by itself, then all levels of the sun's map from them. The
+        # number of a cloud is opaque, so that all clouds share one compiled kernel.
         maps = tuple(
             filtered_map(
                 [
@@ -273,9 +282,10 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
             )
             for light in scene.lights
         )
-        return CloudState(surfaces, maps, fillings, left, stride, threshold, depths, body)
+        return CloudState(surfaces, maps, fillings, factors, stride, threshold, depths, body)
 
     if density:
+        # The slab of a cloud with densities has their mean above the threshold.
         body = Float([density.mean_above(cloud, parameters.threshold) for cloud in range(clouds)])
         dr.make_opaque(body)
         return marched
@@ -285,62 +295,76 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
 def _fillings(
     scene: Scene, parameters: CloudCollectors
 ) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
-    """Return the fillings of clouds, each phase function and albedo once, and `CloudState.left`."""
+    """Return the fillings of clouds, each phase function and albedo once, and
+    `CloudState.extinction_factor`.
+    """
     clouds = scene.medium.clouds
     assert clouds is not None
+    # Where extinction and albedos are the same in all channels, one channel is searched.
     types = types_of(type(scene.camera.origin.x))
     phases = np.array(clouds.phase)
     albedos = np.array(clouds.albedo, dtype=np.float64).reshape(3, -1)
     grey = len(clouds.sigma_t) == 1 and np.all(albedos == albedos[0])
     albedos = albedos[:1] if grey else albedos
-    fillings, left = [], np.ones_like(albedos)
+    fillings, factors = [], np.ones_like(albedos)
+    # Each pair of a phase function and an albedo in any channel of any cloud is one medium of
+    # slabs, and one table of transport.
     for phase, albedo in sorted(
         {(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}
     ):
-        known = clouds.phases[phase]
-        fraction = parameters.cut(known, types)
+        phase_function = clouds.phases[phase]
+        # Without the fraction f the density has the factor 1 - a f, and the albedo of the orders
+        # from 2 on is a (1 - f)/(1 - a f).
+        fraction = parameters.cut(phase_function, types)
         filled = (phases == phase) & (albedos == albedo)
-        left[filled] = 1 - albedo * fraction
+        factors[filled] = 1 - albedo * fraction
         medium = (
-            slab_phase(known, types, modified=parameters.peak != "full"),
+            slab_phase(phase_function, types, modified=parameters.peak != "full"),
             albedo * (1 - fraction) / (1 - albedo * fraction),
         )
         transport = on_device(canonical_transport(*medium), types)
+        # None spares a search in a channel where no cloud is filled with it.
         by_channel = (mi.UInt32(row.astype(np.uint32)) if row.any() else None for row in filled)
         fillings.append(Filling(transport, tuple(by_channel)))
-    lefts = tuple(types.scalar(row) for row in left)
-    dr.make_opaque([filling.clouds for filling in fillings], lefts)
-    return tuple(fillings), lefts
+    factors_on_device = tuple(types.scalar(row) for row in factors)
+    dr.make_opaque([filling.clouds for filling in fillings], factors_on_device)
+    return tuple(fillings), factors_on_device
 
 
 def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> Layers:
     """Return the light of clouds along every ray [W/(m^2 sr)]."""
     Color = type(view.medium.albedo)
+    # Order 1 first, then a sum for each set of orders from 2 on.
     rays, thin_rays = _rays(view, state)
-    by_set, kept = (
+    by_set, collectors = (
         [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)],
         [],
     )
     entry = _entry(view, state, rays)
     suns = _suns(view, parameters)
     for number, sun in enumerate(suns):
-        last = view.carried[number] if view.carried is not None else None
-        orders = _many_times(view, state, thin_rays, entry, sun, last=last, parameters=parameters)
+        # The collectors of the last frame, where a search starts with them.
+        last_collectors = view.carried[number] if view.carried is not None else None
+        orders = _many_times(
+            view, state, thin_rays, entry, sun, last=last_collectors, parameters=parameters
+        )
         by_set[1:] = [
             sum_ + view.lights[sun].intensity * part
             for sum_, part in zip(by_set[1:], orders.by_set)
         ]
-        kept.append(orders.collectors)
+        collectors.append(orders.collectors)
     for number, light in enumerate(view.lights):
+        # The light of a uniform sky comes by orders as well, without a search.
         if state.escapes is not None and number not in suns:
             of_sky = sky_light(
                 state.escapes, light, rays, view.visible if view.features.shadows else None
             )
             by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
+    # Clouds are as opaque as their full density makes them, with the peak.
     opacity = parameters.opacity_along(rays, state.stride)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
     extra = dict(zip(ORDER_LAYERS, by_set)) | {OPACITY: opacity} if view.extra_layers else None
-    return replace(layers, extra=extra, carried=tuple(kept) if parameters.carries else None)
+    return replace(layers, extra=extra, carried=tuple(collectors) if parameters.carries else None)
 
 
 def _suns(view: View, parameters: CloudCollectors) -> list[int]:
@@ -356,9 +380,10 @@ def _rays(view: View, state: CloudState) -> tuple[CloudRays, CloudRays]:
     assert view.medium.clouds is not None
     clouds = view.medium.clouds
     thin = _without_peak(clouds, state)
-    both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
+    # One walk finds both depths: the channels without the peak come behind the full ones.
+    joined = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
     rays = cloud_rays(
-        state.surfaces, both, view.origin, view.direction, view.distance, stride=state.stride
+        state.surfaces, joined, view.origin, view.direction, view.distance, stride=state.stride
     )
     channels = len(clouds.sigma_t)
     thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
@@ -369,6 +394,8 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
     """Return where camera rays meet a cloud."""
     clouds = view.medium.clouds
     assert clouds is not None
+    # A cloud with densities is met where the density passes the threshold, others at their
+    # boundary. A camera in a cloud, whose first boundary is a way out, is itself the point.
     if clouds.density is not None:
         met = dense_surface(
             state.surfaces,
@@ -379,14 +406,14 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
             threshold=state.threshold,
             stride=state.stride,
         )
-        there = dr.isfinite(met.distance)
+        hit = dr.isfinite(met.distance)
         return _Entry(
-            view.origin + view.direction * dr.select(there, met.distance, 0), met.cloud, there
+            view.origin + view.direction * dr.select(hit, met.distance, 0), met.cloud, hit
         )
     first = rays.first
     begin = dr.select(first.leaves, 0, first.distance)
-    there = dr.isfinite(begin) & (begin < view.distance)
-    return _Entry(view.origin + view.direction * dr.select(there, begin, 0), first.cloud, there)
+    hit = dr.isfinite(begin) & (begin < view.distance)
+    return _Entry(view.origin + view.direction * dr.select(hit, begin, 0), first.cloud, hit)
 
 
 def _scattered_once(
@@ -419,11 +446,18 @@ def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:
     """Return clouds without the peak of their phase functions, which scatter once as
     much as those with it (TMS).
     """
-    channels = range(len(state.left))
+    # With the density (1 - a f) sigma_t and the albedo a/(1 - a f), their product, and with it the
+    # light scattered once, is the cloud's; only the way through is less dense. A grey cloud has one
+    # channel.
+    channels = range(len(state.extinction_factor))
     sigma_t = tuple(
-        clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.left[c] for c in channels
+        clouds.sigma_t[min(c, len(clouds.sigma_t) - 1)] * state.extinction_factor[c]
+        for c in channels
     )
-    albedo = [value / state.left[min(c, channels[-1])] for c, value in enumerate(clouds.albedo)]
+    albedo = [
+        value / state.extinction_factor[min(c, channels[-1])]
+        for c, value in enumerate(clouds.albedo)
+    ]
     return replace(clouds, sigma_t=sigma_t, albedo=type(clouds.albedo)(*albedo))
 
 
@@ -432,6 +466,8 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int) -> Beam:
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
     assert sun is not None
+    # Lengths through each cloud along the light: from its maps, or where it has densities its
+    # depths.
     maps = [sun.of_cloud(mi.UInt32(cloud)) for cloud in range(dr.width(clouds.phase))]
     lengths: list[Any] = [partial(length_along_light, of_cloud) for of_cloud in maps]
     if state.depths:
@@ -465,6 +501,7 @@ def _many_times(
     next frame takes as `last`.
     """
     Float, Color = type(view.distance), type(view.medium.albedo)
+    # Each channel and filling has a search, masked to the rays that meet a cloud with that filling.
     search = Search(
         parameters.iterations,
         parameters.along_light,
@@ -475,42 +512,46 @@ def _many_times(
     of_sun = state.maps[sun]
     assert of_sun is not None
     sums: list[Any] = []
-    kept: list[Any] = []
-    for channel, own in enumerate(rays.clouds.sigma_t):
+    collectors: list[Any] = []
+    for channel, extinction in enumerate(rays.clouds.sigma_t):
+        # The slab has the mean density of the cloud's body.
         if state.body is not None:
-            own = own * state.body
-        sigma_t = dr.gather(Float, own, entry.cloud, entry.there)
+            extinction = extinction * state.body
+        sigma_t = dr.gather(Float, extinction, entry.cloud, entry.hit)
         of_fillings: list[Any] = []
         of_channel: list[Any] = []
         for filling in state.fillings:
             own_clouds = filling.clouds[channel]
             if own_clouds is None:  # no search is recorded for an albedo that other channels have
                 continue
-            filled = entry.there & (dr.gather(mi.UInt32, own_clouds, entry.cloud, entry.there) != 0)
+            filled = entry.hit & (dr.gather(mi.UInt32, own_clouds, entry.cloud, entry.hit) != 0)
             light = light_of_orders(
                 of_sun.of_cloud(entry.cloud),
                 filling.transport,
                 sets=len(SETS),
                 point=entry.point,
                 toward=-view.direction,
+                # A lane without the filling has read no extinction: 1 stands for it.
                 extinction=dr.select(filled, sigma_t, 1),
                 behind=rays.depths[channel],
                 search=search,
                 last=None if last is None else last[channel][len(of_channel)],
                 active=filled,
             )
+            # Other clouds and opaque shapes shade the collector of each set by itself.
             lit = [
-                _reaching(view, of_sun, own, entry, sun, collector)
+                _reaching(view, of_sun, extinction, entry, sun, collector)
                 for collector in light.collectors
             ]
             of_fillings.append(
                 tuple(radiance * fraction for radiance, fraction in zip(light.by_set, lit))
             )
             of_channel.append(light.collectors)
-        kept.append(tuple(of_channel))
+        collectors.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
+    # A grey scene has one channel, which stands for all three.
     by_set = tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums)))))
-    return OrdersLight(by_set, tuple(kept))
+    return OrdersLight(by_set, tuple(collectors))
 
 
 def _reaching(
@@ -525,6 +566,8 @@ def _reaching(
     centre, fraction = entry.point + collector.centre, Float(1)
 
     def behind(number, fraction):
+        # Another cloud attenuates the part of the collector's width that lies in its shade, over
+        # the mean length there; the collector's own cloud does not shade it.
         cover, length = shade(of_sun.of_cloud(number), centre, collector.width)
         attenuated = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
         return number + 1, dr.select(number == entry.cloud, fraction, fraction * attenuated)

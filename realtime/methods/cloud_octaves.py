@@ -47,10 +47,9 @@ from airlight.realtime.scene.media.bounded import Clouds
 from airlight.realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
 from airlight.realtime.scene.read_scene import Scene
 
-_ANGLES = 20_000  # of a mean cosine, by the midpoint rule in the root of the angle
-
 
 def _check_phase(words: Any) -> None:
+    # How many numbers may follow a name; -1 below refuses every other name.
     name, *cells = str(words).split(":")
     numbers = {"scene": 0, "isotropic": 0, "hg": 1, "hg-draine": 1}
     try:
@@ -65,6 +64,7 @@ def _check_phase(words: Any) -> None:
         raise InputError(
             f"phase: got {words!r}, expected scene, isotropic, hg:G or hg-draine:DIAMETER [um]"
         )
+    # `named_phase` checks the diameter of a droplet; the bounds of a mean cosine are checked here.
     if name == "hg" and not -1 < values[0] < 1:
         raise InputError(
             f"phase: got {words!r}, expected a mean cosine between -1 and 1, such as hg:0.85"
@@ -149,6 +149,8 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
     """Return the function that makes the state of a frame."""
     clouds = scene.medium.clouds
     assert clouds is not None  # `media_checks` refuses the others
+    # Mean cosines take a quadrature on the host, and boundaries a table of their facets: both are
+    # made once for all frames.
     Float = type(scene.camera.origin.x)
     means = [mean_cosine(phase, Float) for phase in _phases(clouds, parameters, Float)]
     uniform = len(beams_of(scene.lights, parameters.sky, clouds)) < len(scene.lights)
@@ -165,6 +167,7 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
     if clouds.density is None:
         return lambda now: state
 
+    # Suns may move: the depths of their light in a grid of densities are those of the frame.
     def with_depths(now: Scene) -> OctaveState:
         return replace(
             state, depths=sun_depths(state.surfaces, clouds, now.lights, stride=state.stride)
@@ -183,12 +186,17 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     )
     suns = beams_of(view.lights, parameters.sky, clouds)
     beams = [_beam(view, state, number, parameters) for number in suns]
+    # By sun and octave the integral with a^n and P_n; the sum over the suns is the light of the
+    # octave.
     by_light = light_once(rays, beams, steps=parameters.steps, stride=state.stride)
-    by_octave = [sum(own) for own in zip(*by_light)]
+    by_octave = [sum(radiances) for radiances in zip(*by_light)]
+    # Octave n has the factor b^n.
     amount, amounts = type(view.distance)(1), []
     for radiance in by_octave:
         amounts.append(amount * radiance)
         amount = amount * state.contribution
+    # Octave n stands for the order n + 1. A uniform sky has no octaves: its orders come from
+    # `realtime.clouds.uniform_sky` and are added to the layers of the same names.
     parts = [(order_layer(octave + 1), radiance) for octave, radiance in enumerate(amounts)]
     for number, light in enumerate(view.lights):
         if state.escapes is not None and number not in suns:
@@ -196,6 +204,7 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
                 state.escapes, light, rays, view.visible if view.features.shadows else None
             )
             parts += zip(ORDER_LAYERS, of_sky)
+    # Several octaves, and the sky, may count to one layer of orders.
     opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
     if view.extra_layers:
@@ -216,7 +225,10 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
 
 def mean_cosine(phase: Phase, Float: Any) -> float:
     """Return the mean cosine of a phase function [1]; `Float` is the type of its arrays."""
-    root = (np.arange(_ANGLES) + 0.5) / _ANGLES
+    # The midpoint rule with 20 000 steps in u, the root of the angle over pi. A lobe about 0
+    # degrees then has many steps: theta = pi u^2, d theta ~ u du.
+    angles = 20_000
+    root = (np.arange(angles) + 0.5) / angles
     angle = np.pi * root**2
     fraction = (
         np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
@@ -236,6 +248,8 @@ def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves)
     clouds, surfaces, light = view.medium.clouds, state.surfaces, view.lights[number]
     assert clouds is not None
     Float = type(view.distance)
+    # Octave n: the depth to the light times a^n; the phase function of the scene for n = 0,
+    # otherwise Henyey-Greenstein with c^n times the mean cosine. `sharp` is c^n of the next octave.
     cosine = -dr.dot(view.direction, light.axis)  # forward where the eye looks into the sun
     scale, sharp = Float(1), state.anisotropy
     scales, phases = [], []
@@ -243,14 +257,15 @@ def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves)
         scales.append(scale)
         scale = scale * state.extinction
         if octave == 0:
-            own = _phases(clouds, parameters, Float)
+            octave_phases = _phases(clouds, parameters, Float)
         else:
             means = (dr.gather(Float, state.means, number) for number in range(len(clouds.phases)))
-            own = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
+            octave_phases = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
             sharp = sharp * state.anisotropy
-        phases.append(tuple(phase.evaluate(cosine) for phase in own))
+        phases.append(tuple(phase.evaluate(cosine) for phase in octave_phases))
     segment = segment_through(surfaces, clouds, light, stride=state.stride)
     if state.depths:
         segment = segment_by_lengths(clouds, [of_cloud.at for of_cloud in state.depths[number]])
+    # Opaque shapes hide the light at each step, where there are any.
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     return Beam(light.intensity, tuple(scales), tuple(phases), segment, lit)

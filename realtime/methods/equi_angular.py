@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Equi-angular sampling: a few random samples a ray, each of one light chosen by its power.
 
-With N lights of the airlight L_i along a ray, a fraction q_i of the power and an even random angle
-theta between those of the ends of the ray at light i, x = foot + h tan theta,
+Let N lights have the airlight L_i along a ray. Light i is chosen with the probability q_i, its
+fraction of the power. Let theta be an even random angle at light i between theta_0 and theta_1, the
+angles of the ends of the ray, and x = foot + h tan theta. Then
 
-    L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],        f_i the integrand with the visibility,
+    L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],
 
-is the mean of one sample: dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and
-visibility, which is bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the fraction
-(k + c)/S of the power, c the shift of the pattern, and another place for each k, by the step of
-Roberts' sequence in one dimension of two; the mean of all stays the integral, since each sample
-alone is right in the mean.
+with f_i the integrand with the visibility. One sample therefore has the mean L, and it is bounded:
+dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and visibility (Kulla and Fajardo
+2012, section 4). Sample k of S takes the fraction (k + c)/S of the power, c the shift of the
+pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the
+mean of all stays the integral, since each sample alone is right in the mean.
 
 Lights of different structure (points, spots, samples of area lights) are in separate tables, and
 one of each is sampled. Lights at infinity have one sample each, even in the distance.
@@ -33,8 +34,6 @@ from airlight.realtime.numerics.noise import PATTERNS
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.light_table import light_choice, light_tables
 from airlight.realtime.scene.lights import Light
-
-_STEP = 0.7548776662466927  # 1/g with g^3 = g + 1
 
 
 @dataclass(frozen=True)
@@ -71,12 +70,14 @@ class EquiAngular(Method):
     def render(self, view, state, kernel):
         """Return the airlight of every ray by chance [W/(m^2 sr)]."""
         golden = self.animate == "golden"
+        # Two streams of the pattern: where on the ray a sample lies, and which light it takes.
         place, choice = (
             view.pattern(self.jitter, golden=golden, stream=stream) for stream in (0, 1)
         )
         total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
         for table, by_power in zip(view.tables, state, strict=True):
-
+            # One sample of one light of this table: the light is picked by the fraction of the
+            # power, and the radiance divided by q_i.
             def sample(at: Any, fraction: Any, table: Any = table, by_power: Any = by_power) -> Any:
                 if by_power is None:  # a light at infinity is a table by itself
                     return _sample(view, table.rows, at)
@@ -87,15 +88,18 @@ class EquiAngular(Method):
         return Layers(total)
 
     def _mean(self, sample: Any, place: Any, choice: Any, like: Any) -> Any:
-        """Return the mean of samples, each a function of where it lies and of which
-        light it takes, from 0 to 1.
+        """Return the mean of samples; each is a function of its place on the ray and of the
+        fraction of the power at which its light stands, both from 0 to 1.
         """
         if self.samples == 1:
             return sample(place, choice)
         Float = type(place)
 
         def term(number):
-            at = dr.fma(Float(number), _STEP, place)
+            # Sample k lies k steps of Roberts' sequence beyond the pattern's place, modulo 1, and
+            # takes the fraction (k + c)/S of the power.
+            step = 0.7548776662466927  # 1/g with g^3 = g + 1
+            at = dr.fma(Float(number), step, place)
             return sample(at - dr.floor(at), (Float(number) + choice) / self.samples)
 
         return summed(self.samples, term, dr.zeros(type(like), dr.width(place))) / self.samples
@@ -105,6 +109,8 @@ def _sample(view: View, light: Light, at: Any) -> Any:
     """Return the radiance of one sample of a light, at a fraction of the
     angle at it [W/(m^2 sr)].
     """
+    # One step in the angle over the whole ray: its width is theta_1 - theta_0, its stretch
+    # dx/dtheta.
     rays = view.lit_by(light)
     span = marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(at, span.width, span.begin))

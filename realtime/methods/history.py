@@ -37,8 +37,9 @@ def with_history(method: type[Method]) -> type[Method]:
 
     Raises InputError for a method that has parameters of these names.
     """
-    own = [item.name for item in fields(History)]
-    taken = sorted(set(own) & set(defaults(method)))
+    names = [item.name for item in fields(History)]
+    # A class has one field of a name: the method's own would be lost.
+    taken = sorted(set(names) & set(defaults(method)))
     if taken:
         raise InputError(
             f"method {method.name}{ENDING}: the method has a parameter {taken[0]!r} of its own; "
@@ -46,8 +47,10 @@ def with_history(method: type[Method]) -> type[Method]:
         )
 
     def history(self) -> History:
-        return History(*(getattr(self, name) for name in own))
+        return History(*(getattr(self, name) for name in names))
 
+    # A class derived from the method has all of its members; frames read `history` to average its
+    # airlight.
     what = {
         "name": method.name + ENDING,
         "summary": f"{method.summary}; averaged over the frames before",

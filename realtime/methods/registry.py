@@ -40,7 +40,7 @@ _CLASSES: Mapping[str, tuple[str, str]] = {
     "cloud-collectors": ("airlight.realtime.methods.cloud_collectors", "CloudCollectors"),
 }
 
-#: Those of light that is scattered once, in any scene, without random numbers by default.
+#: Methods for light that is scattered once, in any scene, without random numbers by default.
 FOG_METHODS = (
     "unshadowed",
     "ray-march",
@@ -50,14 +50,14 @@ FOG_METHODS = (
     "froxel-fog",
     "soft-shafts",
 )
-#: Those that have the errors of a paper, to judge it.
+#: Methods with the errors of a paper, to judge the paper.
 PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010", "cloud-collectors-2008")
 
 
 class _Methods(Mapping[str, type[Method]]):
     def __getitem__(self, name: str) -> type[Method]:
-        module, found = _CLASSES[name]
-        method: type[Method] = getattr(import_module(module), found)
+        module, class_name = _CLASSES[name]
+        method: type[Method] = getattr(import_module(module), class_name)
         return method
 
     def __iter__(self) -> Iterator[str]:
@@ -90,13 +90,14 @@ def find_method(name: str) -> type[Method]:
         return METHODS[name]
     from airlight.realtime.methods.shader.source import is_shader
 
+    # '+history' is a name with an ending, whatever stands before it: built in, or a user's.
     if name.endswith(ENDING):
-        if is_shader(own := name.removesuffix(ENDING)):
+        if is_shader(base := name.removesuffix(ENDING)):
             raise InputError(
                 f"method {name}: a shader keeps its own frames; expected its name without "
                 f"'{ENDING}'"
             )
-        return with_history(find_method(own))
+        return with_history(find_method(base))
     if is_shader(name):
         from airlight.realtime.methods.shader.method import shader_method
 

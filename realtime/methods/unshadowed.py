@@ -20,8 +20,8 @@ in these forms.
   `DirectionalInscatteringColor pow(saturate(dot), DirectionalInscatteringExponent) (1 - 2^-I)`, the
   exponent 4 by default.
 
-The depth is that of the scene's medium. Unreal's two terms of a series near level rays (8e-6 of the
-depth) and its FogMaxOpacity, StartDistance and cut-off are left out.
+The depth is the optical depth of the scene's medium. Unreal's two terms of a series near level rays
+(8e-6 of the depth) and its FogMaxOpacity, StartDistance and cut-off are left out.
 """
 
 from dataclasses import dataclass
@@ -102,20 +102,25 @@ class Unshadowed(Method):
 
     def _colour(self, view, sky):
         medium, end, exponent = view.medium, dr.minimum(view.distance, 1e30), _EXPONENTS[self.form]
+        # C without the albedo: the radiance of the sky and E_k q(cos_k)/(4 pi) of each sun. The
+        # mean of q = 2 (n + 1) max(cos, 0)^n over the sphere is 1, for `wenzel` with q = 1.
         arriving = sky
         for light in view.lights:
             if not light.w:
                 ahead = dr.maximum(-dr.dot(light.axis, view.direction), 0)
                 lobe = 2 * (exponent + 1) * ahead**exponent if exponent else 1
                 arriving = arriving + light.intensity * (lobe * (0.25 * dr.inv_pi))
-        shown = arriving * medium.ambient(view, end)
+        # C F with F = 1 - exp(-tau): `ambient` has the albedo and F of the medium.
+        radiance = arriving * medium.ambient(view, end)
         if self.form != "quilez":
-            return shown
+            return radiance
+        # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel.
+        # Up to tau = 1e-4, where the divisor cancels, the quotient 1 + tau/2 is taken for 1.
         depths = medium.optical_depth(view, 0, end)
-        taken = [
+        corrections = [
             dr.select(tau > 1e-4, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), 1) for tau in depths
         ]
-        return shown * medium.colour(taken)
+        return radiance * medium.colour(corrections)
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray as if nothing cast a shadow [W/(m^2 sr)]."""

@@ -55,17 +55,19 @@ def user_method(name: str) -> type[Method]:
         For what cannot be imported, is not there or is no function, a function that no frame can
         call, and a parameter with the name of a member of `Method`.
     """
-    found = user_object(name, "method")
-    if isinstance(found, type) and issubclass(found, Method):
-        check_names(name, (item.name for item in fields(found)), Method)
-        return _guarded(found, name)
-    if isinstance(found, type) or not callable(found):
-        kind = "class" if isinstance(found, type) else type(found).__name__
+    target = user_object(name, "method")
+    # A class of `Method` brings its own parameters and members; only its errors and results are
+    # guarded.
+    if isinstance(target, type) and issubclass(target, Method):
+        check_names(name, (item.name for item in fields(target)), Method)
+        return _guarded(target, name)
+    if isinstance(target, type) or not callable(target):
+        kind = "class" if isinstance(target, type) else type(target).__name__
         raise InputError(
             f"method {name}: this is a {kind}; expected a function of the view, or a class of "
             "airlight.Method"
         )
-    return _of_function(found, name)
+    return _of_function(target, name)
 
 
 def check_names(method: str, names: Iterable[str], kind: type[Method]) -> None:
@@ -97,7 +99,10 @@ def _of_function(function: Any, name: str) -> type[Method]:
     """Return a plain function of the view as a method."""
     takes_kernel, parameters = _signature(function, name)
     check_names(name, parameters, Method)
+    # Keywords become fields of a class: commands set them as those of built-in methods.
     items = [(key, type(default), field(default=default)) for key, default in parameters.items()]
+    # Attributes of the function say the rest: the facts below, and `prepare`, which is called once
+    # for a scene and returns the function that makes the state of each frame.
     prepare = getattr(function, "prepare", None)
     if prepare is not None and not callable(prepare):
         raise InputError(
@@ -109,20 +114,22 @@ def _of_function(function: Any, name: str) -> type[Method]:
         if prepare is None:
             return no_state
         with user_errors(f"method {name}", _file(prepare)):
-            made = prepare(scene, **values(self))
-        if not callable(made):
+            make_state = prepare(scene, **values(self))
+        if not callable(make_state):
             raise InputError(
-                f"method {name}: `prepare` returned a {type(made).__name__}; expected a function "
-                "of the scene"
+                f"method {name}: `prepare` returned a {type(make_state).__name__}; expected a "
+                "function of the scene"
             )
 
+        # Both calls of the author's code have their errors named, in the file of `prepare`.
         def run(now):
             with user_errors(f"method {name}", _file(prepare)):
-                return made(now)
+                return make_state(now)
 
         return run
 
     def render(self, view, state, kernel):
+        # The function has the state as `view.prepared`, and a kernel where it takes one.
         given = values(self) | ({"kernel": kernel} if takes_kernel else {})
         with user_errors(f"method {name}", _file(function)):
             returned = function(replace(view, prepared=state), **given)
@@ -134,6 +141,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
         "source": _file(function) or "the user",
         "uses_kernel": takes_kernel,
         "casts_rays": True,
+        # A frame is recorded only if the author says that it can be.
         "frozen": bool(getattr(function, "frozen", False)),
         "by_rays": bool(getattr(function, "by_rays", False)),
         "shadows": bool(getattr(function, "shadows", True)),
@@ -163,11 +171,13 @@ def method_file(name: str) -> Path | None:
     none, or cannot be found.
     """
     module_name = name.rpartition(":")[0]
+    # From the cheapest to the costliest: the path itself, a module that is loaded, a search along
+    # the path, package by package, which runs no code of theirs.
     if _is_file(module_name):
         return Path(module_name)
-    known = getattr(sys.modules.get(module_name), "__file__", None)
-    if known is not None:
-        return Path(known)
+    loaded_file = getattr(sys.modules.get(module_name), "__file__", None)
+    if loaded_file is not None:
+        return Path(loaded_file)
     places: list[str] | None = [os.getcwd(), *sys.path]
     spec = None
     for number, part in enumerate(module_name.split(".")):
@@ -194,6 +204,7 @@ def user_object(name: str, kind: str) -> Any:
     InputError
         For what cannot be imported, or is not there.
     """
+    # The last colon parts file and object: a path may have one too.
     module_name, _, path = name.rpartition(":")
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
         raise InputError(f"{kind}: got {name!r}, {_WANTED}")
@@ -205,11 +216,18 @@ def user_object(name: str, kind: str) -> Any:
             else _from_path(module_name, what)
         )
     named_object: Any = module
+    # The object may lie in a class: 'module:Class.method'.
     for part in path.split("."):
         if not hasattr(named_object, part):
-            there = [key for key, value in vars(module).items() if _is_candidate(value, module)]
-            known = f"it has {', '.join(there)}" if there else "it has no functions of its own"
-            raise InputError(f"{what}: {module_name} has no {path!r}; {known}")
+            candidates = [
+                key for key, value in vars(module).items() if _is_candidate(value, module)
+            ]
+            hint = (
+                f"it has {', '.join(candidates)}"
+                if candidates
+                else "it has no functions of its own"
+            )
+            raise InputError(f"{what}: {module_name} has no {path!r}; {hint}")
         named_object = getattr(named_object, part)
     return named_object
 
@@ -263,17 +281,20 @@ def _from_file(path: Path, what: str) -> ModuleType:
     """Import a file under a name of its own, again if it has changed since, as in a notebook."""
     if not path.is_file():
         raise InputError(f"{what}: there is no file {path}; {_WANTED}")
+    # A file is loaded again when its time or size has changed: in a notebook the author edits it
+    # between frames.
     place = path.resolve()
     status = place.stat()
     stamp = (status.st_mtime_ns, status.st_size)
     key = f"airlight_own_{place.stem}_{abs(hash(str(place))):x}"
-    known = sys.modules.get(key)
-    if known is not None and known.__dict__.get("__airlight_stamp__") == stamp:
-        return known
+    loaded = sys.modules.get(key)
+    if loaded is not None and loaded.__dict__.get("__airlight_stamp__") == stamp:
+        return loaded
     spec = importlib.util.spec_from_file_location(key, place)
     if spec is None or spec.loader is None:
         raise InputError(f"{what}: {path} is not a Python file; {_WANTED}")
     module = importlib.util.module_from_spec(spec)
+    # In `sys.modules` before it runs, as imports do; a file that fails leaves nothing there.
     module.__dict__["__airlight_stamp__"] = stamp
     sys.modules[key] = module
     try:
@@ -293,6 +314,7 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
         raise InputError(
             f"method {name}: its arguments cannot be read ({error}); expected a Python function"
         ) from error
+    # The view is given by position.
     if not arguments or arguments[0].kind not in (
         inspect.Parameter.POSITIONAL_ONLY,
         inspect.Parameter.POSITIONAL_OR_KEYWORD,
@@ -304,6 +326,8 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
     parameters = {}
     takes_kernel = False
     for argument in arguments[1:]:
+        # *args and **kwargs stay empty; `kernel` is no parameter of the method, but says that it
+        # calls one.
         if argument.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
             continue
         if argument.name == "kernel":
@@ -329,7 +353,7 @@ def user_errors(what: str, file: str | None = None) -> Iterator[None]:
         yield
     except InputError:  # what it refuses by name
         raise
-    # The user's code may raise anything, and end the program: that is his to repair,
+    # The user's code may raise anything, and end the program: the author repairs that, and it is
     # never a failure of ours.
     except (Exception, SystemExit) as error:
         root = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop
@@ -350,6 +374,7 @@ def _place(root: BaseException, error: BaseException, file: str | None) -> str:
     steps = [
         step for raised in (error, root) for step in traceback.extract_tb(raised.__traceback__)
     ]
+    # Steps of this file and of the import machinery say nothing to the author.
     outside = [
         step for step in steps if step.filename != __file__ and "importlib" not in step.filename
     ]
@@ -392,6 +417,7 @@ def checked_radiance(returned: Any, view: View, name: str):
     """
     Color, Float = type(view.medium.albedo), type(view.distance)
     width = dr.width(view.pixel)
+    # Dr.Jit arrays stay on the device; what else came goes through NumPy.
     channels = (
         _dr_channels(returned, name)
         if dr.is_array_v(returned)
@@ -479,6 +505,8 @@ def _channels(returned: Any, width: int, name: str) -> tuple[Any, ...]:
             f"method {name}: returned an array of shape {values.shape} for {width} pixels; "
             f"{_RESULT}"
         )
+    # In float64, so that whole numbers and doubles lose nothing before the view's precision is
+    # known.
     double = np.ascontiguousarray(values, dtype=np.float64)
     return (
         (mi.Float64(double),) * 3

@@ -23,7 +23,6 @@ import mitsuba as mi
 from airlight.realtime.memory import check_memory
 from airlight.realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
 from airlight.realtime.methods.epipolar.samples import (
-    STEPS,
     WORD,
     Samples,
     between_samples,
@@ -57,8 +56,6 @@ from airlight.realtime.shadow_maps.shadow_map import (
 )
 
 _MOST = 65536  # slices, and samples of a slice
-
-_NEXT = 6.0  #: pixels from the image of a light within which nothing is interpolated
 
 
 @dataclass(frozen=True)
@@ -109,7 +106,9 @@ class MinMax(Method):
         wanted=f"up to {_MOST}, or 0 for as many as the image needs",
     )
     step: int = parameter(
-        16, "every N-th sample is computed, besides those at breaks of the depth", choices=STEPS
+        16,
+        "every N-th sample is computed, besides those at breaks of the depth",
+        choices=(1, 2, 4, 8, 16, 32),
     )
     sampling: str = parameter(
         "slices",
@@ -123,14 +122,18 @@ class MinMax(Method):
         if not scene.features.shadows:
             return
         map, slices, samples = self.map, self.slices, self.samples
-        held = sum(2 * map_memory(light, map) for light in scene.lights)
-        drawn = (
+        # The maps of all lights exist at once, each as distances and as heights. Slices are made
+        # for one light after another, so the largest count.
+        map_bytes = sum(2 * map_memory(light, map) for light in scene.lights)
+        slice_bytes = (
             _memory_of_slices(scene.camera, light, map, slices, samples) for light in scene.lights
         )
         what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
         advice = "use a smaller map, or fewer slices"
         check_memory(
-            f"{what} for {len(scene.lights)} light(s)", held + max(drawn, default=0), advice
+            f"{what} for {len(scene.lights)} light(s)",
+            map_bytes + max(slice_bytes, default=0),
+            advice,
         )
 
     def prepare(self, scene, light):
@@ -143,18 +146,23 @@ class MinMax(Method):
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray [W/(m^2 sr)]."""
         airlight = view.lit_by(light, kernel)
+        # Nothing casts a shadow: one integral a ray is the airlight, and slices are not needed.
         if not view.features.shadows:
             return airlight.radiance(airlight.gamma(view.distance))
         camera = view.camera
+        # First stage: the slices of the image and the height map with its tree in each of them.
         cut = image_slices(camera, light, self.slices or _usual_slices(camera))
         heights = slice_heights(state.shadow_map, state.heights, cut, light)
         point = camera.project(view.direction)[:2]
+        # Without interpolation every pixel walks in the slice that is nearest to it.
         if self.sampling == "pixels":
             return airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
+        # Second stage: which samples of the slices are computed; third stage: their fractions; last
+        # stage: the pixels between them.
         depth = _depth_image(cut, point, view.distance)
-        drawn = mark_samples(cut, depth, count=_whole_words(self.samples, camera), step=self.step)
-        fractions = _sampled_fractions(view, light, kernel, drawn, heights)
-        return airlight.radiance(_interpolated(airlight, drawn, fractions, heights, point))
+        samples = mark_samples(cut, depth, count=_whole_words(self.samples, camera), step=self.step)
+        fractions = _sampled_fractions(view, light, kernel, samples, heights)
+        return airlight.radiance(_interpolated(airlight, samples, fractions, heights, point))
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
@@ -203,18 +211,23 @@ def _depth_image(slices: Slices, point, distance):
 
 
 def _sampled_fractions(view: View, light: Light, kernel, samples: Samples, heights: SliceHeights):
-    """Return by sample, of those that are marked, the fraction of its airlight that is lit."""
+    """Return the lit fraction of the airlight of each marked sample, by sample."""
+    # `marked` has room for every sample of every slice; its first `count` entries are filled.
     marked, count = marked_samples(samples)
     camera = view.camera
     fractions = dr.empty(type(view.lit_by(light).nothing(1)), dr.width(marked))
 
     def computed(lane):
+        # The ray of a sample goes through its own image point, which lies between the pixels, and
+        # ends at the depth of the pixel that holds the point.
         sample = dr.gather(mi.UInt32, marked, lane)
         (i, j), slice_number, depth = sample_ray(samples, sample)
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
         rays = view.medium.rays(view.origin, direction)
-        seen = replace(view, **vars(rays), distance=depth)
-        airlight = seen.lit_by(light, kernel)
+        sample_view = replace(view, **vars(rays), distance=depth)
+        airlight = sample_view.lit_by(light, kernel)
+        # The lit fraction: the integral over the lit intervals over the integral as if nothing cast
+        # a shadow. A ray that meets no light has 0/0, and its sample the mark of no value.
         fraction = _lit_integral(airlight, heights, slice_number) / airlight.gamma(
             airlight.rays.distance
         )
@@ -231,13 +244,17 @@ def _sampled_fractions(view: View, light: Light, kernel, samples: Samples, heigh
 
 
 def _interpolated(airlight: LitRays, samples: Samples, fractions, heights: SliceHeights, point):
-    """Return the integral of every pixel: the fraction of the samples around it, or its
-    own where they do not fit.
+    """Return the integral of every pixel: by the fraction of the samples around it, or by a walk
+    of its own where the samples do not fit.
     """
     fraction, fits = between_samples(samples, fractions, point, airlight.rays.distance)
     # Next to a light, samples gather most of their airlight at other places than the pixel, and
-    # where it lies on a surface they end before it, or beyond.
+    # where it lies on a surface they end before it, or beyond. Within 6 pixels of the light's image
+    # nothing is interpolated: height over foot is the tangent of the ray's angle with the light,
+    # |left| the same for one pixel.
+    least_pixels = 6.0
     pixel = dr.norm(airlight.rays.camera.left)
-    fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
-    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
-    return dr.select(fits, fraction * airlight.gamma(airlight.rays.distance), own)
+    fits &= airlight.geometry.height > least_pixels * pixel * dr.abs(airlight.geometry.foot)
+    # `~fits` masks the segments, so that pixels with an interpolated fraction do not walk.
+    pixel_integral = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
+    return dr.select(fits, fraction * airlight.gamma(airlight.rays.distance), pixel_integral)

@@ -69,6 +69,8 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
 
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
+    # A spot or a directional light sees all within one edge of k(q); around a point light two edges
+    # lead through half a turn, and the slices are half planes.
     edges = 1 if light_faces(light) == 1 else 2
     chord = None
     if edges == 1:
@@ -76,15 +78,22 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     Float = type(heights)
     empty = SliceHeights(shadow_map.size, edges, slices, chord, None)
     samples = empty.leaves + 1
+    # One lane for each sample of each slice: leaves + 1 samples at equal steps in q, the ends of
+    # the leaves.
     index = dr.arange(mi.UInt32, slices.count * samples)
     number = index // samples
     kx, ky = line_point(empty, number, Float(index - number * samples))
     across = dr.gather(type(slices.across), slices.across, number)
+    # The direction k(q) in space. At infinity k(q) = (s_O, Y): the point Y e2 beside the camera, as
+    # `_height` reads it along parallel rays.
     vector = slices.towards * kx + across * ky if slices.w else slices.away + across * ky
+    # Evaluated, since the trees gather from it.
     value = slices.distance * _height(shadow_map, heights, vector)
     dr.eval(value, chord)
     index = dr.arange(mi.UInt32, slices.count * empty.leaves)
-    at = index + index // empty.leaves  # a map has one sample more than leaves
+    # The sample where each leaf begins: a slice has one sample more than leaves, which puts the
+    # leaves of slice n off by n.
+    at = index + index // empty.leaves
     ends = dr.gather(Float, value, at), dr.gather(Float, value, at + 1)
     return replace(empty, tree=_tree(empty, *ends))
 
@@ -92,6 +101,8 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
 def line_point(heights: SliceHeights, number, q):
     """Return (k_x, k_y) at `q`, counted in leaves, of the slices of a `number`."""
     q = q * (1.0 / heights.size)
+    # The polygonal line (1, 0), (0, 1), (-1, 0) of a point light: k_x falls from 1 to -1 over two
+    # edges, and |k_x| + k_y = 1.
     if heights.chord is None:
         kx = 1 - q
         return kx, 1 - dr.abs(kx)
@@ -106,14 +117,19 @@ def _tree(heights: SliceHeights, at_begin, at_end):
     # The tree is only written here: if a kernel read it too, Dr.Jit would copy it at every level.
     tree = dr.empty(type(at_begin), 2 * count * 2 * leaves)
     index = dr.arange(mi.UInt32, count * leaves)
+    # The leaves are the last half of each slice's heap of 2 `leaves` places, and keep the order of
+    # their ends: S is linear between them.
     dr.scatter(tree, Pair(at_begin, at_end), index + (index // leaves + 1) * leaves)
     low, high = dr.minimum(at_begin, at_end), dr.maximum(at_begin, at_end)
     dr.eval(low, high, tree)
     for level in range(1, heights.top + 1):
+        # A node holds the least and the greatest S of its two children. The loop ends at nodes of a
+        # whole edge, so a slice with two edges has two roots.
         nodes = leaves >> level
         index = dr.arange(mi.UInt32, count * nodes)
         low = dr.minimum(*(dr.gather(type(at_begin), low, 2 * index + k) for k in (0, 1)))
         high = dr.maximum(*(dr.gather(type(at_begin), high, 2 * index + k) for k in (0, 1)))
+        # Level `level` begins at place `nodes` in the heap of a slice.
         number = index // nodes
         dr.scatter(tree, Pair(low, high), number * (2 * leaves) + (index - number * nodes + nodes))
         dr.eval(low, high, tree)
@@ -127,6 +143,8 @@ def _height(shadow_map: ShadowMap, heights, direction):
     the surface on its ray [m].
     """
     size, projection = shadow_map.size, shadow_map.projection
+    # The place (u, v) in the face that the direction points into, and the depth of k along the axis
+    # of that face: heights are inverse planar depths, so s for k is the height times that depth.
     if projection.basis:
         a, b, _, depth = projection.homogeneous(mi.UInt32(0), direction, 1 - projection.w)
         face, u, v = mi.UInt32(0), a / depth, b / depth
@@ -142,6 +160,8 @@ def _height(shadow_map: ShadowMap, heights, direction):
     corner = (face * (size + 1) + row) * (size + 1) + column
     third = corner + dr.select(x >= y, mi.UInt32(1), mi.UInt32(size + 1))
     h0, h1, h2 = (dr.gather(type(u), heights, at) for at in (corner, third, corner + (size + 2)))
+    # Linear over a triangle: from the first corner along the longer step and on along the shorter
+    # one.
     return depth * (h0 + dr.maximum(x, y) * (h1 - h0) + dr.minimum(x, y) * (h2 - h1))
 
 
@@ -152,10 +172,15 @@ def _chord(slices: Slices, light: Light, size: int):
     axis, (p, q) the axis in the slice. The chord is a texel wider on both sides, for the rays of
     pixels beside the slice.
     """
+    # The angle of the axis in the slice, from -pi/2 to 3/2 pi: the slice holds angles from 0 to pi,
+    # and an axis behind it is nearest to one of their ends.
     p, q = dr.dot(light.axis, slices.towards), dr.dot(light.axis, slices.across)
     middle = dr.atan2(q, p)
     middle += dr.select(middle < -0.5 * dr.pi, 2 * dr.pi, 0)
     reach = dr.sqrt(p * p + q * q)
+    # R cos(phi - middle) >= cos(cutoff) gives half the angle of the cone in the slice; where R is
+    # less than that, the slice misses the cone and gets the margin alone. Up to 1.56, under pi/2: a
+    # chord must not go through the light.
     margin = 2 * light.cutoff / size
     half = dr.minimum(dr.safe_acos(dr.minimum(light.cos_cutoff / reach, 1)) + margin, 1.56)
     begin = dr.clip(middle - half, 0, dr.pi - margin)
@@ -170,10 +195,13 @@ def _band(slices: Slices, shadow_map: ShadowMap):
     In a slice u and v are linear in Y, and the map holds -1 to 1 of both.
     """
     projection, Float = shadow_map.projection, type(slices.distance)
+    # (u, v) = (a0, b0) + Y (a, b): the camera in the map, and e2 in it.
     a0, b0, height, _ = projection.homogeneous(mi.UInt32(0), slices.away, 1)
     a, b, _, _ = projection.homogeneous(mi.UInt32(0), slices.across, 0)
     begin, end = Float(0), Float(dr.inf)
     for start, slope in ((a0, a), (b0, b)):
+        # Clip the half line Y >= 0 to -1 <= u <= 1 and the same for v; a slice along a side has
+        # slope 0 and stays as it is.
         side = dr.mulsign(Float(1), slope)
         begin = dr.select(slope == 0, begin, dr.maximum(begin, (-side - start) / slope))
         end = dr.select(slope == 0, end, dr.minimum(end, (side - start) / slope))
@@ -189,6 +217,7 @@ def node_pair(heights: SliceHeights, number, place, level):
     """Return the pair [1/m] of the node of a level that begins at the leaf `place`, of
     the slices of a `number`.
     """
+    # In a heap the parent of place p is p/2: `level` halvings lead from the leaf to its node.
     heap = (mi.UInt32(heights.leaves) + place) >> level
     pair = dr.gather(
         two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap

@@ -3,8 +3,8 @@
 
 A slice has a fixed number of samples at equal steps from where it enters the image to where it
 leaves. One in `step` is computed, and both sides of every break of the depth between two of them;
-the others are interpolated along the slice (Yusov 2013). Which are computed is a bit each, 32 to a
-word, so the nearest on either side is found by counting bits.
+the others are interpolated along the slice (Yusov 2013). A bit says whether a sample is computed,
+32 bits to a word, so the nearest computed samples are found by counting bits.
 
 A pixel lies between two slices and on each between two samples. It takes the mean of the four,
 weighted by their nearness and by how well their depths agree with its own. Where none agrees it has
@@ -27,12 +27,7 @@ from airlight.realtime.numerics.array_types import four_numbers
 from airlight.realtime.numerics.functions import cell_of
 
 WORD = 32  #: samples to a word of bits
-STEPS = (1, 2, 4, 8, 16, 32)
 AGREES = 0.1  #: relative difference of depths up to which there is no break
-LEAST = 0.01  #: the least sum of weights that a pixel is content with
-
-_PACKET, _HANDS = 16, 64
-_BESIDE = -1.0  # the value of a sample that has none: its ray meets no light
 
 
 @dataclass(frozen=True)
@@ -52,6 +47,8 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
     be infinite [m]; `count`: samples of a slice, a multiple of 32; `step`: one in so many is
     computed: a power of two up to 32.
     """
+    # One lane for each word of bits, word by word, and slice by slice within a word: `bits` has the
+    # same order.
     words = count // WORD
     index = dr.arange(mi.UInt32, slices.count * words)
     word = index // slices.count
@@ -64,9 +61,11 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
 
     def body(b, bits, here, before):
         after = depth_at(first + b + 1)
+        # Both sides of a break are computed: sample b differs from the one before it or behind it.
         breaks = _apart(before, here) | _apart(here, after)
         return b + 1, bits | (dr.select(breaks, mi.UInt32(1), 0) << b), after, here
 
+    # Every `step`-th sample is marked from the start, in all words alike.
     # The last sample of all is marked: every other has one behind it.
     initial = sum(1 << b for b in range(0, WORD, step))
     bits = dr.select(first + WORD == count, mi.UInt32(initial | 1 << (WORD - 1)), initial)
@@ -93,6 +92,7 @@ def marked_samples(samples: Samples):
     """
     slices = samples.slices.count
     number = dr.popcnt(samples.bits)
+    # A word's marks begin in the list behind those of all words before it.
     place = dr.prefix_sum(number)
     marked = dr.empty(mi.UInt32, slices * samples.count)
     index = dr.arange(mi.UInt32, dr.width(samples.bits))
@@ -100,6 +100,7 @@ def marked_samples(samples: Samples):
     first = (index - word * slices) * samples.count + word * WORD
 
     def body(bits, place):
+        # Take the lowest bit that is set, and clear it.
         dr.scatter(marked, first + dr.tzcnt(bits), place)
         return bits & (bits - 1), place + 1
 
@@ -121,10 +122,13 @@ def spread(width: int):
     A list fills only the first part of its room. Threads take contiguous parts of it, and
     one would get all the work.
     """
-    row = width // (_PACKET * _HANDS) + 1
-    lane = dr.arange(mi.UInt32, row * _PACKET * _HANDS)
-    packet = lane // _PACKET
-    return ((packet % row) * _HANDS + packet // row) * _PACKET + lane % _PACKET
+    # The lanes are 64 contiguous parts of `row` packets each; part n takes the packets n, n + 64,
+    # n + 128, ... of the list.
+    packet_size, parts = 16, 64
+    row = width // (packet_size * parts) + 1
+    lane = dr.arange(mi.UInt32, row * packet_size * parts)
+    packet = lane // packet_size
+    return ((packet % row) * parts + packet // row) * packet_size + lane % packet_size
 
 
 def sample_ray(samples: Samples, sample):
@@ -139,43 +143,58 @@ def no_value(like):
     """Return the mark in place of a value for a sample whose ray meets no light, an
     array `like` the values.
     """
-    return type(like)(_BESIDE)
+    # Fractions are not negative: `_on_slice` tells by the sign.
+    return type(like)(-1.0)
 
 
 def between_samples(samples: Samples, values, point, depth):
     """Return the values of pixels from those of samples.
 
-    `samples`, `values`: the samples; by sample the values of those that are marked; `point`: image
+    `samples`: the samples; `values`: the values of the marked samples, by sample; `point`: image
     points (i, j) of the pixels; `depth`: their distances [m]. Returns `value`: the weighted mean;
     `fits`: whether enough of the samples agree in their depth.
     """
+    # The pixel lies between slice `low` and the next one, by its place on the border.
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)
     total, weights = type(values)(0), type(depth)(0)
     for step, fraction in ((0, 1 - (place - low)), (1, place - low)):
         number = neighbour(samples.slices, mi.Int32(low) + step)
+        # Two samples on each of two slices: nearness across slices times the weight along the
+        # slice.
         for value, weight in _on_slice(samples, values, number, point, depth):
             total += value * (fraction * weight)
             weights += fraction * weight
-    return total / dr.maximum(weights, 1e-20), weights > LEAST
+    # The least sum of weights with which a pixel is interpolated. The bound of the divisor only
+    # keeps a pixel without weights finite.
+    least_weight = 0.01
+    return total / dr.maximum(weights, 1e-20), weights > least_weight
 
 
 def _on_slice(samples: Samples, values, number, point, depth):
     """Return values and weights of the two samples of a slice on either side of a point."""
     ends = _ends(samples.slices, number)
+    # The slice as a segment of the image, and the pixel projected onto it: `along` counts in
+    # samples.
     i, j = ends.z - ends.x, ends.w - ends.y
     length = dr.maximum(i * i + j * j, 1e-10)
     along = ((point[0] - ends.x) * i + (point[1] - ends.y) * j) * ((samples.count - 1) / length)
     k, fraction = cell_of(along, samples.count)
+    # Samples k and k + 1 enclose the pixel. Those that are not computed lie between the computed
+    # ones `left` and `right`.
     left, right = _marked_about(samples, number, k)
     left_value, right_value = (
         dr.gather(type(values), values, number * samples.count + at) for at in (left, right)
     )
+    # Where one of the two has no value, since its ray meets no light, the other stands for both;
+    # where neither has one, the weights are 0.
     has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
     left_value, right_value = (
         dr.select(has_left, left_value, right_value),
         dr.select(has_right, right_value, left_value),
     )
+    # Interpolate samples k and k + 1 between `left` and `right`, and weigh each by its own depth,
+    # which is known for every sample, computed or not.
     pace = dr.rcp(type(along)(right - left))
     weighted = []
     for step, near in ((0, 1 - fraction), (1, fraction)):
@@ -187,12 +206,15 @@ def _on_slice(samples: Samples, values, number, point, depth):
 
 def _marked_about(samples: Samples, number, k):
     """Return the last marked sample up to k and the first after it."""
+    # `left`: of the word of k all bits beyond k are masked out, and the highest that remains is it.
     word, behind = k // WORD, (k + 1) // WORD
     slices = samples.slices.count
     bits = dr.gather(mi.UInt32, samples.bits, word * slices + number)
     left = (
         word * WORD + (WORD - 1) - dr.lzcnt(bits & (mi.UInt32(0xFFFFFFFF) >> (WORD - 1 - k % WORD)))
     )
+    # `right`: of the word of k + 1 the bits below it are shifted out, and the lowest that remains
+    # is it.
     rest = dr.gather(mi.UInt32, samples.bits, behind * slices + number) >> ((k + 1) % WORD)
     # The first sample of a word is always marked.
     return left, dr.select(rest != 0, k + 1 + dr.tzcnt(rest), (behind + 1) * WORD)
@@ -224,6 +246,7 @@ def _apart(first, second):
 
 
 def _agreement(first, second):
+    # 1 up to the difference that is no break; beyond it, it falls with the fourth power.
     close = dr.minimum(AGREES / dr.maximum(_difference(first, second), 1e-6), 1)
     return dr.square(dr.square(close))
 

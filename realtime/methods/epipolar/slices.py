@@ -9,12 +9,12 @@ point
 
     (a, b, c) = (v . left / |left|^2,  v . up / |up|^2,  v . forward),
 
-and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 that of the
-point opposite. From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so that E may
-lie at infinity. A side of the image "faces away" from E if E lies on the inner side of it. The
-sides that do are a connected part of the border: all four where E is in the image, one to three
-otherwise. Slices leave the image at equal steps of length along them (Yusov 2013), and so each
-pixel lies on one half line from E, which leaves the image at a place along the border.
+and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 the image
+of the point opposite. From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so
+that E may lie at infinity. A side of the image "faces away" from E if E lies on the inner side of
+it. The sides that do are a connected part of the border: all four where E is in the image, one to
+three otherwise. Slices leave the image at equal steps of length along them (Yusov 2013), and so
+each pixel lies on one half line from E, which leaves the image at a place along the border.
 
 In a slice e1 = -v/|v| leads from the light to the camera, or along the light, and e2 is at right
 angles to it, on the side of the rays. With the light at the origin the rays of a slice start at (D,
@@ -42,10 +42,10 @@ class Slices:
     width: int  #: of the image [pixels]
     height: int  #: of the image [pixels]
     epipole: tuple[Any, Any, Any]  #: a, b, c, and all times -1 where c < 0; one entry each
-    #: of the border: where it begins along those that face away, and if it does
+    #: by side of the border, where it begins along the sides that face away, and whether it does
     sides: tuple[tuple[Any, Any], ...]
-    length: Any  #: of those sides [pixels], one entry
-    closed: Any  #: whether they are all four: after the last slice comes the first; one entry
+    length: Any  #: of the sides that face away [pixels], one entry
+    closed: Any  #: whether all four do: after the last slice comes the first; one entry
     towards: Any  #: e1, one entry
     distance: Any  #: D [m], one entry; w = 0: 1
     away: Any  #: w = 0: from the position that stands for the light's to the camera [m], one entry
@@ -65,6 +65,8 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     participating media with single scattering*. Yusov 2013, *Practical implementation of light
     scattering effects using epipolar sampling and 1D min/max binary trees*.
     """
+    # (a, b, c) of the docstring. A light in the pinhole has no direction; the view's own then
+    # serves, whose E is the centre of the image.
     Float = type(camera.origin.x)
     v = light.toward(camera.origin)
     distance = dr.norm(v) if light.w else Float(1)
@@ -73,7 +75,10 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     a = dr.dot(v, camera.left) / dr.squared_norm(camera.left)
     b = dr.dot(v, camera.up) / dr.squared_norm(camera.up)
     c = dr.dot(v, camera.forward)
+    # Times sign(c): then (a - i c, b - j c) points to E from any (i, j).
     epipole = tuple(dr.select(c < 0, -component, component) for component in (a, b, c))
+    # The slices leave the image in the middles of `count` equal parts of the sides that face away,
+    # and enter it at E, or where the half line from E crosses the border.
     sides, length, closed = _border(camera.width, camera.height, epipole)
     slices = Slices(
         count,
@@ -93,6 +98,7 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     place = (Float(dr.arange(mi.UInt32, count)) + 0.5) * (length / count)
     leave = _at_border(slices, place)
     enter = _entry(slices, *leave)
+    # e2 lies on the side of the ray through the place where the slice leaves.
     out = camera.forward + camera.left * leave[0] + camera.up * leave[1]
     across = _at_right_angles(out, towards, camera)
     ends = dr.empty(Float, 4 * count)
@@ -121,12 +127,15 @@ def slice_coordinate(slices: Slices, i, j):
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
-    # The half line from E leaves the image through the side that it meets first.
+    # The half line from E leads along (-di, -dj) and leaves the image through the side that it
+    # meets first: `to_i` steps reach the left or right side, `to_j` the top or bottom.
     to_i = dr.select(di < 0, x - i, x + i) / dr.abs(di)
     to_j = dr.select(dj < 0, y - j, y + j) / dr.abs(dj)
     t = dr.minimum(to_i, to_j)
     at_i, at_j = dr.clip(dr.fma(-t, di, i), -x, x), dr.clip(dr.fma(-t, dj, j), -y, y)
     first, second, third, fourth = (begin for begin, _ in slices.sides)
+    # On that side, the length from where it begins, in the direction in which the border is gone
+    # round: the left side up, the top to the right, the right side down, the bottom to the left.
     along_i = dr.select(di < 0, first + (at_j + y), third + (y - at_j))
     along_j = dr.select(dj < 0, second + (x - at_i), fourth + (at_i + x))
     # A point on E itself belongs to every slice: take any.
@@ -138,6 +147,7 @@ def slice_coordinate(slices: Slices, i, j):
 def neighbour(slices: Slices, number):
     """Return the slice of a whole number that may lie beyond the first or the last."""
     last = slices.count - 1
+    # Numbers go round where all four sides face away; otherwise they end at the first and the last.
     round_ = dr.select(
         number < 0, number + slices.count, dr.select(number > last, number - slices.count, number)
     )
@@ -150,15 +160,19 @@ def _towards_epipole(epipole, i, j):
 
 
 def _border(width: int, height: int, epipole):
-    """Return where the sides left, top, right, bottom begin along those that face away,
-    their length, and if all do.
+    """Return by side (left, top, right, bottom) where it begins along the sides that face away
+    and whether it does; the length of the sides that do; and whether all four do.
 
     The border is gone round from the lower left corner, (i, j) = (W/2, -H/2).
     """
+    # A side faces away if E lies on its inner side, as seen from a corner of it. The corners (x, y)
+    # and (-x, -y) serve all four sides.
     x, y = 0.5 * width, 0.5 * height
     left, top = _towards_epipole(epipole, x, y)
     right, bottom = _towards_epipole(epipole, -x, -y)
     faces = (left < 0, top < 0, right > 0, bottom > 0)
+    # Left and right are as long as the image is high, top and bottom as it is wide; sides that do
+    # not face away have no length.
     lengths = [
         type(left)(dr.select(side, float(n), 0)) for side, n in zip(faces, 2 * (height, width))
     ]
@@ -166,6 +180,8 @@ def _border(width: int, height: int, epipole):
     # The first of the connected sides, where they do not close.
     first = [faces[k] & ~faces[k - 1] for k in range(4)]
     first[0] = first[0] | closed
+    # A side begins behind those between it and the first of the connected ones. Which is the first
+    # is known on the device only, so all four are tried, and one of them counts.
     sides = []
     for side in range(4):
         before = type(lengths[0])(0)
@@ -179,6 +195,7 @@ def _border(width: int, height: int, epipole):
 def _at_border(slices: Slices, place):
     """Return (i, j) at a place along the sides that face away."""
     x, y = 0.5 * slices.width, 0.5 * slices.height
+    # By side, the point at the length r from where it begins, the way round of `_border`.
     points = (
         lambda r: (x, r - y),
         lambda r: (x - r, y),
@@ -189,6 +206,7 @@ def _at_border(slices: Slices, place):
     for (begin, faces), point, length in zip(
         slices.sides, points, 2 * (slices.height, slices.width)
     ):
+        # One of the sides holds the place: they do not overlap.
         inside = faces & (place >= begin) & (place < begin + length)
         at_i, at_j = point(place - begin)
         i, j = dr.select(inside, at_i, i), dr.select(inside, at_j, j)
@@ -200,6 +218,8 @@ def _entry(slices: Slices, i, j):
     itself if that is inside.
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
+    # Step t from the border towards E: up to the opposite side of the image, or to E itself, which
+    # t = 1/c reaches, as (di, dj) is c (E - (i, j)).
     di, dj = _towards_epipole(slices.epipole, i, j)
     to_i = dr.select(di > 0, x - i, x + i) / dr.abs(di)
     to_j = dr.select(dj > 0, y - j, y + j) / dr.abs(dj)
@@ -216,9 +236,12 @@ def _at_right_angles(vector, axis, camera: Camera):
 
     def across(side):
         normal = dr.cross(axis, side)
+        # (axis x side) x axis is the part of `side` at right angles to the axis, times |axis|^2.
         return dr.cross(normal, axis)
 
     across_vector = across(vector)
+    # A vector along the axis has no side, and any unit vector across it will do: that by the
+    # camera's left, or by its up where left lies along the axis as well.
     flat = dr.squared_norm(across_vector) <= 1e-12 * dr.squared_norm(vector)
     other = dr.select(
         dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left),

@@ -41,7 +41,7 @@ a slice). Wronski 2014 (the grid, and its sum front to back).
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
@@ -51,11 +51,6 @@ from airlight.realtime.numerics.array_types import Metres, PerRay, four_numbers
 from airlight.realtime.numerics.functions import between_entries
 from airlight.realtime.scene.camera import Camera, row_and_column
 from airlight.realtime.scene.media.medium import Medium, Rays
-
-_RATIO = 8  # far/near
-# optical depth behind a light that deserves slices: e^-6 = 0.25 % of the light comes back from it
-_OPTICAL_REACH = 3.0
-_REACH = 32.0  # the same in distances of the light: the airlight beyond x falls like 1/x
 
 
 @dataclass(frozen=True)
@@ -67,6 +62,7 @@ class Grid:
     slices: int  #: froxels in depth
     camera: Camera
     far: Metres  #: depth where the last slice ends [m]
+    ratio: ClassVar[int] = 8  #: far/near
 
     @property
     def columns(self) -> int:
@@ -75,11 +71,11 @@ class Grid:
 
     def depth(self, s: PerRay) -> Metres:
         """Return z(s) [m]."""
-        return self.far / _RATIO * (dr.exp(s * math.log(1 + _RATIO)) - 1)
+        return self.far / self.ratio * (dr.exp(s * math.log(1 + self.ratio)) - 1)
 
     def fraction(self, depth: Metres) -> PerRay:
         """Return s(z); `depth` is z [m]."""
-        return dr.log(1 + depth / self.far * _RATIO) / math.log(1 + _RATIO)
+        return dr.log(1 + depth / self.far * self.ratio) / math.log(1 + self.ratio)
 
     def column_ray(self, column: PerRay, shift: tuple[Any, Any] = (0, 0)) -> PerRay:
         """Return the vector from the camera to depth 1 in columns, `shift` parts of a
@@ -123,18 +119,24 @@ def column_rays(view: View, grid: Grid) -> Rays:
 
 
 def _frame_depth(view: View) -> Metres:
-    """Return the depth of the farthest surface, or where rays meet none, where too little
-    light comes from to matter.
+    """Return the depth of the farthest surface; where rays meet none, the depth behind which too
+    little light is scattered back to matter.
 
     Grids, and media in vacuum, end by themselves.
     """
     Float, medium, forward = type(view.distance), view.medium, view.camera.forward
+    # If all rays meet surfaces, the farthest surface is the end. A ray that meets none needs the
+    # grid up to where the medium ends, or where the light fades.
     met = dr.isfinite(view.distance)
     depth = view.distance * dr.dot(view.direction, forward)
     surfaces = dr.max(dr.select(met, depth, 0))
-    last = medium.last_depth(view.camera.origin, forward)
-    if last is not None:
-        return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, last), last), 1e-3)
+    medium_end = medium.last_depth(view.camera.origin, forward)
+    if medium_end is not None:
+        return dr.maximum(
+            dr.select(dr.all(met), dr.minimum(surfaces, medium_end), medium_end), 1e-3
+        )
+    # In an unbounded medium the farthest reach of all lights counts. The bound of 0.001 m keeps the
+    # grid from having no depth at all.
     beyond = Float(0)
     for table in view.tables:
         reach = _reach(view, table[dr.arange(mi.UInt32, table.count)].position, medium)
@@ -143,13 +145,11 @@ def _frame_depth(view: View) -> Metres:
 
 
 def _reach(view: View, position: Any, medium: Medium) -> Metres:
+    # Behind the light, slices reach to the optical depth of 3, as e^-6 = 0.25 % of the light comes
+    # back from there; and to 32 distances of the light, as the airlight beyond x falls like 1/x.
     away = position - view.camera.origin
-    reach = dr.minimum(medium.length_of(_OPTICAL_REACH), _REACH * dr.norm(away))
+    reach = dr.minimum(medium.length_of(3.0), 32.0 * dr.norm(away))
     return dr.maximum(dr.dot(away, view.camera.forward), 0) + reach
-
-
-_THIN = 0.1  # optical depth of a slice up to which the series serves
-_TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 
 
 def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
@@ -160,25 +160,30 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
     froxel, a colour [W/(m^3 sr)], evaluated.
     """
     Float, Color, medium = type(view.distance), type(scattered), view.medium
+    # One lane a column: `stretch` turns depths along the axis into distances along its middle ray.
     column = dr.arange(mi.UInt32, grid.columns)
     stretch = dr.norm(grid.column_ray(column))
+    # Slice by slice from front to back; the first of the slices + 1 values is that at the camera,
+    # 0.
     volume = dr.zeros(Float, 4 * (grid.slices + 1) * grid.columns)
 
-    def step(number, x, kept, total):
+    def step(number, x, transmittance, total):
         end = grid.depth((Float(number) + 1) / grid.slices) * stretch
         thickness = end - x
+        # L_{k+1} = L_k + T_k S_k D_k (1 - exp(-z))/z, channel by channel, z the optical depth of
+        # the slice.
         depths = medium.optical_depth(rays, x, end)
         source = dr.gather(Color, scattered, number * grid.columns + column)
         passed = [dr.exp(-depth) for depth in depths]
         weights = [
-            fraction * thickness * _mean_transmittance(depth, end)
-            for fraction, depth, end in zip(kept, depths, passed)
+            before * thickness * _mean_transmittance(depth, through)
+            for before, depth, through in zip(transmittance, depths, passed)
         ]
         total = total + source * (weights[0] if len(weights) == 1 else Color(*weights))
-        kept = [fraction * end for fraction, end in zip(kept, passed)]
+        transmittance = [before * through for before, through in zip(transmittance, passed)]
         value = four_numbers(Float)(total.x, total.y, total.z, 0)
         dr.scatter(volume, value, (number + 1) * grid.columns + column)
-        return number + 1, end, kept, total
+        return number + 1, end, transmittance, total
 
     dr.while_loop(
         state=(
@@ -187,19 +192,22 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
             [dr.full(Float, 1, grid.columns) for _ in range(medium.channels)],
             dr.zeros(Color, grid.columns),
         ),
-        cond=lambda number, x, kept, total: number < grid.slices,
+        cond=lambda number, x, transmittance, total: number < grid.slices,
         body=step,
-        labels=("number", "x", "kept", "total"),
+        labels=("number", "x", "transmittance", "total"),
     )
     return volume
 
 
 def _mean_transmittance(depth: Any, passed: Any) -> Any:
     """Return (1 - exp(-z))/z, the mean of exp(-t) for t from 0 to z; `passed` is exp(-z)."""
-    series = type(depth)(1 / math.factorial(_TERMS))
-    for order in range(_TERMS - 1, 0, -1):
+    # Up to z = 0.1 the series sum_k (-z)^k / (k + 1)! serves, as 1 - exp(-z) cancels there. Eight
+    # terms leave out 0.1^8/9! = 3e-14. Horner's scheme begins at the last term.
+    thin, terms = 0.1, 8
+    series = type(depth)(1 / math.factorial(terms))
+    for order in range(terms - 1, 0, -1):
         series = dr.fma(-depth, series, 1 / math.factorial(order))
-    return dr.select(depth > _THIN, (1 - passed) / depth, series)
+    return dr.select(depth > thin, (1 - passed) / depth, series)
 
 
 def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
@@ -208,10 +216,13 @@ def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
     """
     Float, camera = type(view.distance), view.camera
     row, column = row_and_column(camera, view.pixel)
+    # (u, v) counts columns from the middle of the first one; a pixel behind the last slice takes
+    # the value at its end.
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)
     across = [(v / (grid.height - 1), grid.height), (u / (grid.width - 1), grid.width)]
+    # Values stand at the ends of slices in depth and at the middles of columns across.
     red, green, blue, _ = between_entries(
         volume, [(grid.fraction(depth), grid.slices + 1), *across], 4
     )

@@ -44,9 +44,6 @@ from airlight.realtime.scene.media.medium import Rays
 #: whether it reaches the point.
 Visibility = Callable[[Any, int], Callable[[Light, Any], Any]]
 
-_GROWTH = 1.2207440846057596  # g^4 = g + 1
-_STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
-
 
 @dataclass(frozen=True)
 class FroxelPoints:
@@ -63,10 +60,14 @@ def frame_shift(view: View) -> tuple[Any, Any, Any]:
     """Return by how much the samples of a frame are moved from the middles of
     froxels, in parts of a froxel.
     """
+    # n/g, n/g^2 and n/g^3 modulo 1 as whole numbers of 32 bits, which wrap by themselves; taken
+    # with a sign they lie from -1/2 to 1/2.
+    growth = 1.2207440846057596  # g^4 = g + 1
+    steps = tuple(round(2**32 / growth**power) % 2**32 for power in (1, 2, 3))
     Float, begin = type(view.distance), view.random.of_run()
     across, down, deep = (
         Float(mi.Int32(word + view.frame * mi.UInt32(step))) * 2.0**-32
-        for word, step in zip(begin, _STEPS, strict=False)
+        for word, step in zip(begin, steps, strict=False)
     )
     return across, down, deep
 
@@ -85,10 +86,12 @@ def scattered_light(
     points from the middles of the froxels, in parts of a froxel across, down and in depth;
     `visible`: which light reaches which point.
     """
+    # The points do not depend on the light: they are found once for all tables.
     points = _froxel_points(view, grid, rays, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
 
     for place, table in enumerate(view.tables):
+        # `visible` is asked once a table; the light and its number come with each row.
         reaches = visible(points.point, place)
 
         def scattered(light: Light, number: Any, reaches: Any = reaches) -> Any:
@@ -101,6 +104,7 @@ def scattered_light(
 
 def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, Any]) -> FroxelPoints:
     Float = type(view.distance)
+    # Slice by slice, column by column within a slice, as `accumulated` gathers them.
     lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
     number = lane // grid.columns
     column = lane - number * grid.columns
@@ -109,7 +113,10 @@ def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, An
         grid.depth(Float(number) / grid.slices),
         grid.depth((Float(number) + 1) / grid.slices),
     )
+    # The sample lies on the ray that is shifted across, in depth between both ends of the froxel.
     point = dr.fma(ray, dr.lerp(begin, end, 0.5 + shift[2]), view.origin)
+    # The medium between the ends of the froxel is that along the middle ray, where it was found for
+    # all slices of the column at once.
     middle = grid.column_ray(column)
     length = dr.norm(middle)
     direction = middle / length
@@ -124,6 +131,8 @@ def _least_square(grid: Grid, begin: Any, end: Any) -> Any:
     """Return b^2 of froxels between two depths [m^2]."""
     camera = grid.camera
     depth = 0.5 * (begin + end)
+    # b^2 = a^2/3 with a^2 a quarter of the squared diagonal, whose parts are across, at the middle
+    # depth, and along the axis.
     across = dr.squared_norm(camera.left * (camera.width / grid.width)) + dr.squared_norm(
         camera.up * (camera.height / grid.height)
     )
@@ -141,7 +150,9 @@ def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
     strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * profile(
         light, points.point, -toward * dr.rsqrt(dr.maximum(square, 1e-30))
     )
+    # c albedo sigma_t p of all media in parts of `unit`, one value for each froxel.
     value = strength * medium.mean_source(points.rays, *points.ends, _at(cosine))
+    # The depth to the light is walked only where some light arrives and is scattered.
     some = lit & (sum(value) > 0 if dr.depth_v(value) > 1 else value > 0)
     depths = medium.depth_to_light(light, points.point, r, active=some)
     return dr.select(some, value * medium.transmittance(depths), 0)

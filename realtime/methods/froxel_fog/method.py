@@ -42,8 +42,6 @@ from airlight.realtime.shadow_maps.shadow_map import (
     map_size,
 )
 
-_NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
-
 
 @dataclass(frozen=True)
 class FroxelFog(Method):
@@ -92,10 +90,13 @@ class FroxelFog(Method):
 
     def check(self, scene):
         """Refuse a grid and maps that need more memory than the machine has."""
+        # A froxel has 12 numbers: scattered light and airlight, four each, and as much on the way.
         across, down, deep = self.grid_size
         Float = type(scene.camera.origin.x)
-        froxels = _NUMBERS * bytes_of(Float) * across * down * deep
+        froxels = 12 * bytes_of(Float) * across * down * deep
         check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
+        # Maps need their room beside the froxels: hemispheres for light samples, cubes or single
+        # faces for other lights.
         if self.shadow == "map" and scene.features.shadows:
             samples = sum(light.source is not None for light in scene.lights)
             maps = sum(
@@ -113,6 +114,8 @@ class FroxelFog(Method):
             return no_state
 
         def maps(geometry, table):
+            # A table of an area light's samples has one map of a hemisphere for each; other lights
+            # have shadow maps.
             if table.rows.facing is None:
                 return cast_shadow_maps(geometry, table, self.map)
             return cast_hemisphere_maps(geometry, table, self.point_map, for_surfaces=False)
@@ -122,6 +125,9 @@ class FroxelFog(Method):
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
         grid = view_grid(view, size=self.grid_size, far=self.far)
+        # Three kernels: over froxels, over columns, over pixels. The depth of the grid and the
+        # scattered light are evaluated between them, since each kernel reads what the one before it
+        # wrote.
         dr.eval(grid.far)
         shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
@@ -132,8 +138,7 @@ class FroxelFog(Method):
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`.
 
-        With a column a pixel nothing is left of the columns' error; then what is
-        left is that of the slices.
+        With a column for each pixel the columns make no error; the error of the slices remains.
         """
         return (
             ("map", {"shadow": "ray"}),

@@ -24,8 +24,6 @@ import mitsuba as mi
 
 from airlight.realtime.scene.media.medium import LitRays
 
-_LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
-
 
 @dataclass(frozen=True)
 class Steps:
@@ -59,8 +57,10 @@ def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = 
         begin, end, place = x0, x1, (None, None)
     else:
         foot, height = light
+        # g is 0 where the light stands beside the segment; where it stands before or behind the
+        # segment, h is at least g/1024, so that float32 tells the angles of the steps apart.
         gap = dr.maximum(dr.maximum(x0 - foot, foot - x1), 0)
-        height = dr.maximum(height, _LEAST_HEIGHT * gap)
+        height = dr.maximum(height, 2.0**-10 * gap)
         end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
         begin, place = dr.atan2(x0 - foot, height), (foot, height)
     walks = x1 > x0
@@ -110,6 +110,8 @@ def marched_integral(
 
     Float = type(between.width)
 
+    # A medium that sums its depth along the ray is asked for the depth between samples only, one
+    # after another; other media find the depth of each sample by themselves.
     summed = airlight.medium.sums_depth and not running
 
     def step(index, before, depths, total):
@@ -122,10 +124,14 @@ def marched_integral(
             added = airlight.medium.optical_depth(airlight.rays, before, x)
             camera = depths = [depth + more for depth, more in zip(depths, added, strict=True)]
             before = x
+        # As engines do: the extinction at the sample stands for the whole step, and the sample has
+        # the part of it before its own place.
         if running:
             added = [sigma * length for sigma in airlight.medium.extinction(airlight.rays, x)]
             camera = [depth + shift * more for depth, more in zip(depths, added, strict=True)]
             depths = [depth + more for depth, more in zip(depths, added, strict=True)]
+        # dx = dx/du du: `length` is the stretch at the sample times the width in u. Rays without
+        # steps have the width 0, and `lit` may be anything there.
         reached = (between.width > 0) & lit(x)
         return (
             index + 1,
@@ -134,6 +140,8 @@ def marched_integral(
             total + dr.select(reached, airlight.source(x, camera), 0) * length,
         )
 
+    # The depth from the camera to the first step, which a light's cone or the medium may put far
+    # ahead.
     first = airlight.medium.optical_depth(airlight.rays, 0, between.x0) if running or summed else ()
     depths = [depth + dr.zeros(Float, lanes) for depth in first]
     *_, total = dr.while_loop(
@@ -146,8 +154,28 @@ def marched_integral(
 
 
 def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) -> Steps:
-    """Return the steps of rays where a light could reach them and something scatters."""
+    """Return the steps of rays where a light could reach them and something scatters.
+
+    Parameters
+    ----------
+    airlight
+        The rays and the light.
+    distance
+        Where each ray ends, may be infinite [m].
+    steps
+        The number of steps on every ray.
+    spacing
+        'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at
+        infinity both are uniform.
+
+    Returns
+    -------
+    steps
+        The steps; their width is 0 on a ray that has none.
+    """
     light, geometry = airlight.light, airlight.geometry
+    # The part of the ray in which the medium scatters, and in it the part in the light's cone or on
+    # its side; a light at infinity reaches all of it.
     x0, x1 = airlight.medium.part(
         airlight.rays, type(distance)(0), distance, uniform=spacing == "uniform"
     )

@@ -3,7 +3,7 @@
 shape under suns and a sky.
 
 Methods of fog ask the medium for the airlight of lit segments, so it has to be homogeneous, bounded
-by convex shapes, height fog, or a grid for those that march. Methods of clouds cast rays at
+by convex shapes, height fog, or, for methods that march, a grid. Methods of clouds cast rays at
 boundaries of any shape, under lights at infinity.
 """
 
@@ -46,6 +46,8 @@ def _check_fog(scene: Scene, method: Method, near: list[str]) -> None:
             "'homogeneous' only; "
             f"{way_out}"
         )
+    # Media with convex bounds are `bounded_media` as well as clouds; where there are none, some
+    # bound is not convex.
     if medium.clouds is not None and not medium.bounded_media:
         shapes = ", ".join(repr(shape.id()) for shape in scene.boundaries[:3])
         raise InputError(
@@ -53,6 +55,7 @@ def _check_fog(scene: Scene, method: Method, near: list[str]) -> None:
             "only (shapes "
             f"{shapes}); {instead}, or cut the shapes into convex parts"
         )
+    # Light from all directions has no segment of a ray that it lights, and no kernel.
     if any(light.sky is not None for light in scene.lights):
         raise InputError(
             f"{prefix} scene has a sky, an emitter of type 'constant', which this method does not "

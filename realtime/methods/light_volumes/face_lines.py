@@ -15,7 +15,7 @@ On the face of a directional light u, v and s are linear in x itself, so y = x w
 place of s; the ray is cut where s = 0, and all before the largest height is lit.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray
-that stays on the border of two faces is in one of them, that of the first axis: neighbours compute
+that stays on the border of two faces is in the face of the first axis alone: neighbours compute
 the same numbers there, with opposite signs. The line t goes over the part of it beyond the nearest
 height of the face: all before that is lit.
 """
@@ -33,10 +33,6 @@ from airlight.realtime.shadow_maps.inverse_depth_field import (
     texel_heights,
     texel_walls,
 )
-
-_NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
-_STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
-_ROUNDING = 1e-5  # of a height of the map, with room
 
 
 @dataclass
@@ -65,6 +61,7 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
+    # Behind the rectangle of a directional light's map there are no media: the ray ends at s = 0.
     if not heights.projection.w:
         begin, end = _cut(begin, end, s0, ds)
     # The neighbours across come later in the order of axes, except for the last axis; those
@@ -90,21 +87,26 @@ def face_ray(heights: InverseDepthField, face, away, direction, segment) -> Face
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
+    # The root of the pyramid holds the largest height of the face, the nearest surface to the
+    # light.
     zero = mi.UInt32(0)
     _, highest = node_bounds(heights, face, zero, zero, zero)
+    nearer = 1 - 1e-4  # of the nearest surface, with room for rounding
     if not heights.projection.w:
-        # -s
+        # The third product, c0 + x dc, is -s: the line begins where s comes down to the largest
+        # height.
         (*_, c0), (*_, dc) = (
             heights.projection.products(face, vector) for vector in (away, direction)
         )
-        t0, t1 = _cut(begin, end, highest / _NEARER + c0, dc)
+        t0, t1 = _cut(begin, end, highest / nearer + c0, dc)
         walks = (t0 < t1) & (highest > 0)
         ends = [
             _parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, ds), walks)
             for x in (t0, t1)
         ]
         return _face_ray(begin, end, walks, ends, parallel=True)
-    nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
+    # The line begins where the planar depth c reaches the depth of the nearest surface.
+    nearest = nearer / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)
     walks = (t0 < t1) & (highest > 0)
     ends = [_coordinates(heights.size, x, (a0, b0, c0), (da, db, dc), nearest) for x in (t0, t1)]
@@ -120,6 +122,7 @@ def _face_ray(begin, end, walks, ends, *, parallel: bool = False) -> FaceRay:
 
 def _cut(begin, end, start, slope):
     """Cut a segment down to where start + x slope >= 0."""
+    # A slope of 0 cuts all or nothing.
     at = -start / slope
     begin = dr.select(slope > 0, dr.maximum(begin, at), begin)
     end = dr.select(slope < 0, dr.minimum(end, at), end)
@@ -128,14 +131,16 @@ def _cut(begin, end, start, slope):
 
 def _coordinates(size: int, x, origin, direction, nearest):
     """Return u, v [texels], s and y of the point at x."""
+    # At the end of an unbounded ray the direction takes the place of the point: s = 0, y = 1 / dc.
     finite = dr.isfinite(x)
     at = dr.select(finite, x, 0)
     a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
+    # Rounding must not put the point nearer to the light than where the line begins.
     inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
     half = 0.5 * size
     # Stay just within the last column and row: a line along the far border would lie in none.
-    last = size * (1 - dr.epsilon(type(x)))
-    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last) for p in (a, b))
+    last_place = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last_place) for p in (a, b))
     return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
 
 
@@ -146,13 +151,15 @@ def _parallel_coordinates(size: int, x, origin, direction, walks):
     at = dr.select(walks, x, 0)
     a, b, s = (dr.fma(at, d, o) for o, d in zip(origin, direction))
     half = 0.5 * size
-    last = size * (1 - dr.epsilon(type(x)))
-    u, v = (dr.clip(dr.fma(half, p, half), 0, last) for p in (a, b))
+    last_place = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half, p, half), 0, last_place) for p in (a, b))
     return u, v, s, at
 
 
 def _inverse(length):
-    return dr.select(dr.abs(length) < 1 / _STEEP, _STEEP, 1 / length)
+    # Lines of texels that the ray never crosses lie far beyond [0, 1]: 1e30 stands for 1/0.
+    steep = 1e30
+    return dr.select(dr.abs(length) < 1 / steep, steep, 1 / length)
 
 
 def at_line(pair, t):
@@ -173,19 +180,21 @@ class Line:
     right: Any  #: whether columns rise along it
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
-    cells: tuple[tuple[Any, Any], tuple[Any, Any]]  #: column and row of the texels that they lie in
-    #: how far below the height field a point at t = 1 may seem that lies on what it samples
+    #: column and row of the texels that hold the two ends
+    cells: tuple[tuple[Any, Any], tuple[Any, Any]]
+    #: how far below the height field a point at t = 1 may seem although it lies on the surface
     slack: Any
 
 
 def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
-    """Return the line of a ray in a face; D at its ends is that of the texel
-    whose borders lie about them.
+    """Return the line of a ray in a face; D at either end is read in the texel whose borders lie
+    about that end.
     """
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
         at = type(ray.begin)(t)
+        # The texel whose borders lie about this end of the line, and the height there.
         i, j = (
             cell_at(pair, per, at, mi.UInt32(0), mi.UInt32(heights.size))
             for pair, per in ((ray.u, ray.per_u), (ray.v, ray.per_v))
@@ -195,7 +204,8 @@ def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
         height, doubt = _height_in(heights, (face, i, j, ray.walks), four, x, y)
         excess.append(ray.s[t] - height)
         cells.append((i, j))
-        slack = dr.fma(ray.s[t], _ROUNDING, doubt)
+        # The slack at t = 1 stays; 1e-5 of the height is the rounding of the map, with room.
+        slack = dr.fma(ray.s[t], 1e-5, doubt)
     return Line(ray, right, up, (excess[0], excess[1]), (cells[0], cells[1]), slack)
 
 
@@ -207,6 +217,8 @@ def _height_in(heights, texel, four, x, y):
     Next to a wall it is half the range: there the only question is on which of two surfaces the
     point lies.
     """
+    # Over the triangle below the diagonal the height changes with x along the bottom and with y
+    # along the right side; over the one above it along the top and the left side.
     s00, s10, s01, s11 = four
     below = x >= y
     along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)

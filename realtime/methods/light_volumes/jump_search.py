@@ -8,11 +8,11 @@ shadow is upright there, in a plane through the light, and stands somewhere betw
 The same error stands along the whole ray, so it does not average out.
 
 Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of
-the larger one, rays from the light halve the interval between the samples `_HALVINGS` times, each
-time keeping the half with the larger change of height. The last interval holds a small part of the
-change of a slope, and the side stays as it is; it holds the whole change of a jump, and a wall is
-put in its middle. That is the idea of silhouette maps (Sen, Cammarano, Hanrahan 2003), for volumes;
-the map itself stays as it was.
+the larger one, rays from the light halve the interval between the samples six times, down to one of
+`PLACES` parts, each time keeping the half with the larger change of height. The last interval holds
+a small part of the change of a slope, and the side stays as it is; it holds the whole change of a
+jump, and a wall is put in its middle. That is the idea of silhouette maps (Sen, Cammarano, Hanrahan
+2003), for volumes; the map itself stays as it was.
 """
 
 from dataclasses import dataclass
@@ -33,9 +33,7 @@ from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start
 from airlight.realtime.shadow_maps.shadow_map import cast_map_rays
 
-_HALVINGS = PLACES.bit_length() - 1
 _JUMP = 0.05  # of the larger height: walls lower than that are left slanted
-_KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
 #: texels on a side of the nodes in which sides are looked for, those two levels above the texels
 LEAF = 4
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
@@ -65,6 +63,8 @@ class _Edge:
 
 def _edge_of(heights: InverseDepthField, leaf, side) -> _Edge:
     """Return a side by the number of its leaf and its own in there."""
+    # Leaves are counted row by row, face by face; in a leaf the sides along u come first, then as
+    # many along v, each kind in LEAF + 1 lines of LEAF sides.
     nodes = heights.size // LEAF
     row = leaf // nodes
     face = row // nodes
@@ -77,6 +77,8 @@ def _edge_of(heights: InverseDepthField, leaf, side) -> _Edge:
 
 def _jumping_sides(heights: InverseDepthField):
     """Return the sides over which heights differ enough, by their leaves' numbers and their own."""
+    # Heights differ by no more on a side than over its whole leaf: leaves with lower differences
+    # are left out before any side is looked at.
     per_face = (heights.size // LEAF) ** 2
     leaf = dr.arange(mi.UInt32, heights.faces * per_face)
     face = leaf // per_face
@@ -87,15 +89,16 @@ def _jumping_sides(heights: InverseDepthField):
     leaf = dr.compress(high - low > _JUMP * high)
     if not dr.width(leaf):
         return leaf, leaf
+    # Then all sides of the leaves that remain, by the heights at their own ends.
     lane = dr.arange(mi.UInt32, dr.width(leaf) * _SIDES)
     of_leaf, side = dr.gather(mi.UInt32, leaf, lane // _SIDES), lane % _SIDES
     edge = _edge_of(heights, of_leaf, side)
     begin_height, end_height = _ends(heights, edge)
     # The far border of a leaf belongs to the next one, except for the last.
     outer = dr.select(edge.upright, edge.i, edge.j)
-    own = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
+    belongs = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
     some = dr.compress(
-        own & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height))
+        belongs & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height))
     )
     return dr.gather(mi.UInt32, of_leaf, some), dr.gather(mi.UInt32, side, some)
 
@@ -122,6 +125,7 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
     Double, size = mi.Float64, heights.size
 
     def halve(step, number, begin_height, end_height):
+        # The middle of interval `number` of the 2^step intervals of the side.
         middle = (2 * Double(number) + 1) / Double(2 << step)
         column, row = Double(edge.i), Double(edge.j)
         u = dr.fma(dr.select(edge.upright, column, column + middle), 2.0 / size, -1.0)
@@ -130,6 +134,8 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
         height = heights.projection.inverse_depth(
             (type(begin_height)(u), type(begin_height)(v)), distance
         )
+        # The half with the larger change of height is kept: the far one if the middle is nearer in
+        # height to the beginning.
         far = dr.abs(height - begin_height) < dr.abs(height - end_height)
         number = (number << 1) + dr.select(far, mi.UInt32(1), mi.UInt32(0))
         return (
@@ -139,14 +145,19 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
             dr.select(far, end_height, height),
         )
 
+    halvings = PLACES.bit_length() - 1
     step = dr.zeros(mi.UInt32, dr.width(begin_height))
     _, number, low, high = dr.while_loop(
         state=(step, step + 0, begin_height + 0, end_height + 0),
-        cond=lambda step, *_: step < _HALVINGS,
+        cond=lambda step, *_: step < halvings,
         body=halve,
         labels=("step", "number", "begin_height", "end_height"),
     )
-    jumps = dr.abs(low - high) > _KEPT * dr.abs(begin_height - end_height)
+    # A jump keeps at least half the change between the samples in the last interval; a slope keeps
+    # 1/64 of it.
+    jumps = dr.abs(low - high) > 0.5 * dr.abs(begin_height - end_height)
+    # Both texels of a side get its byte: it is the bottom or left side of the one behind it and the
+    # top or right side of the one before it. At the border of a face one of the two is missing.
     behind = (edge.face * size + edge.j) * size + edge.i
     before = behind - dr.select(edge.upright, mi.UInt32(1), mi.UInt32(size))
     place = dr.select(edge.upright, edge.i, edge.j)
@@ -157,6 +168,7 @@ def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
         level, upright = (mi.UInt32(8 * side) for side in shifts)
         number_there = (number + 1) << dr.select(edge.upright, upright, level)
         dr.scatter_reduce(dr.ReduceOp.Or, walls, number_there, texel, jumps & active)
+    # A missing texel is replaced by the other one, which then is in the list twice.
     pair = dr.select(place < size, behind, before), dr.select(place > 0, before, behind)
     dr.eval(walls, pair)
     # Not `dr.concat`: it would put the number of sides into a kernel, which each light that

@@ -77,14 +77,22 @@ def parts_of(four, walls, Float) -> Parts:
     """
     s00, s10, s01, s11 = four
     bottom, top, left, right = sides = _sides_of(walls, Float)
+    # Which of the three lines divides the texel: around a corner, upright or level across it, or
+    # the diagonal. With walls on three or four sides, upright comes before level.
     cut = _cuts_corner(sides)
     upright = bottom.stands & top.stands
     level = left.stands & right.stands & ~upright
+    # x - y is above 0 below the diagonal. An upright line goes from the wall at the bottom to the
+    # one at the top, with the second part right of it; a level line from left to right, with it
+    # above.
     zero, unit = Float(0), Float(1)
     line = _select(upright, (-bottom.place, unit, bottom.place - top.place), (zero, unit, -unit))
     line = _select(level, (-left.place, left.place - right.place, unit), line)
     line = _select(cut, _cut_line(bottom, top, left, right), line)
+    # The slopes of the heights along the bottom, the top, the left and the right.
     below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
+    # The first part: the height of a corner that is cut off; the left side, or the bottom; the
+    # triangle above the diagonal.
     corner = dr.select(
         right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00)
     )
@@ -93,6 +101,9 @@ def parts_of(four, walls, Float) -> Parts:
         dr.select(cut | upright, zero, dr.select(level, below, above)),
         dr.select(cut | level, zero, before),
     )
+    # The second part: the plane through the other three corners, whose slopes are those of the two
+    # sides without walls; the right side, or the top; the triangle below the diagonal. Where (0, 0)
+    # is cut off, the plane's height there follows from the other three.
     at_zero = dr.select(bottom.stands & left.stands, s10 - above, s00)
     second = (
         dr.select(cut, at_zero, dr.select(upright, s10, dr.select(level, s01, s00))),
@@ -118,6 +129,7 @@ def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
     the corner between them.
     """
     Float = type(bottom.place)
+    # Where the two walls stand on the sides that meet, and the corner where they meet.
     x, y = (
         dr.select(bottom.stands, bottom.place, top.place),
         dr.select(left.stands, left.place, right.place),
@@ -152,8 +164,8 @@ def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthFie
     """Return a height field with walls in its texels, and the bounds of its
     nodes as these need them.
 
-    `heights`: the height field; `walls`: the number of each texel; `texels`: those that may have
-    walls; some may be there more than once.
+    `heights`: the height field; `walls`: the number of each texel; `texels`: the numbers of
+    the texels that may have walls, some of them more than once.
     """
     bounds = heights.bounds + 0
     if dr.width(texels):
@@ -179,6 +191,7 @@ def _widen(heights: InverseDepthField, bounds, texel, walls) -> None:
     )
     value = dr.maximum(value, 0)  # no ray comes below
     low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
+    # Every node that holds the texel, from the whole face down to the texel itself.
     for level in range(heights.finest + 1):
         shift = heights.finest - level
         node = face * heights.nodes + level_start(level) + ((j >> shift) << level) + (i >> shift)

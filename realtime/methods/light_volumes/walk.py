@@ -5,7 +5,7 @@ A ray goes over the faces of the map in the order in which it passes them. Over 
 (u, v) goes from node to node of the pyramid of bounds (`realtime.shadow_maps.inverse_depth_field`).
 With D(t) = s of the ray - height, a node over which the ray is above the largest height is lit as a
 whole, one over which it is below the least is dark; the ray steps to its neighbour, one level up
-where the border is that of the parent too. Into any other node it descends, down to the texels. In
+where the border is the parent's too. Into any other node it descends, down to the texels. In
 a texel it crosses the height field not at all, once, or twice
 (`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a
 whole (`realtime.intervals`). Crossings therefore come in the order of the ray.
@@ -44,7 +44,6 @@ from airlight.realtime.methods.light_volumes.face_lines import (
 from airlight.realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
 from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
-_FIRST = 3  # levels below that of the whole face, at which a ray begins
 _FACE_BITS = 3  # of the number of a face in an order of faces
 _NO_FACE = (1 << _FACE_BITS) - 1  # stands behind the last
 
@@ -89,21 +88,26 @@ def sum_lit_intervals(
         return integral(begin, dr.maximum(begin, end))
 
     def of_face(to_come, lit, opened, intervals, reached):
+        # The lowest bits are the number of the next face that the ray passes.
         face = to_come & _NO_FACE
         begin, end = in_face(heights, face, away, direction, segment)
         ray = replace(face_ray(heights, face, away, direction, (begin, end)), stops=end >= x1)
         line = line_of(heights, face, ray)
         # All is lit before the line begins, and after it ends early.
         lit_here = ~ray.walks | (line.excess[0] > 0)
+        # At the border of two faces nothing changes if both say the same, so lit intervals go on
+        # over it.
         passes = begin < end
         changes = passes & (lit != lit_here)
         intervals, opened = _changed(intervals, (begin, begin), opened, lit, (changes, none))
+        # The walk begins in a node three levels below the whole face. Columns and rows are counted
+        # along the line, so that the ray always goes to larger ones.
         way = _way(heights, face, line)
         walk = _Walk(
             i=line.cells[0][0] ^ way.mirror[0],
             j=line.cells[0][1] ^ way.mirror[1],
             t=dr.zeros(type(x1), width),
-            shift=dr.full(mi.UInt32, max(heights.finest - _FIRST, 0), width),
+            shift=dr.full(mi.UInt32, max(heights.finest - 3, 0), width),
             lit=dr.select(passes, lit_here, lit),
             opened=opened,
             intervals=intervals,
@@ -115,8 +119,10 @@ def sum_lit_intervals(
             body=lambda walk: (_next_interval(way, walk, between),),
             labels=("walk",),
         )
-        seen = ~ray.walks | (line.excess[1] > -line.slack)
-        reached = dr.select(passes & (end >= x1), seen, reached)
+        # The face in which the segment ends says whether its end is lit: D there, up to the slack,
+        # which is the bias of this shadow.
+        surface_lit = ~ray.walks | (line.excess[1] > -line.slack)
+        reached = dr.select(passes & (end >= x1), surface_lit, reached)
         return to_come >> _FACE_BITS, walk.lit, walk.opened, walk.intervals, reached
 
     none = dr.full(mi.Bool, False, width)
@@ -146,12 +152,15 @@ def _faces_in_order(heights: InverseDepthField, away, direction, segment):
     count, order = mi.UInt32(0), mi.UInt32(0)
     for face, begin in enumerate(begins):
         rank = mi.UInt32(0)
+        # The rank of a face is how many begin before it; of two that begin at one place the face of
+        # the lower number comes first.
         for other, its_begin in enumerate(begins):
             before = its_begin <= begin if other < face else its_begin < begin
             rank += dr.select(before, mi.UInt32(1), 0)
-        there = begin < dr.inf
-        order |= dr.select(there, mi.UInt32(face) << (_FACE_BITS * rank), 0)
-        count += dr.select(there, mi.UInt32(1), 0)
+        passed = begin < dr.inf
+        # Its number stands at the place of its rank; the mark of no face comes behind the last.
+        order |= dr.select(passed, mi.UInt32(face) << (_FACE_BITS * rank), 0)
+        count += dr.select(passed, mi.UInt32(1), 0)
     return order | (mi.UInt32(_NO_FACE) << (_FACE_BITS * count))
 
 
@@ -172,6 +181,8 @@ class _Way:
 
 def _way(heights: InverseDepthField, face, line: Line) -> _Way:
     ray, last = line.ray, heights.size - 1
+    # Where columns fall along the line they are counted from the far border: all bits the other way
+    # round, as `size` is a power of two.
     mirror = tuple(
         dr.select(rises, mi.UInt32(0), mi.UInt32(last)) for rises in (line.right, line.up)
     )
@@ -204,20 +215,22 @@ def _next_texel(way: _Way, walk: _Walk) -> _Walk:
     """
     none = walk.done & False
 
-    def step(i, j, t, shift, done, found, whole):
-        return _step(way, (i, j, t, shift), walk.lit, found, whole)
+    def step(i, j, t, shift, done, stops, whole):
+        return _step(way, (i, j, t, shift), walk.lit)
 
-    i, j, t, shift, done, found, whole = dr.while_loop(
+    i, j, t, shift, done, stops, whole = dr.while_loop(
         state=(walk.i, walk.j, walk.t, walk.shift, walk.done, none, none & True),
-        cond=lambda i, j, t, shift, done, found, whole: ~(found | done),
+        cond=lambda i, j, t, shift, done, stops, whole: ~(stops | done),
         body=step,
-        labels=("i", "j", "t", "shift", "done", "found", "whole"),
+        labels=("i", "j", "t", "shift", "done", "stops", "whole"),
     )
     line = way.line
+    # In a texel crossings are computed. At a node that is lit or dark as a whole, against what the
+    # ray was before it, the change is at its beginning.
     over = passage(way.heights, way.face, line, (i ^ way.mirror[0], j ^ way.mirror[1]))
     here = texel_crossings(line, over)
-    crosses = found & (whole | here.crosses)
-    twice = found & ~whole & here.crosses & here.twice
+    crosses = stops & (whole | here.crosses)
+    twice = stops & ~whole & here.crosses & here.twice
     x, second = (
         distance_at(line.ray, dr.select(whole, t, here.t)),
         distance_at(line.ray, here.second),
@@ -225,11 +238,11 @@ def _next_texel(way: _Way, walk: _Walk) -> _Walk:
     intervals, opened = _changed(
         walk.intervals, (x, second), walk.opened, walk.lit, (crosses, twice)
     )
-    ahead, end, there = _neighbour(way, i, j, shift)
-    goes_on = found & there
+    ahead, end, has_next = _neighbour(way, i, j, shift)
+    goes_on = stops & has_next
     i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
     return _Walk(
-        i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (found & ~there)
+        i, j, t, shift, walk.lit ^ crosses ^ twice, opened, intervals, done | (stops & ~has_next)
     )
 
 
@@ -239,6 +252,8 @@ def _changed(intervals: LitIntervals, x, opened, lit, changes):
 
     If there are two places, one closes an interval and the other opens one; nothing may wait.
     """
+    # A lit ray closes at the first place and opens again at the second; a dark one opens at the
+    # first and closes at the second.
     (first, second), (changes, twice) = x, changes
     closes = (changes & lit) | twice
     end, begin = dr.select(lit, first, second), dr.select(lit, opened, first)
@@ -246,16 +261,20 @@ def _changed(intervals: LitIntervals, x, opened, lit, changes):
     return intervals, dr.select(changes & ~lit, first, dr.select(twice, second, opened))
 
 
-def _step(way: _Way, node, was_lit, found, whole):
+def _step(way: _Way, node, was_lit):
     """Look at the bounds of one node: go over it, or down into it, or stay."""
     i, j, t, shift = node
     heights, ray = way.heights, way.line.ray
-    ahead, end, there = _neighbour(way, i, j, shift)
+    ahead, end, has_next = _neighbour(way, i, j, shift)
+    # Back to columns and rows of the face, for the node that holds the texel.
     column, row = (i ^ way.mirror[0]) >> shift, (j ^ way.mirror[1]) >> shift
     low, high = node_bounds(heights, way.face, heights.finest - shift, column, row)
+    # s is linear along the line: its values at both ends bound it over the node.
     s0, s1 = at_line(ray.s, t), at_line(ray.s, end)
     lit, dark = dr.minimum(s0, s1) > high, dr.maximum(s0, s1) <= low
     whole, empty = lit | dark, t >= end
+    # Over a node that is as the ray was before it, or in which the line has no length by rounding;
+    # down into one that is neither lit nor dark as a whole. The others wait for `_next_texel`.
     over = (whole & (lit == was_lit)) | empty
     down = ~over & ~whole & (shift > 0)
     # One level up where the neighbour is beyond the parent too.
@@ -263,9 +282,9 @@ def _step(way: _Way, node, was_lit, found, whole):
     shift = dr.select(down, shift - 1, dr.select(up, shift + 1, shift))
     # A ray at the end of its line stays in its last node: it is looked at with the
     # others, and must be in the map.
-    goes_on = over & there
+    goes_on = over & has_next
     i, j, t = (dr.select(goes_on, new, old) for new, old in zip((*ahead, end), (i, j, t)))
-    return i, j, t, shift, over & ~there, ~over & ~down, whole
+    return i, j, t, shift, over & ~has_next, ~over & ~down, whole
 
 
 def _neighbour(way: _Way, i, j, shift):
@@ -274,12 +293,16 @@ def _neighbour(way: _Way, i, j, shift):
     """
     ray, size = way.line.ray, way.heights.size
     Float = type(ray.begin)
+    # The first column and row behind the node, and t where the line crosses each border: it leaves
+    # through the nearer one.
     rest = (mi.UInt32(1) << shift) - 1
     next_i, next_j = (i | rest) + 1, (j | rest) + 1
     out_u, out_v = (
         (Float(n) - start) * per for n, start, per in zip((next_i, next_j), way.start, way.per)
     )
     by_u, end = out_u <= out_v, dr.minimum(dr.minimum(out_u, out_v), 1)
+    # Behind that border the line comes into the first texel; along the border into the texel where
+    # it is, kept within the node's own rows or columns against rounding.
     along_u, along_v = (
         dr.abs(pair[1] - pair[0]) * end + start for pair, start in zip((ray.u, ray.v), way.start)
     )

@@ -9,8 +9,8 @@ values, and an image or None:
             the shader that nothing sets
     again   draws the same for some seconds, and answers with the time of each frame
 
-A time is the wall clock's from the first call to the end of `finish()` where the processor draws:
-the timer queries of llvmpipe are wrong. On a GPU it is that of a query.
+Where the processor draws, a time is the wall clock's from the first call to the end of `finish()`,
+as the timer queries of llvmpipe are wrong. On a GPU a timer query measures it.
 """
 
 import signal
@@ -58,6 +58,7 @@ class Host:
 
     def open(self, message, arrays):
         """Compile all stages and make their images."""
+        # A stage that does not compile ends the work: its log is the answer.
         self.stages = message["stages"]
         for stage in self.stages:
             try:
@@ -70,6 +71,8 @@ class Host:
                     self.programs.append((program, self.context.vertex_array(program, [])))
             except self.error as error:
                 return {"log": str(error)}, None
+            # The picture has one image; a pass has two that take turns, so that one holds the last
+            # frame.
             self.targets.append(
                 [self._image(stage) for _ in range(1 if stage["kind"] == "picture" else 2)]
             )
@@ -85,6 +88,7 @@ class Host:
         else:
             image = self.context.texture(size, channels, zeros, dtype=kind)
             buffer = self.context.framebuffer([image])
+        # Images end at their border, and do not begin again on the other side.
         for axis in "xyz"[: len(size)]:
             setattr(image, f"repeat_{axis}", False)
         return image, buffer
@@ -99,9 +103,10 @@ class Host:
                     int(name[-1])
                 )
             else:
-                kind, own = name.split()
-                if own in self.textures:
-                    self.textures.pop(own).release()
+                kind, sampler = name.split()
+                # The texture of the last call may have another size: it is released.
+                if sampler in self.textures:
+                    self.textures.pop(sampler).release()
                 if kind == "layers":
                     texture = self.context.texture_array(
                         array.shape[::-1], 1, array.tobytes(), dtype="f4"
@@ -112,7 +117,7 @@ class Host:
                     )
                 # nearest: what lies between two surfaces is nothing
                 texture.filter = (0x2600, 0x2600)
-                self.textures[own] = texture
+                self.textures[sampler] = texture
 
     def draw(self, uniforms):
         """Draw one frame, and return the time that it took [ms]."""
@@ -149,12 +154,13 @@ class Host:
             zip(self.stages, self.programs, strict=True)
         ):
             textures = dict(self.textures)
-            for other, made in enumerate(self.stages[:-1]):
+            for other, producer in enumerate(self.stages[:-1]):
                 # A stage that is not drawn yet in this frame shows the last frame.
-                textures[f"{made['name']}_image"] = self.targets[other][
+                textures[f"{producer['name']}_image"] = self.targets[other][
                     now if other < number else last
                 ][0]
-                textures[f"{made['name']}_last"] = self.targets[other][last][0]
+                textures[f"{producer['name']}_last"] = self.targets[other][last][0]
+            # Textures that the program reads take one unit each, in turn.
             unit = 0
             for name, texture in textures.items():
                 if name in program:
@@ -165,7 +171,10 @@ class Host:
             for name, value in {**uniforms, "frame": self.frame, "al_size": size}.items():
                 if name in program:
                     program[name].value = tuple(value) if isinstance(value, list) else value
+            # A pass draws into the image of its two that is not the last frame's.
             image, buffer = self.targets[number][0 if stage["kind"] == "picture" else now]
+            # A pass in 3D is a compute shader in groups of 4 x 4 x 4, as the prelude says; the
+            # barrier lets later stages read what it wrote.
             if buffer is None:
                 image.bind_to_image(0, read=False, write=True)
                 program.run(*(-(-side // 4) for side in size))
@@ -178,6 +187,7 @@ class Host:
         """Draw frames and return the last."""
         self.take(arrays)
         self.uniforms = message["uniforms"]
+        # A history begins with black images and frame 0.
         if message["reset"]:
             self.frame = 0
             for stage, targets in zip(self.stages[:-1], self.targets[:-1], strict=True):
@@ -187,6 +197,7 @@ class Host:
         times = [self.draw(self.uniforms) for _ in range(message["frames"])]
         image, _ = self.targets[-1][0]
         width, height = self.stages[-1]["size"]
+        # Rows from the lowest on, as OpenGL has them; alpha is left out.
         pixels = np.frombuffer(image.read(), dtype=np.float32).reshape(height, width, 4)
         return {"ms": times, "unset": self._unset()}, pixels[..., :3]
 
@@ -211,6 +222,7 @@ def main():
             kind, message, arrays = caller.recv()
         except EOFError:
             return
+        # Without a driver each message has the same answer, so that the caller can name the reason.
         if host is None:
             caller.send(({"missing": missing}, None))
             continue

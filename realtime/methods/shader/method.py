@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A user's shader as a method, named by its file: 'fog.glsl' (`realtime.methods.shader`).
 
-It is the same to frames, reports and the view as a method in Python. Its time is that of the device
-that OpenGL draws on, which has a name, and no part of it is Dr.Jit's.
+It is the same to frames, reports and the view as a method in Python. Its time is measured on the
+device that OpenGL draws on, which has a name; Dr.Jit has no part in it.
 """
 
 from dataclasses import dataclass, make_dataclass
@@ -62,6 +62,7 @@ class Shader(Method):
     def preparation(self, scene):
         """Start the driver and compile the shader; return what casts shadow maps before a frame."""
         self.check(scene)
+        # Every pass is a stage, and the picture, None, is the last.
         host, size = ShaderHost(self.name), (scene.camera.width, scene.camera.height)
         phase = phase_text(scene.medium.phase)
         stages = [
@@ -74,12 +75,14 @@ class Shader(Method):
             }
             for each in (*self.shader.passes, None)
         ]
+        # The driver's log of a mistake becomes a message with the line of the user's file.
         said, _ = host.ask("open", stages=stages)
         if "log" in said:
             raise InputError(f"method {self.name}: {self.shader.mistake(said['log'])}")
         host.device = said["device"]
 
         def run(now):
+            # Maps are cast for a shader that reads them, in scenes where something casts shadows.
             maps = []
             if self._maps and now.features.shadows:
                 maps = [cast_shadow_map(now.geometry, light, self.map) for light in now.lights]
@@ -95,33 +98,40 @@ class Shader(Method):
         arrays: dict[str, Any] = ray_arrays(
             view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words)
         )
+        # All that a shader is given goes to the host by the names of the prelude: textures, layers,
+        # buffers by their bindings, and uniforms.
         arrays["layers shadow_maps"] = map_array(maps)
         arrays |= {
             "buffer 0": light_array(view.lights, maps),
             "buffer 1": phase_table(view.medium.phase),
         }
-        own = {
+        settings = {
             each.name: getattr(self, each.name) for each in self.shader.parameters if each.uniform
         }
+        # A shader without memory, or at its first frame, begins again and draws as many frames as
+        # its history needs.
         first = not self.carries or view.carried is None
-        asked = {
+        request = {
             "reset": first,
             "frames": self.shader.frames if first else 1,
-            "uniforms": uniforms(view) | own,
+            "uniforms": uniforms(view) | settings,
         }
-        said, image = host.ask("frame", arrays, **asked)
+        said, image = host.ask("frame", arrays, **request)
         self.shader.check_unset(said["unset"])
+        # Rows are turned round: row 0 of OpenGL is the lowest.
         wrong = ~np.isfinite(image[::-1]).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
-            seen = arrays["texture al_rays"][::-1][row, column]
+            ray = arrays["texture al_rays"][::-1][row, column]
             raise InputError(
                 f"method {self.name}: {int(wrong.sum())} of {wrong.size} pixels are not finite, "
                 "the first in column "
-                f"{column} of row {row}, ray.direction = ({seen[0]:.6g}, {seen[1]:.6g}, "
-                f"{seen[2]:.6g}), ray.distance = "
-                f"{abs(seen[3]):.6g}"
+                f"{column} of row {row}, ray.direction = ({ray[0]:.6g}, {ray[1]:.6g}, "
+                f"{ray[2]:.6g}), ray.distance = "
+                f"{abs(ray[3]):.6g}"
             )
+        # The whole image comes back; the view takes its own pixels. `carried` only says that a
+        # frame was drawn: images of the last one stay with the host.
         lanes = image[::-1].reshape(-1, 3)[np.array(view.pixel)]
         return Layers(
             checked_radiance(lanes, view, self.name), carried=mi.UInt32(1) if self.carries else None
@@ -149,7 +159,7 @@ def shader_method(name: str) -> type[Method]:
 def drawn_again(state: Any, seconds: float) -> tuple[str, list[float]]:
     """Return the name of the device that draws, and times of the same frame there again [ms].
 
-    `state`: that of a shader, which has drawn a frame; `seconds`: how long to draw.
+    `state`: the state of a shader that has drawn a frame; `seconds`: how long to draw.
     """
     host, _ = state
     said, _ = host.ask("again", seconds=seconds)

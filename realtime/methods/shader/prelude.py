@@ -125,11 +125,12 @@ void main() {{
 def stage_text(
     source: ShaderSource, phase: str, settings: Mapping[str, Any], stage: Pass | None
 ) -> str:
-    """Return the whole text of a stage: that of a pass, or for None of the picture.
+    """Return the whole text of a stage: a pass, or None for the picture.
 
     `phase` is the text of `phase_text`, `settings` are the values of the shader's
     parameters by their names.
     """
+    # A parameter is a literal before the text, where another value compiles again, or a uniform.
     given = [
         f"#define {each.name} {_literal(settings[each.name])}"
         for each in source.parameters
@@ -141,6 +142,7 @@ def stage_text(
         for each in source.parameters
         if each.uniform
     ]
+    # The images of every pass, of this frame and of the last, are there for all stages.
     for each in source.passes:
         given.append(f"uniform sampler{len(each.size)}D {each.name}_image, {each.name}_last;")
     if stage is None:
@@ -149,6 +151,8 @@ def stage_text(
         end = (_PASS_2D if len(stage.size) == 2 else _PASS_3D).format(
             name=stage.name, format=stage.format
         )
+    # `#version` and extensions must come first. `#line` gives our text the numbers of block 1: from
+    # its first line on before the user's text, from its middle on behind it.
     head = ["#version 430 core", *source.extensions, f"#line {OWN_LINES}", _GIVEN, phase, *given]
     return "\n".join([*head, source.text, f"#line {OWN_LINES + 500_000}", end])
 

@@ -27,8 +27,6 @@ from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 
 Array = NDArray[np.float32]
 
-_LAYERS = 2048  # of a texture, which every OpenGL has
-_FAR = 1e18  # in a map where there is no surface: its square is finite [m]
 _LIGHT = np.dtype(
     [
         *[("position", "f4", 3), ("kind", "i4"), ("axis", "f4", 3), ("cos_cutoff", "f4")],
@@ -51,6 +49,7 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(
             f"the medium {what}: {wanted}; use ray-march, or write the method in Python"
         )
+    # A ray that meets nothing ends where little of its light is left: never, in a vacuum.
     if medium.vacuum:
         raise InputError(
             f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t "
@@ -60,11 +59,13 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(
             f"the scene has area lights: {wanted}; use soft-shafts, or write the method in Python"
         )
+    # The faces of all maps are layers of one texture: one of a spot, six of a point light.
+    most = 2048  # layers of a texture, which every OpenGL has
     layers = sum(1 if light.axis is not None else 6 for light in scene.lights)
-    if layers > _LAYERS:
+    if layers > most:
         raise InputError(
             f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: expected "
-            f"{_LAYERS}"
+            f"{most}"
         )
 
 
@@ -74,12 +75,16 @@ def ray_arrays(view: View, *, surfaces: bool) -> dict[str, Array]:
     pixel = np.array(view.pixel)
 
     def image(values: Any) -> Array:
+        # A view may have some of the pixels, in any order; the others stay black. OpenGL's first
+        # row is the lowest.
         lanes = np.zeros((height * width, 4), dtype=np.float32)
         for channel, each in enumerate(values):
             lanes[pixel, channel] = np.array(each, dtype=np.float32)
         return np.ascontiguousarray(lanes.reshape(height, width, 4)[::-1])
 
     medium: Any = view.medium
+    # The foot of the farthest light ahead, and OPTICAL_REACH optical depths behind it; the sign of
+    # the distance says that the ray meets nothing.
     reach = dr.full(type(view.distance), 0, len(pixel))
     for light in view.lights:
         reach = dr.maximum(reach, dr.dot(light.position - view.origin, view.direction))
@@ -101,21 +106,23 @@ def _surfaces(view: View, lanes: int) -> tuple[Any, Any]:
     """
     if not view.features.surfaces:
         return dr.zeros(mi.Vector3f, lanes), dr.zeros(mi.Color3f, lanes)
+    # The view has distances alone: the ray is cast again for what it meets.
     ray = mi.Ray3f(mi.Point3f(view.origin), mi.Vector3f(view.direction))
     met = view.scene.ray_intersect(ray)
     normal = mi.Vector3f(met.sh_frame.n)
     normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
-    seen = met.is_valid()
+    hit = met.is_valid()
     albedo = mi.Color3f(met.bsdf().eval_diffuse_reflectance(met))
-    return dr.select(seen, normal, 0), dr.select(seen, albedo, 0)
+    return dr.select(hit, normal, 0), dr.select(hit, albedo, 0)
 
 
 def map_array(maps: Sequence[ShadowMap]) -> Array:
     """Return the shadow maps of all lights, face by face, as layers of one texture; there
     is one without maps too.
     """
+    # Where there is no surface a texel holds 1e18 m, whose square is finite in a shader.
     layers = [
-        np.minimum(np.array(each.distance, dtype=np.float32), _FAR).reshape(
+        np.minimum(np.array(each.distance, dtype=np.float32), 1e18).reshape(
             -1, each.size + 1, each.size + 1
         )
         for each in maps
@@ -128,21 +135,25 @@ def light_array(lights: Sequence[Light], maps: Sequence[ShadowMap]) -> NDArray[A
     table, layer = np.zeros(len(lights), dtype=_LIGHT), 0
     for number, (row, light) in enumerate(zip(table, lights, strict=True)):
         row["position"], row["intensity"] = host_numbers(light.position, light.intensity)
+        # POINT is 0 and SPOT 1 in the prelude; a light with the map -1 is visible from everywhere.
         row["kind"], row["map"] = light.cone is not None, -1
         if light.cone is not None:
             row["axis"], cos, square = (each if n == 0 else each[0] for n, each in enumerate(
                 host_numbers(light.exact_axis, light.cone.cos, light.cone.square_sin)))  # fmt: skip
             row["cos_cutoff"], row["sin_cutoff"], row["cos_beam"] = cos, np.sqrt(square), cos
+        # Without a beam the cone has a hard edge: cos_beam is cos_cutoff and the transition 0.
         if light.beam is not None:
             row["cos_beam"], row["transition"] = (
                 each[0] for each in host_numbers(light.beam.cos, light.inverse_transition)
             )
         if maps:
-            own = maps[number]
+            shadow_map = maps[number]
             row["map"] = layer
-            layer += own.faces
-            if own.projection.basis is not None:
-                across, up, _ = host_numbers(*own.projection.basis)
+            layer += shadow_map.faces
+            if shadow_map.projection.basis is not None:
+                across, up, _ = host_numbers(*shadow_map.projection.basis)
+                # Divided by their squared lengths: the dot product of a point with them, over that
+                # with the axis, is then its place in [-1, 1].
                 row["across"], row["up"] = across / (across @ across), up / (up @ up)
     return table
 
@@ -157,8 +168,8 @@ def uniforms(view: View) -> dict[str, Any]:
         g = float(host_numbers(phase.g)[0][0])
     elif isinstance(phase, Tabulated):
         p, c = phase_table(phase), np.linspace(-1, 1, dr.width(phase.values))
-        # c p is a parabola in each cell, of which Simpson's rule is exact: four times the
-        # middle is (c0 + c1)(p0 + p1).
+        # c p is a parabola in each cell, for which Simpson's rule is exact: four times the value in
+        # the middle is (c0 + c1)(p0 + p1).
         g = float(np.mean((c * p)[:-1] + (c * p)[1:] + (c[:-1] + c[1:]) * (p[:-1] + p[1:])) / 6)
     return {
         "resolution": [camera.width, camera.height],

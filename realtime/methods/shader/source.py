@@ -25,8 +25,8 @@ from pathlib import Path
 from airlight.errors import InputError
 
 SUFFIX = ".glsl"
-OWN_LINES = 1_000_000  #: of the texts before and behind the user's
-_BLOCK = 1_000_000  # lines of a text
+_BLOCK = 1_000_000  # line numbers of a text: the user's file, ours, and each included file
+OWN_LINES = _BLOCK  #: first line of the texts before and behind the user's
 _FORMATS = ("rgba16f", "rgba32f", "r32f")
 _DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(\w+)[ \t]*(.*?)[ \t]*$")
 _PARAMETER = re.compile(r'(\w+)\s+([^\s"]+)(?:\s+"([^"]*)")?$')
@@ -86,27 +86,31 @@ class ShaderSource:
 
     def mistake(self, log: str) -> str:
         """Return the driver's message by the user's file and line, and the line itself."""
+        # The first error by one of the three forms of messages.
         for pattern in _ERRORS:
-            found = pattern.search(log)
-            if found:
-                number, words = int(found[1]), " ".join(found[2].split())
+            matched = pattern.search(log)
+            if matched:
+                number, words = int(matched[1]), " ".join(matched[2].split())
                 if words.endswith("candidates are:"):  # They follow one a line, set in.
-                    following = map(pattern.match, log[found.end() :].splitlines()[1:])
+                    following = map(pattern.match, log[matched.end() :].splitlines()[1:])
                     candidates = takewhile(
                         lambda words: words.startswith(" "),
                         (line[2] if line else "" for line in following),
                     )
                     words += " " + "; ".join(map(str.strip, candidates))
                 words += "".join(f"; {way}" for name, way in _WAYS_OUT.items() if name in words)
+                # The block says which file the line is in. Block 1 is text of ours: then the
+                # message has no line of the user's.
                 place, line = divmod(number, _BLOCK)
                 if place == 0 or 2 <= place <= len(self.files):
                     chosen = max(place - 1, 0)
                     lines = self.lines[chosen]
-                    shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+                    source_line = lines[line - 1].strip() if 0 < line <= len(lines) else ""
                     return f"{self.files[chosen].name}, line {line}: {words}" + (
-                        f": {shown}" if shown else ""
+                        f": {source_line}" if source_line else ""
                     )
                 return f"{self.path.name}: {words}"
+        # No form fits: the first line that speaks of an error, or all of it.
         lines_of_log = [line.strip() for line in log.splitlines() if "error" in line.lower()]
         return f"{self.path.name}: {lines_of_log[0] if lines_of_log else ' '.join(log.split())}"
 
@@ -122,7 +126,7 @@ class ShaderSource:
         Raises
         ------
         InputError
-            With those that are not set.
+            With the names that are not set.
         """
         unset = [
             name for name in names if not re.search(_INITIAL.format(re.escape(name)), self.text)
@@ -138,12 +142,12 @@ class ShaderSource:
 
 
 def is_shader(name: str) -> bool:
-    """Return whether the name of a method is that of a shader's file."""
+    """Return whether the name of a method is the name of a shader's file."""
     return name.endswith(SUFFIX)
 
 
 def is_users(name: str) -> bool:
-    """Return whether the name of a method, or of a kernel, is that of a user's code."""
+    """Return whether the name of a method, or of a kernel, names a user's code."""
     return ":" in name or is_shader(name)
 
 
@@ -156,6 +160,7 @@ def read_shader(path: Path) -> ShaderSource:
         For a file that cannot be read, a line of ours that means nothing, and a
         function that is not there.
     """
+    # The reader goes through the file and what it includes, and collects the pragmas on its way.
     reader = _Reader(f"method {path}")
     text = reader.read(path, ())
     source = ShaderSource(
@@ -169,6 +174,7 @@ def read_shader(path: Path) -> ShaderSource:
         wanted.append(
             ("vec4", each.name, "Ray ray" if len(each.size) == 2 else "ivec3 cell, ivec3 cells")
         )
+    # A function that a stage calls must be there; the driver would name a line of ours.
     for kind, name, arguments in wanted:
         if not re.search(rf"\b{kind}\s+{name}\s*\([^()]*\)\s*\{{", text):
             raise InputError(f"method {path}: {path.name}: no function {kind} {name}({arguments})")
@@ -198,20 +204,23 @@ class _Reader:
                 else "it is no text in UTF-8"
             )
             raise InputError(f"{self.what}: {path} cannot be read: {words}") from error
+        # Before the included files are read: blocks of lines are in this order.
         self.files.append(path)
         self.lines.append(tuple(text.splitlines()))
+        # The user's file has block 0, our texts block 1, the n-th included file block n + 1.
         first = 0 if not within else len(self.files) * _BLOCK
         out = [f"#line {first + 1}"]
         # Mesa miscounts lines of comments
         for number, code in enumerate(_without_comments(text).splitlines(), 1):
-            found = _DIRECTIVE.match(code)
-            word, rest = (found[1], found[2]) if found else ("", "")
+            matched = _DIRECTIVE.match(code)
+            word, rest = (matched[1], matched[2]) if matched else ("", "")
             place = f"{self.what}: {path.name}, line {number}"
             if word == "include":
                 name = re.fullmatch(r'"([^"]+)"', rest)
                 if name is None:
                     raise InputError(f'{place}: got `#include {rest}`, expected `#include "file"`')
                 other = path.parent / name[1]
+                # `within` holds the files that include this one: a circle would never end.
                 if other.resolve() in (each.resolve() for each in (*within, path)):
                     raise InputError(f"{place}: {name[1]} includes itself")
                 if not other.is_file():
@@ -222,6 +231,7 @@ class _Reader:
                 self.extensions.append(f"#extension {rest}")
             elif word == "pragma" and rest.split(None, 1)[:1] == ["airlight"]:
                 self._pragma(rest.removeprefix("airlight").strip(), place)
+            # `#version` and extensions stand at the top of the whole text; their lines stay, empty.
             out.append("" if word in ("version", "extension") else code)
         return "\n".join(out)
 
@@ -230,6 +240,7 @@ class _Reader:
         rest = rest.strip()
         if word in ("set", "uniform"):
             self.parameters.append(_parameter(rest, place, uniform=word == "uniform"))
+            # Each name is one field of the method's class.
             if len({each.name for each in self.parameters}) < len(self.parameters):
                 raise InputError(
                     f"{place}: two parameters are called {self.parameters[-1].name}; rename one"
@@ -249,51 +260,54 @@ class _Reader:
 
 
 def _parameter(text: str, place: str, *, uniform: bool) -> ShaderParameter:
-    found, word = _PARAMETER.match(text), "uniform" if uniform else "set"
+    matched, word = _PARAMETER.match(text), "uniform" if uniform else "set"
     value: bool | int | float | None = None
-    if found and found[1].isidentifier() and not keyword.iskeyword(found[1]):
-        value = {"true": True, "false": False}.get(found[2])
+    # A default is a truth value, a whole number or a number, whichever it first reads as; that is
+    # the type of the parameter.
+    if matched and matched[1].isidentifier() and not keyword.iskeyword(matched[1]):
+        value = {"true": True, "false": False}.get(matched[2])
         for kind in (int, float) if value is None else ():
             try:
-                value = kind(found[2])
+                value = kind(matched[2])
                 break
             except ValueError:
                 continue
-    if found is None or value is None:
+    if matched is None or value is None:
         raise InputError(
             f'{place}: got `{word} {text}`, expected `{word} NAME DEFAULT "help"`, such as `{word} '
             "STEPS 16`"
         )
-    return ShaderParameter(found[1], value, found[3] or "", uniform)
+    return ShaderParameter(matched[1], value, matched[3] or "", uniform)
 
 
 def _pass(text: str, place: str) -> Pass:
-    found = _PASS.match(text)
-    terms = tuple(found[2].split("x")) if found else ()
-    if found is None or len(terms) not in (2, 3) or not all(map(_TERM.match, terms)):
+    matched = _PASS.match(text)
+    terms = tuple(matched[2].split("x")) if matched else ()
+    if matched is None or len(terms) not in (2, 3) or not all(map(_TERM.match, terms)):
         raise InputError(
             f"{place}: got `pass {text}`, expected `pass NAME size=W/2xH/2` or `pass NAME "
             "size=80x60x64`"
         )
-    if (found[3] or _FORMATS[0]) not in _FORMATS:
+    if (matched[3] or _FORMATS[0]) not in _FORMATS:
         raise InputError(
-            f"{place}: got the format {found[3]}, expected one of {', '.join(_FORMATS)}"
+            f"{place}: got the format {matched[3]}, expected one of {', '.join(_FORMATS)}"
         )
-    return Pass(found[1], terms, found[3] or _FORMATS[0])
+    return Pass(matched[1], terms, matched[3] or _FORMATS[0])
 
 
 def _evaluated(term: str, width: int, height: int) -> int:
-    found = _TERM.match(term)
-    assert found is not None
-    if found[1]:
-        return max(int(found[1]), 1)
-    return -(-(width if found[2] == "W" else height) // max(int(found[3] or 1), 1))
+    matched = _TERM.match(term)
+    assert matched is not None
+    if matched[1]:
+        return max(int(matched[1]), 1)
+    # W/n and H/n are rounded up.
+    return -(-(width if matched[2] == "W" else height) // max(int(matched[3] or 1), 1))
 
 
 def _without_comments(text: str) -> str:
-    """Return the text with spaces for comments, line by line as it was."""
+    """Return the text with spaces in place of comments; lines stay where they are."""
 
-    def blank(found: re.Match[str]) -> str:
-        return re.sub(r"[^\n]", " ", found[0])
+    def blank(comment: re.Match[str]) -> str:
+        return re.sub(r"[^\n]", " ", comment[0])
 
     return re.sub(r"//[^\n]*|/\*.*?(?:\*/|\Z)", blank, text, flags=re.DOTALL)

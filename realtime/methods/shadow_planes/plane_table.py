@@ -28,12 +28,12 @@ c,
     1/x = P w_x + Q w_y,     and it is beyond the edge if x cos g > z, thus w_z > A w_x + B w_y.
 
 It is the limit of the above as D goes to infinity, where z is D more and both sides of 1/x are
-divided by D. Along the ray the radius c grows from 0 as psi does: so c takes the place of psi, in
-the order of azimuths, in the layers gained and, in the order of the paper, in that of the middles
-of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the light is a point there, without
-azimuths to span, and no plane; a ray along the light crosses none.
+divided by D. Along the ray the radius c grows from 0 as psi does, and c takes the place of psi: in
+the order within an azimuth, in the layers gained, and in the order of the paper, which is by the
+middles of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the light is a point there,
+without azimuths to span, and no plane; a ray along the light crosses none.
 
-In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is
+In both cases a plane has four numbers. Two of them give the quotient q, D/x or 1/x, which is
 positive ahead of the camera and falls along the ray. `plane_crossing` is the one place where they
 differ on the device.
 
@@ -43,8 +43,8 @@ Four numbers an edge, no division but one, and no test of depth against a triang
 axis, narrower than most planes: its list holds the planes at its azimuths and few others, and
 serves every ray there, so that nothing is sorted for a frame.
 
-**Order.** In a half plane of one azimuth phi all rays cross planes in one order, that of psi, hence
-of c = A cos(phi) + B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its
+**Order.** In a half plane of one azimuth phi all rays cross planes in one order: by psi, hence
+by c = A cos(phi) + B sin(phi), from large to small (w = 0: P and Q). A wedge is in the order of its
 middle; where that is wrong for a ray the walk notices (`realtime.methods.shadow_planes.sweep`).
 
 **End.** With (w_x, w_y) = sin g (cos phi, sin phi) a plane is crossed at D/x = c sin g - cos g, so
@@ -54,8 +54,8 @@ before the ray ends at x_end only if
 
 Over a wedge of the angle d, c = R cos(phi - phi_0) is at most the larger of its values at both
 ends, over cos(d) where that is positive: phi_0 may lie between them. The largest such bound of an
-entry and all behind it falls along the list; where it falls below what a ray asks for, a search by
-halves says, and there the list ends for the ray.
+entry and all behind it falls along the list. A search by halves finds where it falls below the
+least c that a ray asks for, and there the list ends for the ray.
 
 Azimuths are diamond angles (`realtime.numerics.functions`), 0 to 4 for a full turn. Two edges that
 share a vertex share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray
@@ -84,9 +84,6 @@ NUMBER = (1 << 24) - 1
 GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -31 to 31
 FULL = 1 << 30  #: the plane is at all azimuths of the wedge
 
-# wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
-_FINE = 4
-_LEAST, _MOST = 1 << 6, 1 << 16  # wedges
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 
 
@@ -143,6 +140,7 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
     axis = w * camera - l
     distance = float(np.linalg.norm(axis))
     z = axis / distance if distance > 0 else np.array([0.0, 0.0, 1.0])
+    # The axis to which z is least parallel gives an x across it without cancelling.
     helper = np.eye(3)[np.argmin(np.abs(z))]
     x = np.cross(helper, z)
     x /= np.linalg.norm(x)
@@ -190,6 +188,8 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) 
             ],
             axis=1,
         )
+    # At infinity P and Q give the quotient 1/x and stand first: both cases read the same four
+    # numbers.
     if not w:
         lines = lines[:, [2, 3, 0, 1]]
     spans_azimuths = (first != last) & np.all(np.isfinite(lines), axis=1)
@@ -221,12 +221,14 @@ def wedge_lists(
             f"{NUMBER + 1} of {GAIN_ZERO - 1}: use simpler occluders, or light-volumes"
         )
 
-    # As many wedges as make a plane span a few on average; a wedge lists every plane that it meets.
+    # A wedge lists every plane that it meets. There are so many wedges that a plane spans at least
+    # four on average: then lists are up to a quarter longer than the planes at one azimuth.
+    fine, least, most = 4, 1 << 6, 1 << 16
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
     count = (
-        int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST))
+        int(np.clip(2 ** np.ceil(np.log2(fine * TURN / np.mean(span))), least, most))
         if len(span)
-        else _LEAST
+        else least
     )
     scale = np.float32(count / TURN)
     plane, wedge = _in_wedges(planes, scale, count)
@@ -269,13 +271,14 @@ def _in_wedges(
     """
     low = np.maximum((planes.first * scale).astype(np.int64), 0)
     high = np.minimum((planes.last * scale).astype(np.int64), count - 1)
+    # Plane n is repeated once for each of its wedges, which are counted on from its first one.
     width = high - low + 1
     plane = np.repeat(np.arange(len(width)), width)
     return plane, np.arange(len(plane)) - np.repeat(np.cumsum(width) - width, width) + low[plane]
 
 
 def _largest_behind(values: Array, start: NDArray[np.int64]) -> Array:
-    """Return of each value of a run the largest of it and those behind it;
+    """Return for each value of a run the largest of the values from it to the end of the run;
     `start` is where runs begin.
     """
     # Runs one after another, from the last: a number that grows by more than the values
@@ -292,6 +295,7 @@ def parted(planes: Planes) -> Planes:
     """Part the planes that hold azimuth 0 in two, one that ends beyond 4 and
     one that begins below 0.
     """
+    # A plane that holds azimuth 0 begins beyond where it ends.
     around = planes.first > planes.last
     if not around.any():
         return planes
@@ -348,8 +352,8 @@ def layers_between(
     if not len(number):
         return 0
 
-    # Triangles that the line crosses, by component: those that face the light
-    # and those that are averted.
+    # Triangles that the line crosses, by component: how many face the light and how many are
+    # averted.
     crossed = number[_crosses(occluders, number, (start, direction), reach)]
     sign = np.sign(occluders.normals[crossed] @ l - w * occluders.offsets[crossed])
     component = occluders.component[crossed]
@@ -362,9 +366,9 @@ def layers_between(
 
 
 def _beside_axis(occluders: Occluders, number, start: Array, axes: Array) -> NDArray[np.bool_]:
-    """Return of triangles whether they may meet the axis through `start`: most lie aside of it.
+    """Return whether triangles may meet the axis through `start`.
 
-    It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
+    The axis is x = y = 0. Most triangles lie beside it: all three corners are on one of four sides.
     """
     x, y = axes[:2] @ occluders.vertices.T - (axes[:2] @ start)[:, None]
     sides = (
@@ -395,6 +399,7 @@ def _crosses(
         low, high = (
             occluders.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum)
         )
+        # The side of an edge turns round with the direction in which the triangle runs along it.
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
@@ -483,12 +488,15 @@ def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
     # may have more wedges.
     wedge = dr.minimum(mi.UInt32(azimuth * index.scale), mi.UInt32(TURN * index.scale) - 1)
     first, last = (dr.gather(mi.UInt32, index.start, wedge + step) for step in (0, 1))
-    asked = dr.fma(-_SLACK, ray_end + 1, ray_end + z) if index.w else ray_end
-    asked *= dr.rsqrt(dr.fma(x, x, y * y))
+    # Crossed before the end: c > (D/x_end + cos g)/sin g, with some room for rounding, or at
+    # infinity c > 1/(x_end sin g). An entry whose bound is less is not crossed, nor is any behind
+    # it.
+    least_c = dr.fma(-_SLACK, ray_end + 1, ray_end + z) if index.w else ray_end
+    least_c *= dr.rsqrt(dr.fma(x, x, y * y))
 
     def halve(low, high):
         middle = (low + high) >> 1
-        more = dr.gather(type(x), index.bounds, middle) > asked
+        more = dr.gather(type(x), index.bounds, middle) > least_c
         return dr.select(more, middle + 1, low), dr.select(more, high, middle)
 
     low, _ = dr.while_loop(
@@ -507,6 +515,7 @@ def plane_crossing(index: PlaneIndex, number, way, active):
     a, b, p, q = dr.gather(four_numbers(type(x)), index.lines, number, active)
     if not index.w:
         return dr.fma(a, x, b * y), dr.fma(p, x, q * y) < z
+    # Beyond the edge, x sin g / c > 1: the quotient D/x is below D (P w_x + Q w_y).
     quotient = dr.fma(a, x, dr.fma(b, y, -z))
     return quotient, quotient < index.distance * dr.fma(p, x, q * y)
 

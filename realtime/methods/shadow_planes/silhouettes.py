@@ -15,9 +15,9 @@ which has no area; the count over a direction is whole.
 
 Layers:
 
-* a closed component counts its triangles that face the light, w = 1, or just as well those that are
-  averted: both have the same cycle. Edges between a facing and an averted triangle get c = +-1: the
-  silhouette of the paper.
+* a closed component counts its triangles that face the light, w = 1, or just as well its averted
+  triangles: both have the same cycle. Edges between a facing and an averted triangle get c = +-1:
+  the silhouette of the paper.
 * an open component (border edges, or faces that are not consistently oriented) counts all of its
   triangles, each turned to the light: w = +1 or -1. Its folds get c = +-2, its border edges c =
   +-1.
@@ -108,10 +108,12 @@ def components_in_view(occluders: Occluders, camera: HostCamera, light: Array) -
     """
     l, w = place_and_weight(light)  # noqa: E741
     origin, normals = view_planes(camera)
+    # The eight corners of each box, by their lower and upper coordinates.
     choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])
     corners = occluders.boxes[:, choose, np.arange(3)]
     near = (corners - origin) @ normals.T
     far = (w * corners - l) @ normals.T
+    # A hull lies outside a plane if its corners and the directions away from the light all do.
     outside = np.all(near < 0, axis=1) & np.all(far <= 0, axis=1)
     return ~outside.any(axis=1)
 
@@ -120,6 +122,8 @@ def view_planes(camera: HostCamera) -> tuple[Array, Array]:
     """Return the pinhole and the normals, towards the view, of the planes
     through it that bound the view.
     """
+    # The corners of the image in turn; two neighbours and the pinhole span a plane. The fifth plane
+    # bounds what lies behind the camera.
     half = 0.5 * np.array([camera.width, camera.height])
     signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
     corner = camera.forward + (signs * half) @ np.stack([camera.left, camera.up])

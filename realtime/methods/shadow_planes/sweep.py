@@ -55,7 +55,6 @@ from airlight.realtime.numerics.functions import diamond_angle
 
 #: crossings that wait for others which may come before them, or are collected at once
 FEW, MANY = 2, 8
-_DUE = 3  # marks in the last bits of a place where waiting integrals are added
 
 
 @dataclass(frozen=True)
@@ -94,6 +93,7 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
     layers gained, and its number.
     """
     active = active & (k < ray.count)
+    # An entry holds the number of the plane, its gain, and whether the plane fills the wedge.
     entry = dr.gather(mi.UInt32, index.entries, ray.first + k, active)
     number = entry & NUMBER
     Float = type(ray.x)
@@ -104,6 +104,7 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
         return (azimuth >= first) & (azimuth < last)
 
     counts = active & beyond & (quotient > 0)
+    # A plane that fills the wedge is at the ray's azimuth; the spans of others are read.
     unsure = counts & ((entry & FULL) == 0)
     crossed = dr.if_stmt(
         args=(number, ray.azimuth, unsure),
@@ -129,6 +130,8 @@ def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero
         begin = dr.maximum(index.distance / opened, x0)
         return integral(begin, dr.maximum(dr.minimum(index.distance / closed, x1), begin))
 
+    # All rays walk with the short queue; rays that it loses start again with the long one, and rays
+    # that this loses too collect their crossings from the whole list.
     sweep = _Sweep(index, ray, index.distance / x1, between, zero)
     wanted = x1 > x0
     passed, lost = _walk(sweep, wanted, places=FEW)
@@ -195,6 +198,8 @@ def _pass_plane(sweep: _Sweep, passed: _Passed, quotient, gain, *, crosses, due)
     where `due` or another ends.
     """
     layers = passed.layers + dr.select(crosses, gain, 0)
+    # The light comes back where no layer is left over the point, and ends where the first is
+    # gained.
     opens = crosses & (passed.layers > 0) & (layers <= 0)
     closes = crosses & (passed.layers <= 0) & (layers > 0)
     intervals = add_waiting(passed.intervals, sweep.integral, closes | due)
@@ -232,19 +237,22 @@ def _walk(sweep: _Sweep, active, *, places: int):
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.count
+    # A walk reads `count` planes, and makes as many steps more as the queue has places, to empty
+    # it.
     end = dr.select(active & (count > 0), count + places, 0)
 
     def body(place, waiting, passed, lost):
         reads = place < count
         quotient, gain, crossed = _read(sweep, place, reads)
-        # Where nothing is crossed the queue stays as it is: infinitely near, that comes out again.
-        # Behind the last plane those that wait come out.
+        # Where nothing is crossed the queue stays as it is: an infinite quotient goes in and, as
+        # the nearest, comes out again. Behind the last plane the waiting crossings come out.
         moves = crossed | ~reads
         key, gain = dr.select(moves, quotient, dr.inf), dr.select(moves, gain, 0)
         waiting, nearest, gained = exchange(waiting, key, gain)
         crosses = moves & (nearest > 0)
+        # Quotients fall along the ray: a larger one than the last has come out too late.
         lost |= crosses & (nearest > passed.quotient)
-        due = (place & _DUE) == _DUE
+        due = (place & 3) == 3  # every fourth plane
         passed = _pass_plane(sweep, passed, nearest, gained, crosses=crosses, due=due)
         return place + 1, waiting, passed, lost
 
@@ -276,25 +284,32 @@ def _collect(sweep: _Sweep):
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.count
 
-    def body(place, nearest, more, ties, seen, passed, done):
+    def body(place, nearest, more, ties, ties_read, passed, done):
         reads = place < count
         quotient, gain, crossed = _read(sweep, place, reads)
+        # Beyond the last crossing: of those at the same quotient, the ones that no earlier pass
+        # went over.
         tie = crossed & (quotient == passed.quotient)
-        beyond = crossed & ((quotient < passed.quotient) | (tie & (seen >= ties)))
-        seen += dr.select(tie, mi.UInt32(1), 0)
+        beyond = crossed & ((quotient < passed.quotient) | (tie & (ties_read >= ties)))
+        ties_read += dr.select(tie, mi.UInt32(1), 0)
+        # While the list is read, each crossing goes among the eight nearest, and a farther one
+        # falls out: then another pass is needed.
         nearest, left_out, _ = insert(nearest, dr.select(beyond, quotient, 0), gain)
         more |= left_out > 0
+        # Behind the end of the list they come out one by one, the nearest first; when none is left
+        # the pass ends, and the next begins at the first plane.
         nearest, at, gained = pop(nearest, 0, ~reads)
         crosses = ~reads & (at > 0)
+        # `ties` counts the crossings gone over at the last quotient, over all passes.
         ties = dr.select(crosses, dr.select(at == passed.quotient, ties + 1, 1), ties)
         passed = _pass_plane(sweep, passed, at, gained, crosses=crosses, due=mi.Bool(False))
         empty = ~reads & (at <= 0)
         again = empty & more
-        place, seen = (
+        place, ties_read = (
             dr.select(reads, place + 1, dr.select(again, 0, place)),
-            dr.select(again, 0, seen),
+            dr.select(again, 0, ties_read),
         )
-        return place, nearest, more & ~again, ties, seen, passed, done | (empty & ~more)
+        return place, nearest, more & ~again, ties, ties_read, passed, done | (empty & ~more)
 
     none, no, zero = (
         filled(0, MANY, Float, width),
@@ -303,8 +318,8 @@ def _collect(sweep: _Sweep):
     )
     *_, passed, _ = dr.while_loop(
         state=(zero, none, no, +zero, +zero, _start(sweep), no),
-        cond=lambda place, nearest, more, ties, seen, passed, done: ~done,
+        cond=lambda place, nearest, more, ties, ties_read, passed, done: ~done,
         body=body,
-        labels=("place", "nearest", "more", "ties", "seen", "passed", "done"),
+        labels=("place", "nearest", "more", "ties", "ties_read", "passed", "done"),
     )
     return passed

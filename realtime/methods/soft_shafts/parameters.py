@@ -14,7 +14,6 @@ from airlight.realtime.parameters import parameter
 from airlight.realtime.shadow_maps.shadow_map import map_size
 
 AUTO = "auto"
-MOST_HD = 64.0  #: [pixels]
 
 
 def check_width(value: Any) -> None:
@@ -24,13 +23,15 @@ def check_width(value: Any) -> None:
     """
     if value == AUTO:
         return
+    # A value that is no number, or NaN, fails the comparison below.
     try:
         width = float(value)
     except (TypeError, ValueError):
         width = math.nan
-    if not 0 < width <= MOST_HD:
+    most = 64.0  # [pixels]
+    if not 0 < width <= most:
         raise InputError(
-            f"hd: got {value!r}, expected 'auto' or a number above 0 to {MOST_HD:g} [pixels]"
+            f"hd: got {value!r}, expected 'auto' or a number above 0 to {most:g} [pixels]"
         )
 
 
@@ -129,6 +130,7 @@ class SoftShaftsParameters(Method):
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
+        # `hd=auto` needs a bilateral filter: without filter it is a number.
         plain = {"filter": "none"} | ({"hd": "5"} if self.hd == AUTO else {})
         without = "shadows" if self.shadow == "none" else "map"
         return (

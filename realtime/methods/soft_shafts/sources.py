@@ -48,20 +48,26 @@ class SourceState:
 def source_state(
     scene: Any, lights: LightTable, size: int, *, with_maps: bool, for_surfaces: bool = True
 ) -> SourceState:
-    """Return the state of a source of some `lights`; `size` [texels] is that of its
-    maps, also `for_surfaces`.
+    """Return the state of a source of some `lights`.
+
+    `size`: texels on a side of its maps; `with_maps`: whether it needs any; `for_surfaces`: whether
+    points on surfaces ask them, not only points in the air.
     """
     light = lights.rows
+    # A source of one point has no width and no samples that face anywhere; its state is one shadow
+    # map.
     if light.facing is None:
         maps = cast_shadow_map(scene, light, size) if with_maps else None
         return SourceState(dr.opaque(type(light.position.x), 0, 1), True, maps)
-    # The mean square distance from the middle of a square of the side L is L^2 / 6. It stays on the device.
+    # The mean square distance from the middle of a square of the side L is L^2 / 6. It stays on the
+    # device.
     spread = sum(dr.mean(dr.square(column - dr.mean(column))) for column in light.position)
     hemispheres = None
     if with_maps:
         hemispheres = cast_hemisphere_maps(scene, lights, size, for_surfaces=for_surfaces)
     width = dr.sqrt(6 * spread)
     dr.eval(width)
+    # All samples of a rectangle or disc have the same normal, bit for bit.
     flat = all(np.ptp(np.array(component)) == 0 for component in light.facing.exact_normal)
     return SourceState(width, flat, hemispheres)
 
@@ -81,11 +87,6 @@ AUTO_WIDTH = 0.4
 #: The same where pixels share the points, whose mean over a tile is no staircase:
 #: the least error in `fence`.
 AUTO_WIDTH_SHARED = 1.6
-_STEP = 4  # pixels from one place where the width is looked for to the next
-# how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
-_SEARCH = 4.0
-# what is this much nearer to the light than a surface, of its own distance, is not that surface
-_NEARER = 0.01
 
 
 @dataclass(frozen=True)
@@ -117,11 +118,12 @@ def reached_surfaces(
     `p`: the parameters.
     """
     Float = type(view.distance)
-    there = dr.isfinite(view.distance) & asked
-    place = view.origin + view.direction * dr.select(there, view.distance, 0)
+    mask = dr.isfinite(view.distance) & asked
+    # Rays without a surface, and those that are not asked, stand at the camera: finite, and masked.
+    place = view.origin + view.direction * dr.select(mask, view.distance, 0)
 
     def of_sample(index: Any) -> list[Any]:
-        return _reached_of_sample(view, state, lights, place, there, number_of(index), p)
+        return _reached_of_sample(view, state, lights, place, mask, number_of(index), p)
 
     if count == 1:
         return Reached(*of_sample(mi.UInt32(0)))
@@ -133,7 +135,7 @@ def reached_surfaces(
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(2)]),
-        cond=lambda index, sums: there & (index < count),
+        cond=lambda index, sums: mask & (index < count),
         body=add,
         labels=("index", "sums"),
     )
@@ -145,7 +147,7 @@ def _reached_of_sample(
     state: SourceState,
     lights: LightTable,
     place: Any,
-    there: Any,
+    mask: Any,
     number: Any,
     p: SoftShaftsParameters,
 ) -> list[Any]:
@@ -153,28 +155,29 @@ def _reached_of_sample(
     light = lights[number]
     away = place - light.position
     square = dr.squared_norm(away)
-    # Without shared samples those that face one way count alike: the fraction has N + 1 levels.
+    # Where pixels share no samples, samples that face one way count alike: the fraction has N + 1
+    # levels.
     alike = state.flat and not p.interleave
     weight = 1 if alike else dr.maximum(dr.dot(away, light.normal), 0) / (square * dr.sqrt(square))
     if not view.features.shadows:
-        lit = there
+        lit = mask
     elif p.surfaces == "map":
         assert isinstance(state.maps, HemisphereMaps)
         lit = state.maps.of(number, light).lit_surface(place)
     else:
-        lit = view.visible(place, light, there)
+        lit = view.visible(place, light, mask)
     return [
-        dr.select(there & lit, type(square)(weight), 0),
-        dr.select(there, type(square)(weight), 0),
+        dr.select(mask & lit, type(square)(weight), 0),
+        dr.select(mask, type(square)(weight), 0),
     ]
 
 
 def few_pixels(raster: Raster) -> tuple[Raster, int]:
-    """Return the image of the pixels in which penumbrae are looked for, and how many
-    pixels it is to the next one.
+    """Return the image of the pixels in which penumbrae are looked for, and the step from one
+    of these pixels to the next [pixels].
     """
-    # One pixel of some is enough to look about, where these divide the image.
-    step = _STEP if raster.width % _STEP == 0 and raster.height % _STEP == 0 else 1
+    # Widths change slowly: one pixel in 4 x 4 is enough, where 4 divides the sides of the image.
+    step = 4 if raster.width % 4 == 0 and raster.height % 4 == 0 else 1
     return Raster(raster.width // step, raster.height // step), step
 
 
@@ -194,12 +197,16 @@ def penumbra_width(
         dr.gather(type(distance), guide.values, small_pixels(few, step, raster.width)),
         guide.width,
     )
-    # The mean over a neighbourhood of what is there: both are divided by the same sum of weights.
-    sums = separable(blockers, few, hd=_SEARCH / step, guides=(few_guide,), support=2.0)
+    # Pixels take the width from their neighbours, with a standard deviation of 4 pixels. The sum of
+    # logarithms and the count are divided by the same sum of weights, which cancels in their ratio.
+    search = 4.0
+    sums = separable(blockers, few, hd=search / step, guides=(few_guide,), support=2.0)
     dr.eval(sums, few_guide.values)
     column, row = raster.places()
     near, blocked = upsample(sums, few_guide, guide.values, few, scale=step, column=column, row=row)
+    # The geometric mean of (d_r - d_b)/d_b, and 0 where hardly any sample is blocked nearby.
     mean = dr.select(blocked > 1e-4, dr.exp(near / dr.maximum(blocked, 1e-4)), 0)
+    # A pixel is as wide as this at the distance of the surface [m], and w = L times the mean.
     pixel = dr.norm(camera.left) * dr.select(dr.isfinite(distance), distance, 1)
     return width * mean / pixel
 
@@ -212,13 +219,15 @@ def blockers_of(view: View, state: SourceState, lights: LightTable) -> Any:
     """
     Float, maps = type(view.distance), state.maps
     assert isinstance(maps, HemisphereMaps)
-    there = dr.isfinite(view.distance)
-    place = view.origin + view.direction * dr.select(there, view.distance, 0)
+    hit = dr.isfinite(view.distance)
+    place = view.origin + view.direction * dr.select(hit, view.distance, 0)
 
     def add(number: Any, near: Any, blocked: Any):
+        # (d_r - d_b) / d_b by the map of the sample. Up to 1 % the map shows the surface itself;
+        # and a surface behind the plane of the sample gets nothing from it anyway.
         light = lights[number]
-        beyond = maps.of(number, light).beyond(place, there)
-        before = there & (beyond > _NEARER) & (dr.dot(place - light.position, light.normal) > 0)
+        beyond = maps.of(number, light).beyond(place, hit)
+        before = hit & (beyond > 0.01) & (dr.dot(place - light.position, light.normal) > 0)
         return (
             number + 1,
             near + dr.select(before, dr.log(beyond), 0),
