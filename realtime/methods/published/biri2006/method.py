@@ -4,7 +4,7 @@
 With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments
 [a_i, b_i] has the airlight
 
-    L = sum_i Gamma(b_i) - Gamma(a_i)                                                      (section 4.2).
+    L = sum_i Gamma(b_i) - Gamma(a_i)                                        (section 4.2).
 
 The paper evaluates Gamma on every plane, with a stencil buffer to leave out planes that are
 themselves in shadow. `order` chooses how that is decided:
@@ -14,9 +14,9 @@ themselves in shadow. `order` chooses how that is decided:
   the front facing planes increment the stencil, section 5.1.5 has the back facing ones add: the
   latter is right.)
 * `none` counts every plane: the artefact of Fig. 4.
-* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. That integrates
-  each lit segment; here its ends are two Gammas, whose difference loses digits where a segment is
-  short.
+* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. `shadow-planes`
+  integrates each lit segment; here the ends of a segment are two Gammas, whose difference loses
+  digits where the segment is short.
 
 Each of the other parameters adds one thing that the paper has: a polynomial comes with the kernel
 `taylor`.
@@ -132,7 +132,7 @@ class ShadowPlanes2006(Method):
 
     @property
     def by_rays(self):
-        """Gamma at vertices is that of the whole image."""
+        """Gamma at every crossing belongs to one ray; Gamma at vertices to the whole image."""
         return self.evaluation == "pixel"
 
     @property
@@ -165,6 +165,7 @@ class ShadowPlanes2006(Method):
         reaches the visible surface.
         """
         if state is None:
+            # Nothing casts a shadow: the ray is lit up to the surface.
             rays = self._lit(view, light, kernel)
             return rays.radiance(rays.gamma(view.distance)), True
         value, reached = self._drawn(view, light, state, kernel)
@@ -204,6 +205,7 @@ class ShadowPlanes2006(Method):
         total, surfaces = Color(0), Color(0)  # what the buffer holds, and what of that are surfaces
         lit: list[Any] = []
         for number, light in enumerate(view.lights):
+            # Frames cast rays for the shadows of a light at infinity on surfaces.
             planes = state[number] if view.features.shadows else None
             reached = True
             if planes is not None and light.w:
@@ -238,6 +240,7 @@ class ShadowPlanes2006(Method):
         # Planes take the place of a cone whose intensity does not fall within it.
         cone = bool(self.cone and light.cone is not None and not light.varies)
         airlight = self._lit(view, light.without_cone() if cone else light, kernel)
+        # Vertices in bounded media: medium by medium, each with a Gamma that begins where it does.
         if view.medium.bounded_media and self.evaluation == "vertex":
             start = type(view.medium.albedo)(0) if start is None else start
             assert isinstance(airlight, BoundedRays)
@@ -253,6 +256,7 @@ class ShadowPlanes2006(Method):
                 start=start,
             )
             return total, reaches(index, rays, view.distance)
+        # Without a buffer that rounds in between, the ends of each lit segment are found first.
         if self.order == "exact" and self.evaluation == "pixel" and buffer is None:
             return _differences(view, planes, rays, airlight)
         gammas = self._gammas(view, planes, airlight, cone=cone)
@@ -268,6 +272,7 @@ class ShadowPlanes2006(Method):
         def at(x):
             return airlight.radiance(airlight.gamma(x))
 
+        # At every crossing itself, or between the vertices of the planes and of the surfaces.
         if self.evaluation == "pixel":
             return lambda number, rays, x: at(x), at
         gamma = partial(gamma_at, view, airlight.light, kernel=airlight.kernel)
@@ -321,6 +326,7 @@ class PaperPreparation:
             used = components_in_view(occluders, camera, position)
             if shape is not None:  # the light's shape casts no shadow in its own light
                 used &= ~occluders.of_shape(shape)
+            # The cone of a spot as an occluder: a ring of edges close to the light.
             if self.cone and light.cone is not None:
                 axis, cosine = host_numbers(light.axis, light.cos_cutoff)
                 ring = cone_ring(axis, float(cosine[0]), self.cone)
