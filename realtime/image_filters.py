@@ -252,6 +252,7 @@ def bilateral(
     wide = taps.wide
     Float = type(wide.values[0])
 
+    # The exponent by distance is a sum of one for the row and one for the column.
     def add_row(down: Any, start: Any, total: Any, sums: Any):
         begin = -across * Float(down * down)
         for right in range(2 * r + 1):

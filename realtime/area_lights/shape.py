@@ -149,8 +149,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     if kind is None and not shape.is_mesh():
         raise InputError(
             f"light '{name}': its shape is a {shape.class_name().lower()}; expected a 'rectangle', "
-            "'disk', 'sphere' or "
-            "mesh with an 'area' emitter"
+            "'disk', 'sphere' or mesh with an 'area' emitter"
         )
     # A `null` material lets camera rays and the light of others pass.
     radiance = _read_radiance(shape.emitter(), name)
@@ -281,6 +280,7 @@ def _is_folded(light: AreaLight, normals: Array) -> bool:
 
 
 def _read_radiance(emitter, name: str) -> Array:
+    # A texture or a spectrum has other parameters.
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise InputError(

@@ -228,8 +228,7 @@ def _phase(phase: Phase) -> str:
         return f"{start}{signature}    return {_polynomial(phase.polynomial[::-1], 'up')};\n}}\n"
     raise InputError(
         f"phase: {phase.name!r} reads a table, which cannot be exported; expected isotropic, "
-        "rayleigh, hazy, murky, hg "
-        "or hg-draine:D"
+        "rayleigh, hazy, murky, hg or hg-draine:D"
     )
 
 
@@ -378,7 +377,8 @@ def _ray() -> str:
         "vec3 origin, vec3 direction, vec3 light, vec3 intensity, float x0, float x1, "
         "float sigma_t, vec3 albedo, float g"
     )
-    # The radiance is albedo sigma_t intensity J/(4 pi).
+    # The height is the length of a product of vectors: a difference of squares would lose it where
+    # the ray passes close to the light. The radiance is albedo sigma_t intensity J/(4 pi).
     return f"""// foot and height [m] of a light over a ray; direction has unit length.
 vec2 al_ray(vec3 origin, vec3 direction, vec3 light) {{
     vec3 to = light - origin;

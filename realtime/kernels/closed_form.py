@@ -82,14 +82,13 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
         polynomials = ", ".join(phase.name for phase in PHASES if phase.polynomial)
         raise InputError(
             f"kernel closed-form: phase function {medium.phase.name!r} is no polynomial in the "
-            "cosine; use the kernel "
-            f"'quadrature' or one of {polynomials}"
+            f"cosine; use the kernel 'quadrature' or one of {polynomials}"
         )
     if light.varies:
         raise InputError(
             "kernel closed-form: a spot that falls off between beam and cut-off, or an area light, "
-            "has no closed "
-            "form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
+            "has no closed form here; use the kernel 'quadrature', or a spot with beam_width = "
+            "cutoff_angle"
         )
     foot, h = geometry.foot, geometry.height
     Float = type(h)

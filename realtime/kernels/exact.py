@@ -279,8 +279,8 @@ def _offset(u):
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
-    Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0)
-    included, any segment, unbounded ones and those of length 0 included, and |g| < 1. Where the ray
+    Valid for any extinction, vacuum included; for any ray, a light on its line beside the segment
+    (height 0) included; for any segment, unbounded or of length 0; and for |g| < 1. Where the ray
     meets the light (height 0) on the segment, its ends included, the integral is infinite, and so
     is the result.
 

@@ -41,18 +41,17 @@ def upload_table(Float, *, size: int = 64):
     `size`: entries along each side. Raises InputError for a size outside [2, 2048], for the scalar
     backend, and while a frozen function records.
     """
+    # The scalar backend computes with Python's numbers.
     _check(size)
     if Float is float:
         raise InputError(
             "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA "
-            "variant, or another "
-            "kernel"
+            "variant, or another kernel"
         )
     if dr.flag(dr.JitFlag.FreezingScope):
         raise InputError(
             "kernel table: got a frozen function that records while the table is not on the "
-            "device; call "
-            "Kernel.prepared before, and pass on what it returns"
+            "device; call Kernel.prepared before, and pass on what it returns"
         )
     records = Float(table_records(size).ravel())
     # Evaluated: an input of a frozen function, and no literal of the kernels that read it.
@@ -100,25 +99,26 @@ def table(
         sample, another size, a derivative that is asked for, and while a frozen function records
         without `tables`.
     """
+    # F(u, v) is the integral for the phase function 1, and for a light that shines alike on all of
+    # the segment.
     _check(size)
     if not medium.phase.constant:
         raise InputError(
             f"kernel table: phase function {medium.phase.name!r} is not tabulated; use the kernel "
-            "'quadrature' or an "
-            "isotropic medium"
+            "'quadrature' or an isotropic medium"
         )
     if light.varies:
         raise InputError(
             "kernel table: a spot that falls off between beam and cut-off, or an area light, is "
-            "not tabulated; "
-            "use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
+            "not tabulated; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
+    # Reads are linear between entries: the error of a slope falls only as the size of a cell.
     if dr.grad_enabled((geometry.foot, geometry.height, x0, x1), medium.sigma_t):
         raise InputError(
             "kernel table: what is read between entries of a table has no derivative worth the "
-            "name; use the kernel "
-            "'exact'"
+            "name; use the kernel 'exact'"
         )
+    # Without a table of the caller this call uploads one.
     records = upload_table(type(geometry.height), size=size) if tables is None else tables
     return medium.per_extinction(
         lambda sigma_t: _difference(geometry, (x0, x1), sigma_t, records, size)

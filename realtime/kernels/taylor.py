@@ -126,8 +126,8 @@ def coefficients_of(a, phase: Phase, degree: int, *, printed: bool) -> list:
     if printed and name not in PRINTED_PHASES:
         raise InputError(
             "kernel taylor-printed: the paper prints no coefficients for the phase function "
-            f"{name!r}; use the kernel "
-            f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
+            f"{name!r}; use the kernel 'taylor' or 'quadrature', or one of "
+            f"{', '.join(PRINTED_PHASES)}"
         )
     highest = 4  # of the annex
     if printed and degree > highest:
@@ -219,6 +219,7 @@ def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
     """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int
     I(theta) theta^n dtheta.
     """
+    # From the nodes in [-1, 1] to the range of theta.
     theta0, theta1 = angles
     half, middle = 0.5 * (theta1 - theta0), 0.5 * (theta1 + theta0)
     total = type(half)(0)
@@ -259,7 +260,6 @@ def phase_series(phase: Phase, degree: int, kernel: str):
         )
         raise InputError(
             f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel "
-            "'quadrature' or one "
-            f"of {names}"
+            f"'quadrature' or one of {names}"
         )
     return series

@@ -135,7 +135,7 @@ def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
     `scalar`, `numbers`: as for `aligned_array`.
     """
     dtype = _dtype(scalar, numbers)
-    # One number at the beginning of each aligned piece, the rest of which stays unused.
+    # One number at the beginning of each aligned piece; the rest of a piece stays unused.
     step = _ALIGNMENT // dtype.itemsize
     aligned = _memory(numbers.size * _ALIGNMENT)[: numbers.size * _ALIGNMENT].view(dtype)
     aligned[::step] = numbers

@@ -77,7 +77,7 @@ EXP2 = (
 #: relative error below 2e-8.
 SINH = (2.9275649e-6, 1.9801041e-4, 8.3337125e-3, 1.6666654e-1, 1.0)
 WIDEST = 1.65  #: largest argument of `sinh_bounded`
-LOG2_E = 1.4426950408889634
+LOG2_E = 1.4426950408889634  #: log2(e)
 
 
 def exp_bounded(x):

@@ -60,7 +60,7 @@ class Noise:
 
     def of_run(self, stream: int = 0) -> list[Any]:
         """Return four random words that all pixels and frames of the run share."""
-        # Streams of `uniform` lie below 2^30 and those of `pattern` below 2^31: these follow.
+        # Streams of `uniform` lie below 2^30, streams of `pattern` below 2^31: these follow.
         return pcg4d(0, 0, self.run, 2**31 + stream)
 
     def pattern(
@@ -74,7 +74,7 @@ class Noise:
         """
         frame = mi.UInt32(0) if golden else self.frame
         row, column = place
-        # White noise. Streams of `uniform` lie below 2^30, those of patterns above.
+        # White noise. Streams of `uniform` lie below 2^30, streams of patterns above.
         hashed = pcg4d(pixel, frame, self.run, 2**30 + stream)[0]
         shared = self.of_run(stream)
         if kind == "blue":

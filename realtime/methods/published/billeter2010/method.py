@@ -76,8 +76,7 @@ class LightVolumes2010(Method):
         if not isinstance(scene.medium, Homogeneous) or scene.medium.bounded_media:
             raise InputError(
                 f"method {self.name}: expected one homogeneous medium that fills all space, and "
-                "the scene has another; "
-                "use light-volumes"
+                "the scene has another; use light-volumes"
             )
         # Without shadows there is no map and no mesh.
         if scene.features.shadows:

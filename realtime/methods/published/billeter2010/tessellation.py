@@ -182,6 +182,7 @@ def triangles(divided: list[Any]):
         for sides_now in range(16):
             chosen = numbers[sides == sides_now] if len(numbers) else numbers
             if len(chosen):
+                # The fan as steps from the corner (0, 0) of each quad.
                 first, step = _first_corner(chosen, level, size)
                 fan = np.array(
                     [

@@ -163,8 +163,8 @@ def reaches(index: PlaneIndex, ray: RayPlanes, distance):
 
 
 def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
-    """Return the key of an entry: planes with a larger one count. It is -cos in the
-    paper's order, else D/x.
+    """Return the key of an entry, which planes are compared with: -cos of the angle at the light
+    in the paper's order, D/x in the other orders.
     """
     if order != "paper":
         return index.distance / entry.distance

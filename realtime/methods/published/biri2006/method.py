@@ -80,15 +80,13 @@ class ShadowPlanes2006(Method):
     evaluation: str = parameter(
         "pixel",
         "Gamma at every crossing, or at the vertices of a mesh of each plane and of the surfaces, "
-        "interpolated, as "
-        "published",
+        "interpolated, as published",
         choices=("pixel", "vertex"),
     )
     buffer: str = parameter(
         "float",
         "the paper's frame buffer: 255 steps up to `white` for surfaces and all lights, rounded "
-        "and clamped after each "
-        "pass",
+        "and clamped after each pass",
         choices=("float", "8bit"),
     )
     white: float = parameter(
@@ -99,31 +97,27 @@ class ShadowPlanes2006(Method):
     )
     rows: int = parameter(
         16,
-        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond the "
-        "last Gamma is "
-        "constant",
+        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond "
+        "the last Gamma is constant",
         least=2,
     )
     ambient: float = parameter(
         0.0,
         "radiance of a constant light field in the medium, the paper's stand-in for multiple "
-        "scattering, which adds "
-        "albedo ambient (1 - exp(-sigma_t x)); the reference has none",
+        "scattering, which adds albedo ambient (1 - exp(-sigma_t x)); the reference has none",
         least=0,
         unit="W/(m^2 sr)",
     )
     media: str = parameter(
         "exact",
-        "bounded media: the true depth on both segments, or the constant R of section 4.2 as meant "
-        "or as printed, by "
-        "the polynomial of the kernel where it has one",
+        "bounded media: the true depth on both segments, or the constant R of section 4.2 as "
+        "meant or as printed, by the polynomial of the kernel where it has one",
         choices=FORMS,
     )
     cone: int = parameter(
         0,
-        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, "
-        "and planes bound no "
-        "light",
+        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone "
+        "itself, and planes bound no light",
         least=3,
         most=4096,
         also=(0,),

@@ -89,8 +89,7 @@ def bounded_taylor(
     elif printed:
         raise InputError(
             "kernel taylor-printed: the paper prints no coefficients for the exponent that section "
-            "4.2 must mean; use "
-            "media=printed, or the kernel 'taylor'"
+            "4.2 must mean; use media=printed, or the kernel 'taylor'"
         )
     else:
         check_degree(degree)
