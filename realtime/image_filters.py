@@ -183,15 +183,16 @@ def with_margin(
 class Taps:
     """The sums of a filter, tap by tap."""
 
-    wide: Margined
+    wide: Margined  #: the images with their margin
     here: list[Any]  #: the image at the pixels
-    guide_here: list[Any]  #: the guides there
+    guide_here: list[Any]  #: the guides at the pixels
 
     def add(self, exponent: Any, place: Any, total: Any, sums: list[Any]) -> tuple[Any, list[Any]]:
         """Return the sums of weights and of weighted differences with one more tap.
 
-        `exponent`: to base 2 of the weight by distance, at most 0; `place`: where the tap of every
-        pixel is; `total`, `sums`: so far, of the weights and by channel.
+        `exponent`: to base 2 of the weight by distance, at most 0; `place`: index of the tap of
+        every pixel; `total`: sum of the weights so far; `sums`: weighted differences so far, by
+        channel.
         """
         # The weight falls with the distance and with the difference of every guide: one exponent.
         Float = type(self.here[0])
@@ -218,7 +219,7 @@ class Taps:
 
 
 def taps_of(wide: Margined) -> Taps:
-    """Return a function that adds up the taps of images with a margin."""
+    """Return the sums of a filter over images with a margin, and the pixels that it filters."""
     Float = type(wide.values[0])
     return Taps(
         wide,
@@ -240,8 +241,9 @@ def bilateral(
     """Return an image filtered, see `realtime.image_filters`.
 
     `image`: a number or a colour per pixel, row by row; `raster`: its size; `hd`: standard
-    deviation of the weights in the image [pixels], above 0; `guides`: what says that pixels are
-    alike; with none it is the Gaussian; `support`: half side of the square of taps [`hd`].
+    deviation of the weights in the image [pixels], above 0; `guides`: the images that say which
+    pixels are alike; with none the filter is the Gaussian; `support`: half side of the square of
+    taps [`hd`].
 
     Valid for finite images. Reconstructed from captions of Ali 2016 where the guide is the image
     itself (his SBFS) or a depth (his SoftBiF-VS).
@@ -289,12 +291,14 @@ def separable(
     standard deviation [pixels], above 0: one number, or an array with an entry per pixel; `most`:
     with an array, its upper bound [pixels].
     """
-    # Along rows, then what comes out along columns; each pass has a margin on two sides alone.
+    # Along rows, then the result along columns; each pass has a margin on two sides alone.
     for right in (True, False):
         r = reach(hd if isinstance(hd, float | int) else most, support)
         wide = with_margin(image, guides, raster, right=r if right else 0, down=0 if right else r)
         kind = type(image)
-        del image  # what it was made of is not needed any more: two images with margins
+        # The result of the first pass still refers to its operands, two images with margins, which
+        # are not needed any more.
+        del image
         image = _pass(wide, kind, raster, r, hd=hd, support=support, right=right)
     return image
 
@@ -367,14 +371,14 @@ def bilateral_of_levels(
 
     # A pixel of the image holds its level plus 1; the margin holds 0, which is no level.
     rows = with_margin(dr.select(there, image * levels + 1, 0), (), raster, right=r, down=0)
-    # Along rows all levels read one image, and count the pixels of theirs.
+    # Along rows all levels read one image: a level counts the pixels that have it.
     along_rows = gaussians(
         rows.values * (levels + 1),
         1,
         rows.place,
         lambda level, value: dr.select(dr.abs(value - (level + 1)) < 0.5, Float(1), 0),
     )
-    # Along columns each level has an image of its own, W_l along rows.
+    # Along columns each level has an image of its own, its count along rows; the result is W_l.
     below = [with_margin(counted, (), raster, right=0, down=r) for counted in along_rows]
     counts = gaussians(
         [margined.values[0] for margined in below],
@@ -396,7 +400,7 @@ def tile_average(image: PerRay, raster: Raster, *, guides: tuple[Guide, ...] = (
     """Return the mean over the window about every pixel, weighted by guides.
 
     `image`: a number, a colour or a vector per pixel, row by row; `raster`: its size; `guides`:
-    what says that pixels are alike.
+    the images that say which pixels are alike.
     """
     # The window has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns; their
     # exponents to base 2.

@@ -130,9 +130,9 @@ class PlacedPoints:
 
     positions: Array  #: (points, 3) [m]
     normals: Array  #: unit vectors, (points, 3)
-    intensity: Array  #: of each along its normal, RGB (3,) [W/sr]
+    intensity: Array  #: of each sample along its normal, RGB (3,) [W/sr]
     lift: float  #: how far before the shape rays start [m]
-    chord: float  #: how long a ray is in the shape that comes along the normal from behind [m]
+    chord: float  #: way through the shape of a ray that comes from behind along the normal [m]
 
 
 def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:

@@ -148,7 +148,7 @@ def sum_crossings(
     if entry is None:
         return draw.total, lit
     # The entry is drawn last: in the paper's order the stencil says whether it is lit, in the exact
-    # one the layers there.
+    # order the layers at the entry. Without an order it always counts.
     enters: Any = mi.Bool(True)
     if order == "paper":
         enters = draw.stencil == 0

@@ -158,8 +158,8 @@ def constant_rays(view: View, light: Light, kernel: Kernel | None, form: str) ->
 
 
 def gamma_in(rays: BoundedRays, x):
-    """Return the integral from where the rays enter their one piece up to the distance x,
-    and beyond, RGB [1/m^2].
+    """Return the integral from where the rays enter their one piece up to the distance x [m],
+    which may lie beyond the piece, RGB [1/m^2].
     """
     # Panels may begin at the camera: before the piece they find no medium.
     if not isinstance(rays, ConstantRays) or rays.polynomial is None:

@@ -90,8 +90,8 @@ def gamma_at(view: View, light: Light, point, *, kernel):
 def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
-    `planes`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of
-    occluders; `cone`: whether planes of a cone are among them.
+    `planes`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of each plane of an
+    occluder; `cone`: whether planes of a cone are among them.
     """
     # Planes of a cone begin NEARNESS times as far from the light as the camera: they have as many
     # rows more as they need to come as far as the camera.
@@ -166,8 +166,8 @@ def _last_row(planes: PaperPlanes, plane, rows: int, rows_of_cone: int):
 
 
 def surface_gamma(triangle, gamma: Gamma, otherwise):
-    """Return Gamma at visible triangles, interpolated between their vertices, or what
-    it is where none is seen.
+    """Return Gamma at visible triangles, interpolated between their vertices; `otherwise`
+    where no triangle is visible.
     """
     corners, weights, hits = triangle
     total = sum(
@@ -227,7 +227,7 @@ def sum_in_media(
     `view`, `media`: the frame, and its rays in the media, with the light; `planes`, `rays`: the
     planes and the rays; `rows`, `cone`: see `realtime.methods.published.biri2006.mesh.mesh_gamma`;
     `order`, `buffer`: see `realtime.methods.published.biri2006.crossings.sum_crossings`; `start`:
-    what is in the buffer before, or 0.
+    the content of the buffer before, or 0.
     """
     triangle = visible_triangle(view)
     Color, total = type(view.medium.albedo), start
@@ -273,9 +273,7 @@ def sum_in_media(
 
 
 def _alone(media: BoundedRays, piece: Piece, begin) -> Piece:
-    """Return a piece without what absorbs before it; the published forms
-    continue it without end.
-    """
+    """Return a piece with vacuum before it; the published forms continue it without end."""
     no_depth = tuple(type(begin)(0) for _ in piece.before)
     end = piece.end if not isinstance(media, ConstantRays) else type(begin)(dr.inf)
     return replace(piece, begin=begin, end=end, before=no_depth)
@@ -288,7 +286,7 @@ def _vertex_gamma(view: View, media: BoundedRays, number: int, point) -> Any:
     direction = offset / distance
     rays = view.medium.rays(view.origin, direction)
     piece = camera_pieces(view.medium, rays)[number]
-    # A ray that misses the medium has the foot of its middle for x_n.
+    # A ray that misses the medium has the foot of the medium's middle for x_n.
     begin = piece.begin
     if isinstance(media, ConstantRays):
         toward = view.medium.bounded_media[number].centre - view.origin

@@ -42,7 +42,7 @@ NEARNESS = 1e-6
 
 @dataclass(frozen=True)
 class PaperPlanes:
-    """The shadow planes of one light, and what the paper needs of them more."""
+    """The shadow planes of one light, with the edges and the order that the paper needs."""
 
     index: PlaneIndex
     centres: Any  #: cosine at the middle of the edge of every plane, section 5.1.4; w = 0: -c [m]
@@ -94,8 +94,9 @@ def paper_planes(
 
 
 def edge_centres(ends: Array, w: int) -> Array:
-    """Return by what planes are ordered towards the camera, of the ends (planes,
-    2, 3) of their edges [m].
+    """Return the values by which planes are ordered towards the camera, from the ends (planes,
+    2, 3) of their edges [m]: the cosine at the middle of the edge, or for w = 0 minus its distance
+    from the axis.
     """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     if w:
