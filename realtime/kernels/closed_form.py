@@ -93,7 +93,7 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     # J is even in h, so a height below the rounding of the distances is as good as zero, and
-    # this one keeps E = q/h finite.
+    # this one keeps E = q/h finite, unless the segment begins at the light itself.
     floor = 1e-9 if is_single(Float) else 1e-17
     h = dr.maximum(h, floor * (dr.abs(x0 - foot) + smallest(Float)))
 

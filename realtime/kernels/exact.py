@@ -336,7 +336,7 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
     Float = type(h)
     single = is_single(Float)
     # J is even in h, so a height below rounding of the distances is as good as zero, and
-    # this one keeps E finite.
+    # this one keeps E finite, unless the segment begins at the light itself.
     s0, s1 = x0 - foot, x1 - foot
     h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))

@@ -150,7 +150,7 @@ class ShadowPlanes2006(Method):
         return PaperPreparation(occluders, self.cone, self.order)
 
     def check(self, scene):
-        """Refuse a constant R without bounds, and bounded media that vertices cannot have."""
+        """Refuse bounded media that vertices cannot have."""
         if scene.medium.bounded_media and self.evaluation == "vertex":
             check_vertices(scene.medium, scene.lights)
 
