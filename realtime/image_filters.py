@@ -2,31 +2,29 @@
 """Filters of whole images: Gaussian, bilateral and joint bilateral, by passes or levels;
 means of tiles; up-sampling.
 
-**Guides: images** whose differences between two pixels say how alike these
-are, in units of a width.
+**Guides** are images. The difference of a guide between two pixels, in units of a width, says how
+alike the pixels are.
 
-**How the pixels of an image lie**, images with a margin, from which taps beside the image
-read, and sums over taps.
+**Margins.** The pixels of an image lie row by row. Taps beside the image read a margin around it,
+which no pixel is like; a filter is a sum over taps.
 
-**The bilateral and the joint bilateral filter as they are defined: every pixel, every tap.**
-
+**The bilateral and the joint bilateral filter** as they are defined: every pixel, every tap.
 Tomasi and Manduchi 1998; Petschnigg et al. 2004 and Eisemann and Durand 2004 for guides. A tap
 gathers each channel of image and guides and takes one exponential; there are (2 r + 1)^2 taps with
 r = ceil(support hd).
 
-**Filters along rows and then along columns:** 2 (2 r + 1) taps a pixel in place of (2 r + 1)^2.
-
-The Gaussian is a product, so that this is the same filter, also at the borders, where the taps that
-are left are normalised. With guides it is an approximation (Pham and van Vliet 2005): a tap off the
-row and the column is weighed through a pixel on the column, by its guide. The two passes do not
-commute, so neither do filter and transposition.
+**Filters along rows and then along columns** take 2 (2 r + 1) taps a pixel in place of (2 r +
+1)^2. The Gaussian is a product, so that this is the same filter, also at the borders, where the
+remaining taps are normalised. With guides it is an approximation (Pham and van Vliet 2005): a tap
+off the row and the column is weighed through a pixel on the column, by the guide of that pixel. The
+two passes do not commute, so neither do filter and transposition.
 
 The width may differ from pixel to pixel. Then a pixel takes as many taps as its own width asks for.
 
 **The bilateral filter of an image that takes few values**, exactly, as a sum of Gaussians.
 
-A visibility by N light samples takes the N + 1 values l / N. With W_l(p) the Gaussian of the image
-that is 1 where f is l / N and 0 elsewhere,
+A visibility f by N light samples takes the N + 1 values l / N. With W_l(p) the Gaussian of the
+image that is 1 where f is l / N and 0 elsewhere,
 
     g(p) = f(p) + sum_l G_hr(f(p) - l / N) (l / N - f(p)) W_l(p) / sum_l G_hr(f(p) - l / N) W_l(p):
 
@@ -37,21 +35,21 @@ operations. (Porikli 2008 and Yang, Tan, Ahuja 2009 do the same with quantised i
 an approximation.) A frame of `fence` by `soft-shafts` with 800 x 600 pixels takes 2.9 s of
 processor time, and 6.3 s with the brute force (two cores, in turns, 29 November 2026).
 
-**The mean over a tile of 4 x 4 pixels**, each of which has another of sixteen samples.
+**The mean over a tile of 4 x 4 pixels**, where every pixel has another of sixteen samples.
 
 A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to
 one side. The window therefore has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns:
 the two taps at its ends have the same sample, and each sample has the weight 1. Where a guide
-leaves out some taps, those that are left are normalised.
+leaves out some taps, the other taps are normalised.
 
-**Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes one
-of all, with a depth test.
+**Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes an image of all pixels,
+with a depth test.
 
 Kopf, Cohen, Lischinski, Uyttendaele 2007; the depth test of realTiSoftLS (Ali 2016) is
 reconstructed from captions. A pixel takes the four pixels of the small image about it with the
 weights of bilinear interpolation, each times the weight of the difference of their depths. Where
-none of the four is like the pixel, as at a bar that is thinner than `scale` pixels, the one whose
-depth is nearest stands alone: no weight is made up.
+none of the four is like the pixel, as at a bar that is thinner than `scale` pixels, the one with
+the nearest depth stands alone: no weight is made up.
 
 The pixels of the small image are rays through the pixels `scale` i + `scale` // 2 of the large one.
 """
@@ -65,11 +63,6 @@ import mitsuba as mi
 
 from airlight.realtime.numerics.array_types import Metres, PerRay
 from airlight.realtime.numerics.functions import exp2_bounded
-
-_LEAST, _MOST = 1e-30, 1e30  # depths beyond stand for one another: a depth of 0, the sky [m]
-_SCALE = 0.8493218002880191  # sqrt(log2(e) / 2): exp(-t^2/2) = 2^-(_SCALE t)^2
-# the exponent at which weights stop to fall: 2^-120 = 8e-37 changes no sum in float32
-_FAINTEST = -120.0
 
 
 @dataclass(frozen=True)
@@ -87,14 +80,17 @@ def depth_guide(depth: Metres, width: float) -> Guide:
     The sky, at infinity, is like itself and unlike all surfaces, and so are depths
     that are 0 or no numbers.
     """
-    finite = dr.select(depth < _MOST, dr.maximum(depth, _LEAST), _MOST)
-    return Guide(dr.log(dr.select(dr.isnan(depth), _LEAST, finite)), width)
+    # Depths beyond these stand for one another [m]: a depth of 0 below, the sky above.
+    least, most = 1e-30, 1e30
+    finite = dr.select(depth < most, dr.maximum(depth, least), most)
+    return Guide(dr.log(dr.select(dr.isnan(depth), least, finite)), width)
 
 
 def airlight_guide(airlight: PerRay, width: float) -> Guide:
     """Return the guide of a radiance that spans decades, log(1 + L / mean L); the `width`
     is one of that logarithm.
     """
+    # A black image has the mean 0: the smallest divisor makes its guide 0 everywhere.
     summed = sum(channels(airlight))
     mean = dr.mean(summed)
     return Guide(dr.log(1 + summed / dr.maximum(mean, 1e-30)), width)
@@ -107,18 +103,17 @@ def channels(value: Any) -> list[Any]:
 
 def falloff(width: Any) -> Any:
     """Return c of 2^(-c d^2) = exp(-d^2 / (2 width^2))."""
-    return (_SCALE / width) ** 2 if isinstance(width, float | int) else dr.square(_SCALE / width)
+    scale = 0.8493218002880191  # sqrt(log2(e) / 2): exp(-t^2/2) = 2^-(scale t)^2
+    return (scale / width) ** 2 if isinstance(width, float | int) else dr.square(scale / width)
 
 
 def weight(exponent: Any) -> Any:
     """Return 2^exponent for an exponent of at most 0, an array or a number."""
+    # Weights stop to fall at 2^-120 = 8e-37, which changes no sum in float32.
+    faintest = -120.0
     if isinstance(exponent, float | int):
-        return 2.0 ** max(exponent, _FAINTEST)
-    return exp2_bounded(dr.maximum(exponent, _FAINTEST))
-
-
-#: Value in the margin of a guide: unlike all pixels.
-_UNLIKE = 1e15
+        return 2.0 ** max(exponent, faintest)
+    return exp2_bounded(dr.maximum(exponent, faintest))
 
 
 @dataclass(frozen=True)
@@ -142,7 +137,7 @@ class Raster:
 
 @dataclass(frozen=True)
 class Margined:
-    """Images with a margin of `right` and `down` pixels on each side, evaluated."""
+    """Images with a margin on each side, evaluated."""
 
     values: list[Any]  #: channels of the image, 0 in the margin
     #: channels of the guides, each with its width; unlike all pixels in the margin
@@ -155,20 +150,27 @@ class Margined:
 def with_margin(
     image: Any, guides: tuple[Guide, ...], raster: Raster, *, right: int, down: int
 ) -> Margined:
-    """Return an image and its guides with a margin in which no pixel is like one of the image."""
+    """Return an image and its guides with a margin in which no pixel is like one of the image.
+
+    `right`, `down`: how wide the margin is on each side, along rows and along columns [pixels].
+    """
     Float = type(channels(image)[0])
     width = raster.width + 2 * right
     column, row = raster.places()
     place = (row + down) * width + column + right
 
+    # Without a margin taps beside the image would have to be tested, or read from other rows.
     def wide(channel: Any, margin: float) -> Any:
         whole = dr.full(Float, margin, width * (raster.height + 2 * down))
         dr.scatter(whole, Float(channel), place)
         return whole
 
+    # The guides in the margin are unlike all pixels; without guides a second image counts the taps
+    # that lie within.
+    unlike = 1e15
     values = [wide(channel, 0) for channel in channels(image)]
     wide_guides = [
-        (wide(channel, _UNLIKE), guide.width)
+        (wide(channel, unlike), guide.width)
         for guide in guides
         for channel in channels(guide.values)
     ]
@@ -181,16 +183,18 @@ def with_margin(
 class Taps:
     """The sums of a filter, tap by tap."""
 
-    wide: Margined
+    wide: Margined  #: the images with their margin
     here: list[Any]  #: the image at the pixels
-    guide_here: list[Any]  #: the guides there
+    guide_here: list[Any]  #: the guides at the pixels
 
     def add(self, exponent: Any, place: Any, total: Any, sums: list[Any]) -> tuple[Any, list[Any]]:
         """Return the sums of weights and of weighted differences with one more tap.
 
-        `exponent`: to base 2 of the weight by distance, at most 0; `place`: where the tap of every
-        pixel is; `total`, `sums`: so far, of the weights and by channel.
+        `exponent`: to base 2 of the weight by distance, at most 0; `place`: index of the tap of
+        every pixel; `total`: sum of the weights so far; `sums`: weighted differences so far, by
+        channel.
         """
+        # The weight falls with the distance and with the difference of every guide: one exponent.
         Float = type(self.here[0])
         for (channel, width), middle in zip(self.wide.guides, self.guide_here, strict=True):
             difference = dr.gather(Float, channel, place) - middle
@@ -200,6 +204,7 @@ class Taps:
             fraction = dr.gather(Float, self.wide.inside, place) * weight(exponent)
         else:
             fraction = weight(exponent)
+        # Differences from the pixel itself: where all taps are alike nothing is rounded.
         sums = [
             dr.fma(fraction, dr.gather(Float, channel, place) - middle, so_far)
             for channel, middle, so_far in zip(self.wide.values, self.here, sums, strict=True)
@@ -214,7 +219,7 @@ class Taps:
 
 
 def taps_of(wide: Margined) -> Taps:
-    """Return a function that adds up the taps of images with a margin."""
+    """Return the sums of a filter over images with a margin, and the pixels that it filters."""
     Float = type(wide.values[0])
     return Taps(
         wide,
@@ -236,17 +241,20 @@ def bilateral(
     """Return an image filtered, see `realtime.image_filters`.
 
     `image`: a number or a colour per pixel, row by row; `raster`: its size; `hd`: standard
-    deviation of the weights in the image [pixels], above 0; `guides`: what says that pixels are
-    alike; with none it is the Gaussian; `support`: half side of the square of taps [`hd`].
+    deviation of the weights in the image [pixels], above 0; `guides`: the images that say which
+    pixels are alike; with none the filter is the Gaussian; `support`: half side of the square of
+    taps [`hd`].
 
     Valid for finite images. Reconstructed from captions of Ali 2016 where the guide is the image
     itself (his SBFS) or a depth (his SoftBiF-VS).
     """
+    # A square of taps about every pixel: a loop over its rows, and the taps of a row side by side.
     r, across = reach(hd, support), falloff(hd)
     taps = taps_of(with_margin(image, guides, raster, right=r, down=r))
     wide = taps.wide
     Float = type(wide.values[0])
 
+    # The exponent by distance is a sum of one for the row and one for the column.
     def add_row(down: Any, start: Any, total: Any, sums: Any):
         begin = -across * Float(down * down)
         for right in range(2 * r + 1):
@@ -283,11 +291,14 @@ def separable(
     standard deviation [pixels], above 0: one number, or an array with an entry per pixel; `most`:
     with an array, its upper bound [pixels].
     """
+    # Along rows, then the result along columns; each pass has a margin on two sides alone.
     for right in (True, False):
         r = reach(hd if isinstance(hd, float | int) else most, support)
         wide = with_margin(image, guides, raster, right=r if right else 0, down=0 if right else r)
         kind = type(image)
-        del image  # what it was made of is not needed any more: two images with margins
+        # The result of the first pass still refers to its operands, two images with margins, which
+        # are not needed any more.
+        del image
         image = _pass(wide, kind, raster, r, hd=hd, support=support, right=right)
     return image
 
@@ -298,13 +309,15 @@ def _pass(
     taps, across = taps_of(wide), falloff(hd)
     Float, step = type(wide.values[0]), 1 if right else wide.row
     total, sums = dr.zeros(Float, raster.count), [dr.zeros(Float, raster.count) for _ in taps.here]
+    # One width: all pixels take the same taps, whose weights by distance are constants.
     if isinstance(hd, float | int):
         for offset in range(2 * r + 1):
             # With guides the exponent is an array.
             exponent = -across * (offset - r) ** 2
             total, sums = taps.add(exponent, wide.place - r * step + offset * step, total, sums)
         return taps.filtered(kind, total, sums)
-    own = dr.minimum(dr.ceil(support * hd), r)
+    # A width for each pixel: from the pixel outwards, on both sides, as far as its width reaches.
+    farthest = dr.minimum(dr.ceil(support * hd), r)
 
     def body(offset: Any, total: Any, sums: Any):
         exponent = -across * dr.square(Float(offset))
@@ -315,7 +328,7 @@ def _pass(
     total, sums = taps.add(Float(0), wide.place, total, sums)
     _, total, sums = dr.while_loop(
         state=(mi.UInt32(1), total, sums),
-        cond=lambda offset, total, sums: Float(offset) <= own,
+        cond=lambda offset, total, sums: Float(offset) <= farthest,
         body=body,
         labels=("offset", "total", "sums"),
     )
@@ -339,6 +352,7 @@ def bilateral_of_levels(
     may be infinite; `support`: half side of the square of taps [`hd`]; `there`: which pixels take
     part; the others, for instance the sky, change nothing and stay what they are.
     """
+    # The Gaussian of W_l is a product: along rows, then along columns.
     r = reach(hd, support)
     fractions = [math.exp(-0.5 * (offset / hd) ** 2) for offset in range(r + 1)]
     Float = type(image)
@@ -357,12 +371,14 @@ def bilateral_of_levels(
 
     # A pixel of the image holds its level plus 1; the margin holds 0, which is no level.
     rows = with_margin(dr.select(there, image * levels + 1, 0), (), raster, right=r, down=0)
+    # Along rows all levels read one image: a level counts the pixels that have it.
     along_rows = gaussians(
         rows.values * (levels + 1),
         1,
         rows.place,
         lambda level, value: dr.select(dr.abs(value - (level + 1)) < 0.5, Float(1), 0),
     )
+    # Along columns each level has an image of its own, its count along rows; the result is W_l.
     below = [with_margin(counted, (), raster, right=0, down=r) for counted in along_rows]
     counts = gaussians(
         [margined.values[0] for margined in below],
@@ -370,6 +386,7 @@ def bilateral_of_levels(
         below[0].place,
         lambda _, value: value,
     )
+    # The sums of the module over levels: range weights times W_l, and those times the difference.
     total, change = Float(0), Float(0)
     for level, count in enumerate(counts):
         difference = level / levels - image
@@ -379,30 +396,26 @@ def bilateral_of_levels(
     return dr.select(there, image + change / total, image)
 
 
-SIDE = 4  #: of a tile [pixels]
-_EXPONENTS = (-1, 0, 0, 0, -1)  # of the weights along a row, to base 2
-
-
 def tile_average(image: PerRay, raster: Raster, *, guides: tuple[Guide, ...] = ()) -> PerRay:
     """Return the mean over the window about every pixel, weighted by guides.
 
     `image`: a number, a colour or a vector per pixel, row by row; `raster`: its size; `guides`:
-    what says that pixels are alike.
+    the images that say which pixels are alike.
     """
+    # The window has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns; their
+    # exponents to base 2.
+    exponents = (-1, 0, 0, 0, -1)
     taps = taps_of(with_margin(image, guides, raster, right=2, down=2))
     wide = taps.wide
     total, sums = (
         dr.zeros(type(taps.here[0]), raster.count),
         [dr.zeros(type(taps.here[0]), raster.count) for _ in taps.here],
     )
-    for down, vertical in enumerate(_EXPONENTS):
-        for right, horizontal in enumerate(_EXPONENTS):
+    for down, vertical in enumerate(exponents):
+        for right, horizontal in enumerate(exponents):
             place = wide.place + (down * wide.row + right) - (2 * wide.row + 2)
             total, sums = taps.add(vertical + horizontal, place, total, sums)
     return taps.filtered(type(image), total, sums)
-
-
-_ALIKE = 1e-3  # a sum of weights below this says that no pixel is alike
 
 
 def upsample(
@@ -423,6 +436,7 @@ def upsample(
     size of the small image; `scale`: pixels of the large image from one of the small image to the
     next; `column`, `row`: of the pixels that are asked for, in the large image, in any order.
     """
+    # The four pixels of the small image about each pixel, and where it lies between them.
     Float = type(guide)
     x, left, right = _between(Float, column, scale, raster.width)
     y, above, below = _between(Float, row, scale, raster.height)
@@ -433,6 +447,7 @@ def upsample(
         for at_column, horizontal in ((left, 1 - x), (right, x)):
             place = at_row * raster.width + at_column
             difference = dr.gather(Float, small_guide.values, place) - guide
+            # Bilinear interpolation, times the weight of the difference of the guides.
             fraction = (
                 vertical * horizontal * weight(-falloff(small_guide.width) * dr.square(difference))
             )
@@ -441,12 +456,14 @@ def upsample(
                 dr.fma(fraction, dr.gather(Float, channel, place), so_far)
                 for channel, so_far in zip(channels(small), sums)
             ]
+            # The pixel of the nearest guide, for where no pixel is alike.
             nearer = dr.abs(difference) < least
             least, nearest = (
                 dr.select(nearer, dr.abs(difference), least),
                 dr.select(nearer, place, nearest),
             )
-    alike = total > _ALIKE
+    # A sum of weights below 1e-3 says that no pixel is alike.
+    alike = total > 1e-3
     return type(small)(
         *(
             dr.select(alike, summed / total, dr.gather(Float, channel, nearest))
@@ -467,6 +484,8 @@ def _between(Float: Any, place: Any, scale: int, size: int) -> tuple[Any, Any, A
     """Return where a pixel lies between two of the small image, from 0 to 1, and these
     two, which may be the same.
     """
+    # The small image has the pixels `scale` i + `scale` // 2 of the large one. A pixel before the
+    # first one, or behind the last one, takes that one alone.
     along = (Float(place) - scale // 2) / scale
     before = dr.clip(dr.floor(along), 0, size - 1)
     first = mi.UInt32(before)

@@ -6,9 +6,9 @@ it. An element dA has the intensity Le cos dA in a direction at an angle whose c
 is cos, and the power pi Le dA. The shape is a rectangle, disk, sphere or mesh; its material is
 `null` or opaque, and without one it is black, as in Mitsuba.
 
-Methods that know occluders by their triangles need those of black lights. A disk and a sphere have
-none: a polygon and a sphere of facets stand for them, as large in area and in mean shadow. They
-shadow other lights, not their own.
+Methods that know occluders by their triangles need the triangles of black lights. A disk and a
+sphere have none: a polygon and a sphere of facets stand for them, as large in area and in mean
+shadow. They shadow other lights, not their own.
 """
 
 import math
@@ -32,7 +32,7 @@ class AreaLight:
     """An area light, on the host, in float64.
 
     A point of a rectangle or disk is middle + u across + v up, u and v from -1 to 1, for a disk
-    with u^2 + v^2 <= 1. Middle and axes of a mesh are those of a ball around it.
+    with u^2 + v^2 <= 1. A mesh has the middle and the axes of a ball around it.
     """
 
     name: str  #: of its shape
@@ -84,7 +84,7 @@ def turned_area_light(light: AreaLight, about: Array, turn: Array) -> AreaLight:
     return replace(light, middle=middle, vertices=about + (light.vertices - about) @ turn.T, **axes)
 
 
-_SIDES, _RINGS = 64, 32
+_SIDES, _RINGS = 64, 32  #: facets around a disk or sphere, and from pole to pole of a sphere
 
 
 def occluder_vertices(light: AreaLight) -> Array:
@@ -94,12 +94,14 @@ def occluder_vertices(light: AreaLight) -> Array:
     if light.kind == "rectangle":
         corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return np.array([light.middle + u * light.across + v * light.up for u, v in corners])
+    # Around the axis, for a disk and for each ring of a sphere.
     angle = 2 * math.pi * (np.arange(_SIDES) + 0.5) / _SIDES
     circle = np.cos(angle)[:, None] * light.across + np.sin(angle)[:, None] * light.up
-    # A polygon as large as its circle.
+    # A regular polygon in a circle has sin(2 pi/n)/(2 pi/n) of its area: this one is as large.
     wide = math.sqrt(2 * math.pi / _SIDES / math.sin(2 * math.pi / _SIDES))
     if light.kind == "disk":
         return np.concatenate([light.middle + wide * circle, light.middle[None]])
+    # A sphere: rings of vertices from pole to pole, and the poles at the end.
     pole = np.cross(light.across, light.up) / light.radius
     polar = math.pi * np.arange(1, _RINGS) / _RINGS
     rings = [light.middle + wide * (math.sin(a) * circle + math.cos(a) * pole) for a in polar]
@@ -112,10 +114,12 @@ def occluder_triangles(light: AreaLight) -> NDArray[np.int64]:
         return light.triangles
     if light.kind == "rectangle":
         return np.array([[0, 1, 2], [0, 2, 3]])
+    # A vertex of the circle, and the next one around it.
     i = np.arange(_SIDES)
     j = (i + 1) % _SIDES
     if light.kind == "disk":
         return np.stack([i, j, np.full(_SIDES, _SIDES)], axis=1)
+    # Two triangles between each pair of neighbours on two rings; below they end at the poles.
     faces = []
     for ring in range(_RINGS - 2):
         near, far = ring * _SIDES, (ring + 1) * _SIDES
@@ -123,20 +127,15 @@ def occluder_triangles(light: AreaLight) -> NDArray[np.int64]:
             np.stack([near + i, far + i, far + j], axis=1),
             np.stack([near + i, far + j, near + j], axis=1),
         ]
-    last, top = (_RINGS - 2) * _SIDES, (_RINGS - 1) * _SIDES
+    last_ring, top = (_RINGS - 2) * _SIDES, (_RINGS - 1) * _SIDES
     faces += [
         np.stack([np.full(_SIDES, top), i, j], axis=1),
-        np.stack([last + j, last + i, np.full(_SIDES, top + 1)], 1),
+        np.stack([last_ring + j, last_ring + i, np.full(_SIDES, top + 1)], 1),
     ]
     return np.concatenate(faces)
 
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
-_LEAST = 1e-12  #: half a side or a radius, of which float32 knows the square [m]
-#: of a mesh's size and place: how far before a triangle a vertex lies in its plane, after float32
-_FLAT = 1e-6
-_MANY, _CHUNK = 1e9, 1 << 22  #: vertices times triangles that are looked at, in all and at once
-_SHEARED = 1e-4  #: of a length: how far from a right angle or from another length, after float32
 
 
 def read_area_light(shape: Any, camera: Array) -> AreaLight:
@@ -150,9 +149,9 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     if kind is None and not shape.is_mesh():
         raise InputError(
             f"light '{name}': its shape is a {shape.class_name().lower()}; expected a 'rectangle', "
-            "'disk', 'sphere' or "
-            "mesh with an 'area' emitter"
+            "'disk', 'sphere' or mesh with an 'area' emitter"
         )
+    # A `null` material lets camera rays and the light of others pass.
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
@@ -162,6 +161,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
         )
     if kind is None:
         return _read_mesh(shape, radiance, opaque)
+    # The columns of to_world are the axes of the shape: u, v, and for a sphere the third radius.
     matrix = host_matrix(mi.traverse(shape)["to_world"])
     if not np.isfinite(matrix).all():
         raise InputError(f"light '{name}': its to_world holds numbers that are not finite")
@@ -170,24 +170,30 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
         float(np.linalg.norm(axis))
         for axis in ((across, up, third) if kind == "sphere" else (across, up))
     ]
+    # The smallest half side or radius [m]; float32 has its square.
+    least = 1e-12
     if (
-        not min(sizes) > _LEAST
+        not min(sizes) > least
         or not np.linalg.norm(np.cross(across, up)) > 1e-12 * sizes[0] * sizes[1]
     ):
         raise InputError(
             f"light '{name}': the {kind} has no area; expected a to_world that leaves it one"
         )
+    # How far float32 may bring axes from a right angle, or from another length, of a length.
+    sheared = 1e-4
     pairs = [(across, up)] + ([(up, third), (third, across)] if kind == "sphere" else [])
-    if any(abs(a @ b) > _SHEARED * np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs):
+    if any(abs(a @ b) > sheared * np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs):
         raise InputError(
             f"light '{name}': the {kind} is sheared; expected a to_world of rotations, scales and "
             "shifts"
         )
-    if kind != "rectangle" and max(sizes) - min(sizes) > _SHEARED * max(sizes):
+    if kind != "rectangle" and max(sizes) - min(sizes) > sheared * max(sizes):
         scales = " x ".join(f"{size:g}" for size in sizes)
         raise InputError(
             f"light '{name}': the {kind} is scaled by {scales}; expected one scale for all its axes"
         )
+    # A sphere shines outwards. A flat shape shines on the side that Mitsuba's samples on it say:
+    # they count a mirrored to_world and flipped normals.
     middle = matrix[:3, 3]
     normal = np.cross(across, up)
     if kind == "sphere":
@@ -217,6 +223,7 @@ def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
     triangles = _rows(shape.faces_buffer()).astype(np.int64)
     if not np.isfinite(vertices).all():
         raise InputError(f"light '{shape.id()}': its vertices hold numbers that are not finite")
+    # Normals by the order of the vertices, twice as long as triangles are large.
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(normals, axis=1)
@@ -224,15 +231,18 @@ def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
         raise InputError(
             f"light '{shape.id()}': the mesh has no area; expected triangles that have some"
         )
+    # Vertex normals, where there are any, say which side shines; `flip_normals` turns either.
     inverted = shape.has_flipped_normals()
     if shape.has_vertex_normals():
         along = np.einsum("tcx,tx->t", _rows(shape.vertex_normals_buffer())[triangles], normals)
         turned = (along < 0) != inverted
     else:
         turned = np.full(len(triangles), inverted)
+    # Counter-clockwise from the side that shines; triangles without area shine nowhere.
     triangles[turned] = triangles[turned][:, [0, 2, 1]]
     normals[turned] *= -1
     triangles, normals = triangles[twice > 0], normals[twice > 0]
+    # Middle and axes of a ball around the mesh, for the code that asks how large a light is.
     corners = vertices[triangles].reshape(-1, 3)
     middle = (corners.max(axis=0) + corners.min(axis=0)) / 2
     radius = float(np.linalg.norm(corners - middle, axis=1).max())
@@ -251,21 +261,26 @@ def _is_folded(light: AreaLight, normals: Array) -> bool:
     """Return whether a vertex lies before the plane of a triangle; yes for
     a mesh too large to look.
     """
+    # How far before a triangle float32 may bring a vertex that lies in its plane: a millionth of
+    # the mesh's size and place [m].
     vertices = light.vertices[np.unique(light.triangles)]
-    count, most = len(vertices), _FLAT * (light.radius + float(np.abs(light.middle).max()))
-    if count * len(normals) > _MANY:
+    count, flat = len(vertices), 1e-6 * (light.radius + float(np.abs(light.middle).max()))
+    # Every vertex against every triangle: as many pairs as are looked at, in all and at once.
+    most, at_once = 1e9, 1 << 22
+    if count * len(normals) > most:
         return True
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     offset = (unit * light.vertices[light.triangles[:, 0]]).sum(axis=1)
-    rows = max(1, _CHUNK // count)
+    rows = max(1, at_once // count)
     for start in range(0, len(unit), rows):
         height = vertices @ unit[start : start + rows].T - offset[start : start + rows]
-        if height.max() > most:
+        if height.max() > flat:
             return True
     return False
 
 
 def _read_radiance(emitter, name: str) -> Array:
+    # A texture or a spectrum has other parameters.
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
         raise InputError(
@@ -273,6 +288,7 @@ def _read_radiance(emitter, name: str) -> Array:
             "radiance"
         )
     value = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
+    # A grey radiance has one number.
     value = np.broadcast_to(value, 3).copy() if value.size == 1 else value
     if not np.all(np.isfinite(value)) or np.any(value < 0):
         raise InputError(

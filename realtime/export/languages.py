@@ -20,6 +20,7 @@ _TYPE = "(" + "|".join(_WGSL_TYPES) + ")"
 
 
 def _glsl(text: str) -> str:
+    # A constant array has a constructor; `precise` is a word of desktop GLSL alone, from 4.00 on.
     text = re.sub(
         r"^float (\w+)\[(\d+)\] = \((.*)\);$",
         r"const float \1[\2] = float[\2](\3);",
@@ -30,6 +31,7 @@ def _glsl(text: str) -> str:
 
 
 def _hlsl(text: str) -> str:
+    # A constant array of the file is static, or it would be an input of the shader.
     text = re.sub(
         r"^float (\w+)\[(\d+)\] = \((.*)\);$",
         r"static const float \1[\2] = {\3};",
@@ -47,6 +49,7 @@ def _slang(text: str) -> str:
 
 def _wgsl(text: str) -> str:
     def function(match: re.Match[str]) -> str:
+        # WGSL puts a name before its type, and the type of the result behind the parameters.
         parameters = re.sub(_TYPE + r" (\w+)", lambda m: f"{m[2]}: {_WGSL_TYPES[m[1]]}", match[3])
         return f"fn {match[2]}({parameters}) -> {_WGSL_TYPES[match[1]]} {{"
 
@@ -56,6 +59,7 @@ def _wgsl(text: str) -> str:
     array = r"var<private> \1: array<f32, \2> = array<f32, \2>(\3);"
     text = re.sub(r"^float (\w+)\[(\d+)\] = \((.*)\);$", array, text, flags=re.M)
     text = re.sub(r"^( +)float (\w+)\[(\d+)\];$", r"\1var \2: array<f32, \3>;", text, flags=re.M)
+    # Locals that are set where they are declared; then types that are called, as conversions.
     text = re.sub(rf"\b{_TYPE} (\w+) = ", lambda m: f"var {m[2]}: {_WGSL_TYPES[m[1]]} = ", text)
     text = text.replace("floatBitsToInt(", "bitcast<i32>(").replace(
         "intBitsToFloat(", "bitcast<f32>("

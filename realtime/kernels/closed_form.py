@@ -47,19 +47,9 @@ from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import PHASES
 
-_EULER = 0.57721566490153286
-
-# Per size of a float: radius of the series, its terms, levels of the fraction. On the circle |z| =
-# R the series has lost a factor of 5 (float32) and 40 (float64) by cancellation, the fraction stops
-# below one rounding.
-_REGIONS = {4: (1.0, 12, 42), 8: (2.0, 30, 90)}
-
 
 def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J by complex exponential integrals [1/m].
-
-    Raises InputError for Henyey-Greenstein and tabulated phase functions, which are no polynomials,
-    and for a spot that falls off inside its cone.
 
     Valid for any extinction, vacuum included, and x1 infinite; a segment of zero length gives 0. J
     is the difference of two tails, so its relative error is a few roundings times (tail0 +
@@ -75,26 +65,39 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
     media*, Computer Graphics Forum 28(2); Pegoraro, Schott, Parker 2009, *An analytical approach to
     single scattering for anisotropic media and light distributions*, Graphics Interface, for
     polynomials in the cosine.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+
+    Raises
+    ------
+    InputError
+        For Henyey-Greenstein and tabulated phase functions, which are no polynomials, for a spot
+        that falls off inside its cone, and for a light sample.
     """
     polynomial = medium.phase.polynomial
     if polynomial is None:
-        known = ", ".join(phase.name for phase in PHASES if phase.polynomial)
+        polynomials = ", ".join(phase.name for phase in PHASES if phase.polynomial)
         raise InputError(
             f"kernel closed-form: phase function {medium.phase.name!r} is no polynomial in the "
-            "cosine; use the kernel "
-            f"'quadrature' or one of {known}"
+            f"cosine; use the kernel 'quadrature' or one of {polynomials}"
         )
     if light.varies:
         raise InputError(
             "kernel closed-form: a spot that falls off between beam and cut-off, or an area light, "
-            "has no closed "
-            "form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
+            "has no closed form here; use the kernel 'quadrature', or a spot with beam_width = "
+            "cutoff_angle"
         )
     foot, h = geometry.foot, geometry.height
     Float = type(h)
+    # J is even in h, so a height below the rounding of the distances is as good as zero, and
+    # this one keeps E = q/h finite, unless the segment begins at the light itself.
     floor = 1e-9 if is_single(Float) else 1e-17
     h = dr.maximum(h, floor * (dr.abs(x0 - foot) + smallest(Float)))
 
+    # The integral between the ends is the tail of the near end less the tail of the far end.
     def integral(sigma_t):
         return (2 / h) * (
             _tail(foot, h, x0, sigma_t, polynomial) - _tail(foot, h, x1, sigma_t, polynomial)
@@ -108,12 +111,14 @@ def _tail(foot, h, x, sigma_t, polynomial):
     s = x - foot
     r = dr.sqrt(dr.fma(s, s, h * h))
     e = path_over_height(s, r, h)
+    # U_1 and T_1, without their factor exp(-a E).
     tail_u, tail_t = scaled_e1(e, sigma_t * h)
     a = sigma_t * h
     u = dr.rcp(dr.fma(e, e, 1))
     # All tails below leave out the factor exp(-a E), and so does B_m = u^m.
     total, power = polynomial[0] * tail_t, type(h)(1)
     for m in range(1, len(polynomial)):
+        # By parts, from T_m and U_m to T_{m+1} and U_{m+1} (module); `power` is u^m.
         power = power * u
         tail_t, tail_u = (
             dr.fma(2 * m - 1, tail_t, dr.fma(a, tail_u, -e * power)) / (2 * m),
@@ -121,6 +126,8 @@ def _tail(foot, h, x, sigma_t, polynomial):
         )
         if polynomial[m]:
             total = dr.fma(polynomial[m], tail_t, total)
+    # The factor that the tails leave out: a E + sigma_t foot = sigma_t (x + r). Behind a point at
+    # infinity nothing is left, and the terms above are no numbers there.
     return dr.select(dr.isinf(r), 0, dr.exp(-sigma_t * (x + r)) * total)
 
 
@@ -134,9 +141,14 @@ def scaled_e1(e, a):
     float32 and 1e-13 in float64, just inside the circle at large e, and by about one rounding in
     the median; the real part by as little of |S|.
     """
-    radius, terms, levels = _REGIONS[4 if is_single(type(a)) else 8]
+    # Radius of the series, its terms, levels of the fraction, in float32 and float64. On the
+    # circle |z| = R the series has lost a factor of 5 (float32) and 40 (float64) by cancellation,
+    # the fraction stops below one rounding.
+    radius, terms, levels = (1.0, 12, 42) if is_single(type(a)) else (2.0, 30, 90)
     x, y = a * e, -a
     inside = dr.fma(x, x, y * y) < radius * radius
+    # Outside of the circle exp(x) and the powers may overflow: those lanes sum the series at z = 0,
+    # and take the fraction.
     near_x, near_y = dr.select(inside, x, 0), dr.select(inside, y, 0)
     near = _series(near_x, near_y, dr.atan2(type(a)(1), e), terms)
     far = _fraction(x, y, levels)
@@ -148,6 +160,8 @@ def _series(x, y, argument, terms: int):
     atan(1/e), at a = 0 too.
     """
     Float = type(x)
+    # log |z| with the larger component taken out, so that no square under- or overflows; the
+    # maximum with 1 serves z = 0 alone, where both ratios are 0.
     magnitude = dr.maximum(dr.maximum(dr.abs(x), dr.abs(y)), smallest(Float))
     ratio_x, ratio_y = x / magnitude, y / magnitude
     log_z = dr.log(magnitude) + 0.5 * dr.log(
@@ -162,7 +176,10 @@ def _series(x, y, argument, terms: int):
             factor * dr.fma(x, imaginary, y * real),
         )
     real, imaginary = dr.fma(x, real, -y * imaginary), dr.fma(x, imaginary, y * real)
-    real, imaginary = real - (log_z + _EULER), imaginary + argument
+    # -gamma - log z, whose imaginary part is -arg z.
+    euler = 0.57721566490153286
+    real, imaginary = real - (log_z + euler), imaginary + argument
+    # Times exp(z) = exp(x) (cos y + i sin y).
     sine, cosine = dr.sincos(y)
     grown = dr.exp(x)
     return grown * dr.fma(cosine, real, -sine * imaginary), grown * dr.fma(
@@ -174,6 +191,7 @@ def _fraction(x, y, levels: int):
     """Return S(x + i y) by the continued fraction, from level `levels` up."""
     Float = type(x)
 
+    # From w = z + 2 n + 1 up, w -> z + 2 k - 1 - k^2/w for k = n to 1; the fraction is 1/w.
     def step(k, real, imaginary):
         inverse = k * k / dr.fma(real, real, imaginary * imaginary)
         return k - 1, dr.fma(-inverse, real, x + (2 * k - 1)), dr.fma(inverse, imaginary, y)

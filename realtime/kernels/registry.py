@@ -47,7 +47,20 @@ class Kernel:
     tables: Any = None  #: on the device
 
     def __call__(self, *arguments):
-        """Return J [1/m] of geometry, x0, x1, medium and light."""
+        """Return the airlight integral J [1/m], a number per ray, or a colour in a coloured medium.
+
+        Parameters
+        ----------
+        geometry
+            The rays and the light: a `realtime.rays.RayGeometry`.
+        x0, x1
+            Ends of the lit part of each ray, x0 <= x1 [m]; `x1` may be infinite.
+        medium
+            The medium: `realtime.scene.media.medium.Homogeneous`.
+        light
+            The light, for the intensity that varies within its cone.
+        """
+        # A kernel without tables has no such argument.
         tables = {} if self.tables is None else {"tables": self.tables}
         return self.function(*arguments, **self.parameters, **tables)
 
@@ -73,6 +86,7 @@ class Kernel:
 
     def of_size(self, size: int) -> "Kernel":
         """Return the kernel 'name-N', whose first parameter is the size N."""
+        # Parameters are in the order of the record: the first one is the size.
         first = next(iter(self.parameters))
         return replace(self, name=f"{self.name}-{size}", parameters=self.parameters | {first: size})
 

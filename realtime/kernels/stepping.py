@@ -33,8 +33,22 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *,
     Valid where a step is shorter than the distance to the light, everywhere on the ray. An
     unbounded ray is cut after 20 optical depths; through a vacuum it has no step length, and the
     result means nothing.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    steps
+        How many, 1 or more.
+
+    Raises
+    ------
+    InputError
+        For another number of steps.
     """
     _check("steps", steps)
+    # An unbounded ray ends where its thinnest channel keeps e^-20; the smallest number stands for
+    # the extinction of a vacuum, which has no such place.
     thinnest = dr.maximum(medium.least_extinction(), smallest(type(x1)))
     x1 = dr.select(dr.isinf(x1), x0 + OPTICAL_REACH / thinnest, x1)
 
@@ -57,8 +71,21 @@ def equiangular(
 
     Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in
     participating media*, section 4.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    steps
+        How many, 1 or more.
+
+    Raises
+    ------
+    InputError
+        For another number of steps.
     """
     _check("steps", steps)
+    # The angles at the light between the perpendicular and both ends; pi/2 is the infinite end.
     theta0 = dr.atan2(x0 - geometry.foot, geometry.height)
     theta1 = dr.select(dr.isinf(x1), 0.5 * dr.pi, dr.atan2(x1 - geometry.foot, geometry.height))
 
@@ -79,14 +106,29 @@ def quadrature_theta(
     The range is split at the foot point unless the phase function is isotropic. Valid for rays that
     do not meet the light (height above 0). The difference of the angles is one arc tangent, so that
     short segments do not cancel.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    nodes
+        How many, 1 or more, in each part of the range.
+
+    Raises
+    ------
+    InputError
+        For another number of nodes.
     """
     _check("nodes", nodes)
+    # Forward lobes end at the foot, theta = 0, where the rule is therefore split.
     split = dr.clip(geometry.foot, x0, x1)
     whole = medium.phase.constant and not light.varies
     panels = [(x0, x1)] if whole else [(x0, split), (split, x1)]
 
     def panel(sigma_t, x0, x1):
         foot, h = geometry.foot, geometry.height
+        # tan(theta1 - theta0) = h (s1 - s0)/(s0 s1 + h^2): one arc tangent, of no small difference.
+        # The infinite end has the angle pi/2, and the place 0 only keeps NaN out.
         s0, s1 = x0 - foot, dr.select(dr.isinf(x1), 0, x1 - foot)
         begin = dr.atan2(s0, h)
         width = dr.select(
@@ -108,16 +150,28 @@ def quadrature(
 ):
     """Return the airlight integral J by one Gauss-Legendre rule in v = asinh E, d = 1 [1/m].
 
-    `nodes`: how many. The segment is split at the foot (E = 1), where forward lobes end, unless the
-    phase function is isotropic, and at the cone of the beam where a spot falls off between beam and
-    cut-off.
+    The segment is split at the foot (E = 1), where forward lobes end, unless the phase function is
+    isotropic, and at the cone of the beam where a spot falls off between beam and cut-off.
 
     Valid for any ray that does not pass through the light, any extinction, vacuum included, and
     `x1` infinite. With 16 nodes and an isotropic phase function the relative error in float32 stays
     below about 1e-5 for optical depths up to 100; sharp phase functions (g above 0.8) need more
     nodes.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    nodes
+        How many, 1 or more, in each part of the segment.
+
+    Raises
+    ------
+    InputError
+        For another number of nodes.
     """
     _check("nodes", nodes)
+    # Forward lobes end at the foot (E = 1); a soft spot has kinks at its beam.
     if not medium.phase.constant and not light.varies:
         split = dr.clip(geometry.foot, x0, x1)
         segments = [(x0, split), (split, x1)]
@@ -132,10 +186,12 @@ def quadrature(
             grown = exp_bounded(width * fraction)
             # Where the difference cancels, it moves a node by a rounding error of E.
             sinh, less = 0.5 * (grown - dr.rcp(grown)), 0.5 * (grown + dr.rcp(grown)) - 1
+            # E' - E = E (cosh u - 1) + C sinh u, as in the panels of `realtime.kernels.exact`.
             step = dr.fma(e0, less, c0 * sinh)
             value = medium.phase.density(e0 + step, dr.fma(e0, sinh, dr.fma(c0, less, c0)), 1.0)
             if falloff is not None:
                 value *= falloff(e0 + step)
+            # exp(-a (E' - E)): the transmittance relative to the beginning of the segment.
             total += weight * value * exp_bounded(-sigma_t * h * step)
         return total * width * (2 / h) * transmittance_before(geometry, x0, h, sigma_t)
 
@@ -150,12 +206,14 @@ def _check(name: str, count: int) -> None:
 
 
 def _at_angle(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, theta):
+    # x = foot + h tan theta; dx/r^2 = dtheta/h leaves no 1/r^2 in the integrand.
     x = dr.fma(geometry.height, dr.tan(theta), geometry.foot)
     return _integrand(geometry, medium, light, sigma_t, x, geometry.distance_to_light(x))
 
 
 def _integrand(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, x, r):
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot."""
+    # cos_scatter is +1 forward: from the light before the foot, (foot - x)/r > 0.
     value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
     return value * geometry.falloff(light, x) if light.varies else value
 

@@ -25,10 +25,10 @@ theta0 as one arc tangent, so that short segments and rays that pass the light d
 The factor e^-a is left out, and an asterisk stands where the printed term is not the derived one
 (DESIGN section 3):
 
-    isotropic   1;   -a;   a^2 - a *;   -a^3/6 + a^2/2 - a *;   a^4/24 - a^3/4 + 11 a^2/24 - 5 a/24
-    Rayleigh    3/4;   -3a/4;   3a^2/8 + 3/4 *
-    hazy        265/256;   -265a/256 + 9/36 *;   265a^2/256 - 121a/512 + 63/64 *
-    murky       n/2^31;   +n a/2^31 - 25/367108864 *;   n a^2/2^32 - 2147482073 a/2^32 + 775/134217728
+    isotropic  1;  -a;  a^2 - a *;  -a^3/6 + a^2/2 - a *;  a^4/24 - a^3/4 + 11 a^2/24 - 5 a/24
+    Rayleigh   3/4;  -3a/4;  3a^2/8 + 3/4 *
+    hazy       265/256;  -265a/256 + 9/36 *;  265a^2/256 - 121a/512 + 63/64 *
+    murky      n/2^31;  +n a/2^31 - 25/367108864 *;  n a^2/2^32 - 2147482073 a/2^32 + 775/134217728
 
 where n = 2147483673. Derived, the six starred terms are (a^2 - a)/2; -a^3/6 + a^2/2 - a/3; 3a^2/8 -
 3a/8 + 3/4; -265a/256 - 9/32; 265a^2/512 - 121a/512 + 63/64; -n a/2^31 - 25/67108864. The text at
@@ -54,18 +54,26 @@ from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import PHASES, Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
-HIGHEST_DEGREE = 4
 
 
 def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
-    `degree`: of the polynomial, 4 in the paper. Raises InputError for a phase function that has no
-    series, and for a degree below 0.
-
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from
-    the foot or where sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That
-    is the published method's own limit.
+    the foot or where sigma_t h is large; where the light lies far behind the camera,
+    exp(-sigma_t foot) overflows. These are limits of the published method.
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    degree
+        Degree of the polynomial, 0 or more; 4 in the paper.
+
+    Raises
+    ------
+    InputError
+        For a phase function that has no series, and for a degree below 0.
     """
     return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=False)
 
@@ -76,11 +84,20 @@ def taylor_printed(
     """Return J by the polynomial with the coefficients of the paper's annex,
     misprints included [1/m].
 
-    `degree`: at most 4; with 2 every coefficient is a printed one. Raises InputError for a phase
-    function that the annex does not have, and for a degree beyond.
-
     Valid nowhere in particular: even near the foot the error is of first order in theta (hazy,
     murky) or of second (isotropic, Rayleigh).
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        As for `realtime.kernels.registry.Kernel`.
+    degree
+        Degree of the polynomial, 0 to 4; with 2 every coefficient is a printed one.
+
+    Raises
+    ------
+    InputError
+        For a phase function that the annex does not have, and for another degree.
     """
     return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=True)
 
@@ -94,34 +111,38 @@ def _by_extinction(
         a = sigma_t * h
         coefficients = coefficients_of(a, medium.phase, degree, printed=printed)
         total = integral_of(geometry, x0, x1, light, coefficients)
+        # e^-a, which the coefficients leave out, with exp(-sigma_t foot)/h.
         return total * dr.exp(-sigma_t * geometry.foot - a) / h
 
     return medium.per_extinction(integral)
 
 
 def coefficients_of(a, phase: Phase, degree: int, *, printed: bool) -> list:
-    """Return c_0 to c_N without e^-a; as printed, those that the annex does not
-    have are the derived ones.
+    """Return c_0 to c_N without e^-a; where the annex has no coefficient, the printed
+    polynomial takes the derived one.
     """
     check_degree(degree)
     name = phase.name
     if printed and name not in PRINTED_PHASES:
         raise InputError(
             "kernel taylor-printed: the paper prints no coefficients for the phase function "
-            f"{name!r}; use the kernel "
-            f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
+            f"{name!r}; use the kernel 'taylor' or 'quadrature', or one of "
+            f"{', '.join(PRINTED_PHASES)}"
         )
-    if printed and degree > HIGHEST_DEGREE:
+    highest = 4  # of the annex
+    if printed and degree > highest:
         raise InputError(
-            f"degree: got {degree}, expected 0 to {HIGHEST_DEGREE}; for more use the kernel "
-            "'taylor'"
+            f"degree: got {degree}, expected 0 to {highest}; for more use the kernel 'taylor'"
         )
+    # c_n = sum_k e_{n-k} p_k, the product of both series.
     series = phase_series(phase, degree, "taylor-printed" if printed else "taylor")
     derived = series_product(_extinction_series(a, degree), series, degree)
     if not printed:
         return derived
-    known = printed_coefficients(a, name)[: degree + 1]
-    return known + derived[len(known) :]
+    # For all but the isotropic function the annex ends after c_2: the derived ones follow, and what
+    # differs from the derived polynomial is the print's.
+    annex = printed_coefficients(a, name)[: degree + 1]
+    return annex + derived[len(annex) :]
 
 
 def printed_coefficients(a, name: str) -> list:
@@ -131,6 +152,8 @@ def printed_coefficients(a, name: str) -> list:
     `a`: sigma_t h [1], a number or an array of any kind; `name`: 'isotropic' (five coefficients),
     'rayleigh', 'hazy' or 'murky' (three).
     """
+    # The annex, term by term as printed. The module has the derived terms beside the misprints.
+    # A one of the same kind as `a`.
     unit = 0 * a + 1
     if name == "isotropic":
         return [
@@ -142,6 +165,7 @@ def printed_coefficients(a, name: str) -> list:
         ]
     if name == "rayleigh":
         return [0.75 * unit, -0.75 * a, 0.375 * a * a + 0.75]
+    # The printed hazy function has the mean 2 over the sphere, the murky one 83/33.
     if name == "hazy":
         return [
             265 / 256 / 2 * unit,
@@ -158,6 +182,8 @@ def printed_coefficients(a, name: str) -> list:
 
 def integral_of(geometry: RayGeometry, x0, x1, light: Light, coefficients):
     """Return the integral of a polynomial in theta over a segment [1]."""
+    # The largest number stands for the infinite end: its angle is pi/2, and the other formulas have
+    # no infinity times zero.
     s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(geometry.height)))
     angles = dr.atan2(s0, geometry.height), dr.atan2(s1, geometry.height)
     if light.varies:
@@ -175,8 +201,12 @@ def _integrated(geometry: RayGeometry, ends, angles, coefficients):
     """Integrate the polynomial between two angles in closed form."""
     (s0, s1), (theta0, theta1) = ends, angles
     h = geometry.height
+    # theta1 - theta0 as one arc tangent, so that short segments do not cancel. Where s0 s1
+    # overflows the segment is long, and the difference of both angles serves.
     bounded = dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h))
     difference = dr.select(dr.isfinite(s0 * s1), bounded, theta1 - theta0)
+    # theta1^(n+1) - theta0^(n+1) is the difference times the sum over k of theta1^k theta0^(n-k).
+    # `powers` is that sum, and grows from one degree to the next by one product.
     total, powers, power0 = type(h)(0), type(h)(1), type(h)(1)
     for n, c in enumerate(coefficients):
         total += (c / (n + 1)) * powers
@@ -189,11 +219,13 @@ def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
     """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int
     I(theta) theta^n dtheta.
     """
+    # From the nodes in [-1, 1] to the range of theta.
     theta0, theta1 = angles
     half, middle = 0.5 * (theta1 - theta0), 0.5 * (theta1 + theta0)
     total = type(half)(0)
     for xi, weight in zip(*np.polynomial.legendre.leggauss(8)):
         theta = dr.fma(half, float(xi), middle)
+        # Horner's scheme at the node, then the falloff at x = foot + h tan theta.
         value = coefficients[-1]
         for c in reversed(coefficients[:-1]):
             value = dr.fma(value, theta, c)
@@ -206,9 +238,11 @@ def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
 
 
 def _extinction_series(a, degree: int):
+    # g = sec + tan: 2 g' = 1 + g^2.
     g = [1.0]
     for n in range(degree):
         g.append((float(n == 0) + sum(g[k] * g[n - k] for k in range(n + 1))) / (2 * (n + 1)))
+    # e = exp(-a (g - 1)): n e_n = -a sum_k k g_k e_{n-k}.
     e = [type(a)(1)]
     for n in range(1, degree + 1):
         e.append((-a / n) * sum((k * g[k]) * e[n - k] for k in range(1, n + 1)))
@@ -221,12 +255,11 @@ def phase_series(phase: Phase, degree: int, kernel: str):
     """
     series = phase.series(degree)
     if series is None:
-        known = ", ".join(
+        names = ", ".join(
             candidate.name for candidate in PHASES if candidate.series is not Phase.series
         )
         raise InputError(
             f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel "
-            "'quadrature' or one "
-            f"of {known}"
+            f"'quadrature' or one of {names}"
         )
     return series

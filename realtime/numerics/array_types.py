@@ -6,8 +6,8 @@ float64 from the same source.
 
 NumPy's arrays are copied to memory that is aligned as Dr.Jit's own is.
 
-A frame has one way to bring numbers of a scene from the device to the host. It reads a few numbers
-of lights and cameras; each such read waits until the device has come to rest.
+A frame brings numbers of a scene from the device to the host in one way, `host_numbers`. It reads a
+few numbers of lights and cameras; each such read waits until the device has come to rest.
 """
 
 from dataclasses import dataclass
@@ -83,6 +83,7 @@ def packed(numbers):
     gathers that read them at once.
     """
     width = dr.width(numbers)
+    # A scatter of vectors writes the four numbers of a lane next to one another.
     array = dr.zeros(type(numbers.x), 4 * width)
     dr.scatter(array, numbers, dr.arange(mi.UInt32, width))
     return array
@@ -102,6 +103,7 @@ def chosen_value(values, number):
     """Return the value of a number, counted from 0, which may differ between lanes;
     `values` are arrays of one type.
     """
+    # Selections, not a gather: the values are arrays of their own.
     chosen, *others = values
     for place, value in enumerate(others, 1):
         chosen = dr.select(number == place, value, chosen)
@@ -121,6 +123,7 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
     `scalar`: the type of the array, such as `mi.Float`; `numbers`: (n,), in any unit.
     """
     dtype = _dtype(scalar, numbers)
+    # The memory may end later than the numbers do; the array has as many entries as they.
     aligned = _memory(numbers.size * dtype.itemsize)[: numbers.size * dtype.itemsize].view(dtype)
     aligned[:] = numbers
     return scalar(aligned)
@@ -129,9 +132,10 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
 def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
     """Return numbers as Dr.Jit arrays of one entry each, as `aligned_array` makes them.
 
-    `scalar`, `numbers`: as of `aligned_array`.
+    `scalar`, `numbers`: as for `aligned_array`.
     """
     dtype = _dtype(scalar, numbers)
+    # One number at the beginning of each aligned piece; the rest of a piece stays unused.
     step = _ALIGNMENT // dtype.itemsize
     aligned = _memory(numbers.size * _ALIGNMENT)[: numbers.size * _ALIGNMENT].view(dtype)
     aligned[::step] = numbers
@@ -151,6 +155,7 @@ def _memory(size: int) -> NDArray[np.uint8]:
     """Return at least so many bytes of aligned memory, and as many again as Embree may
     read beyond the last number.
     """
+    # One alignment is lost before the first aligned byte, the other lies behind the numbers.
     memory = np.empty(size + 2 * _ALIGNMENT, dtype=np.uint8)
     return memory[-memory.ctypes.data % _ALIGNMENT :]
 
@@ -161,6 +166,7 @@ def host_numbers(*values: Any) -> tuple[NDArray[np.float64], ...]:
     `values`: Dr.Jit numbers and vectors of one entry each, in any unit and precision. Returns
     `numbers`: by value its components, (n,), in float64.
     """
+    # All components in one list, so that one transfer brings them; the lengths cut it up again.
     components = [tuple(value) if dr.depth_v(value) > 1 else (value,) for value in values]
     every = [component for of_value in components for component in of_value]
     numbers = _element_by_element(every) if _on_processor(every[0]) else _in_one_transfer(every)
@@ -173,8 +179,8 @@ def _on_processor(number: Any) -> bool:
 
 
 def _element_by_element(numbers: list[Any]) -> NDArray[np.float64]:
-    """Read where they lie: on a processor a read takes less than a microsecond,
-    and a copy of all a kernel.
+    """Read each number where it lies: on a processor a read takes less than a microsecond,
+    and a copy of all numbers takes a kernel.
     """
     return np.array([number[0] for number in numbers], dtype=np.float64)
 

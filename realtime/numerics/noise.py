@@ -10,15 +10,15 @@ is evenly distributed in [0, 1), so that the mean of runs is the integral; they 
 and frames are alike:
 
 * `white`: a hash, independent of all others;
-* `blue`: a mask of 64 x 64 pixels in 16 frames, alike neither beside nor before
-  (`docs/tools/blue_noise.py`). A run shifts it on its torus by a random offset, and a hash fills in
-  the bits below its 256 levels;
+* `blue`: a mask of 64 x 64 pixels in 16 frames, in which neighbours in the image and in time are
+  unlike (`docs/tools/blue_noise.py`). A run shifts the mask on its torus by a random offset, and a
+  hash fills in the bits below its 256 levels;
 * `ign`: interleaved gradient noise, fract(52.9829189 fract(0.06711056 i + 0.00583715 j)) in column
-  i of row j: in any 3 x 3 pixels the nine values are about those of nine equal steps. A frame moves
-  it by 5.588238 pixels along both; a run adds a random number modulo 1.
+  i of row j: in any 3 x 3 pixels the nine values are about nine equal steps. A frame moves the
+  gradient by 5.588238 pixels along both axes; a run adds a random number modulo 1.
 
-`golden` in place of their own change from frame to frame adds n times the golden ratio
-to the pattern of frame 0.
+With `golden` a pattern does not change from frame to frame in its usual way: frame n adds n times
+the golden ratio to the pattern of frame 0.
 
 References
 ----------
@@ -39,14 +39,6 @@ from airlight.realtime.numerics.array_types import aligned_array
 
 PATTERNS = ("white", "blue", "ign")
 
-_BITS = 24  # of a number: float32 resolves no more
-_GOLDEN = 2654435769  # 2^32 (sqrt(5) - 1)/2
-_GRADIENT = tuple(round(2**32 * slope) for slope in (0.06711056, 0.00583715))
-_MOVED = round(2**32 * 5.588238 * (0.06711056 + 0.00583715)) % 2**32  # of the gradient in a frame
-_SIDE, _FRAMES = 64, 16  # of the mask
-# where streams of patterns begin, and of what all pixels of a run share
-_OF_PATTERNS, _OF_RUN = 2**30, 2**31
-
 
 @dataclass(frozen=True)
 class Noise:
@@ -54,8 +46,8 @@ class Noise:
     new numbers in each frame.
     """
 
-    run: Any
-    frame: Any
+    run: Any  #: number of the run
+    frame: Any  #: number of the frame
     mask: Any  #: of blue noise, four levels in a word
 
     def uniform(self, pixel: Any, stream: int = 0) -> tuple[Any, Any, Any, Any]:
@@ -68,7 +60,8 @@ class Noise:
 
     def of_run(self, stream: int = 0) -> list[Any]:
         """Return four random words that all pixels and frames of the run share."""
-        return pcg4d(0, 0, self.run, _OF_RUN + stream)
+        # Streams of `uniform` lie below 2^30, streams of `pattern` below 2^31: these follow.
+        return pcg4d(0, 0, self.run, 2**31 + stream)
 
     def pattern(
         self, kind: str, *, golden: bool, pixel: Any, place: tuple[Any, Any], stream: int = 0
@@ -81,20 +74,29 @@ class Noise:
         """
         frame = mi.UInt32(0) if golden else self.frame
         row, column = place
-        hashed = pcg4d(pixel, frame, self.run, _OF_PATTERNS + stream)[0]
+        # White noise. Streams of `uniform` lie below 2^30, streams of patterns above.
+        hashed = pcg4d(pixel, frame, self.run, 2**30 + stream)[0]
         shared = self.of_run(stream)
         if kind == "blue":
+            # The run moves the mask on its torus, along columns, rows and frames.
+            side, frames = 64, 16
             x, y, n = (
                 base + offset for base, offset in zip((column, row, frame), shared, strict=False)
             )
-            index = ((n % _FRAMES) * _SIDE + y % _SIDE) * _SIDE + x % _SIDE
+            index = ((n % frames) * side + y % side) * side + x % side
+            # A word of the mask holds four levels of 8 bits; the hash fills in the 24 bits below.
             level = dr.gather(mi.UInt32, self.mask, index >> 2) >> ((index & 3) << 3)
             hashed = (level << 24) | (hashed >> 8)
         elif kind == "ign":
-            gradient = column * _GRADIENT[0] + row * _GRADIENT[1] + frame * _MOVED
+            # Both slopes, and 5.588238 of each a frame, are fractions of 2^32: whole numbers wrap
+            # around as fract does, without rounding.
+            across, down = (round(2**32 * slope) for slope in (0.06711056, 0.00583715))
+            moved = round(2**32 * 5.588238 * (0.06711056 + 0.00583715)) % 2**32
+            gradient = column * across + row * down + frame * moved
             fraction = mi.Float64(gradient) * (52.9829189 * 2.0**-32)
             hashed = mi.UInt32((fraction - dr.floor(fraction)) * 2.0**32) + shared[0]
-        return _number(hashed + self.frame * _GOLDEN if golden else hashed)
+        # n times the golden ratio, 2^32 (sqrt(5) - 1)/2, again modulo 1 by the wrap of 32 bits.
+        return _number(hashed + self.frame * 2654435769 if golden else hashed)
 
 
 def blue_mask() -> Any:
@@ -107,6 +109,8 @@ def blue_mask() -> Any:
 
 def pcg4d(*words: Any) -> list[Any]:
     """Return four hashed `mi.UInt32` of four (Jarzynski and Olano 2020)."""
+    # A linear congruential step of each word, then two rounds that mix the words; between them the
+    # upper bits are folded into the lower ones, which multiplication leaves poor.
     x, y, z, w = (mi.UInt32(word) * 1664525 + 1013904223 for word in words)
     for last in (False, True):
         x = x + y * w
@@ -119,4 +123,5 @@ def pcg4d(*words: Any) -> list[Any]:
 
 
 def _number(word: Any) -> Any:
-    return mi.Float(word >> (32 - _BITS)) * 2.0**-_BITS
+    bits = 24  # float32 resolves no more
+    return mi.Float(word >> (32 - bits)) * 2.0**-bits

@@ -75,11 +75,13 @@ class Frozen:
 
     def __call__(self, *args):
         """Call the function: the first time it is recorded, then replayed."""
+        # An exception of an earlier call must not be raised by this one.
         self._raised.error = None
         with _PAUSE:
             result = self._recorded(*args)
         error, self._raised.error = self._raised.error, None
         if error is not None:
+            # The recording returned nothing: a replay of it would return nothing, too.
             self._recorded.clear()
             raise error
         return result
@@ -95,11 +97,12 @@ def _without_frames(error: BaseException) -> BaseException:
     not outlive the recording.
     """
     links: list[BaseException | None] = [error]
-    seen = set()  # Dr.Jit may wrap an exception in one that has the first as its context: a circle
+    # Dr.Jit may wrap an exception in one that has the first as its context: a circle.
+    visited = set()
     while links:
         link = links.pop()
-        if link is not None and id(link) not in seen:
-            seen.add(id(link))
+        if link is not None and id(link) not in visited:
+            visited.add(id(link))
             link.__traceback__ = None
             links += [link.__cause__, link.__context__]
     return error

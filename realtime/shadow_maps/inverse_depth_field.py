@@ -66,6 +66,7 @@ def level_start(level: int) -> int:
 
 def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
     """Return the height field of a shadow map, with its pyramid of bounds."""
+    # The heights at the corners of the texels are read by four texels each.
     size = shadow_map.size
     height = inverse_depth(shadow_map)
     dr.eval(height)
@@ -74,11 +75,13 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
     row = index // size
     # A face has one row and one column of corners more than of texels.
     corner = (row + row // size) * (size + 1) + (index - row * size)
+    # Each texel with its four corners side by side: a march reads them at once.
     texels = dr.empty(Float, 4 * dr.width(index))
     four = [dr.gather(Float, height, corner + step) for step in (0, 1, size + 1, size + 2)]
     dr.scatter(texels, four_numbers(Float)(*four), index)
     dr.eval(texels)
     field = InverseDepthField(size, shadow_map.projection, texels, dr.empty(Float, 0))
+    # The pyramid from its finest level, a node for each texel, up to the whole face.
     bounds = dr.empty(Float, 2 * field.faces * field.nodes)
     low, high = four[0], four[0]
     for corner_height in four[1:]:
@@ -107,6 +110,7 @@ def node_bounds(heights: InverseDepthField, face, level, i, j):
 
 def _before(level):
     """Return `level_start` of a level that only the device knows."""
+    # (4^level - 1)/3 is 0101...01 in 2 level bits.
     return 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
 
 
@@ -124,13 +128,15 @@ def texel_walls(heights: InverseDepthField, face, i, j, active=True):
 
 
 def _write_level(heights: InverseDepthField, bounds, level: int) -> None:
-    """Write the bounds of the nodes of a level, from those of the next one."""
+    """Write the bounds of the nodes of a level, from the bounds of the next one."""
     # one kernel for all levels: to compile it takes longer than all its runs
     step = dr.opaque(mi.UInt32, level)
     index = dr.arange(mi.UInt32, heights.faces << (2 * level))
+    # Lanes count the nodes of all faces, row by row, 2^level nodes a row and rows a face.
     row = index >> step
     face = row >> step
     i, j = index - (row << step), row - (face << step)
+    # A node has four children in the next level: two side by side in row 2 j, two in row 2 j + 1.
     first = face * heights.nodes + _before(step + 1) + (j << (step + 2)) + 2 * i
     places = first, first + 1, first + (mi.UInt32(2) << step), first + (mi.UInt32(2) << step) + 1
     low, high = _merged(dr.gather(two_numbers(type(bounds)), bounds, place) for place in places)

@@ -13,14 +13,14 @@ light at (l, w) both projections are one homogeneous map from (u, v, s) to the p
   across + v up - s axis. Hence s is the height above that rectangle [m].
 
 It is linear in homogeneous coordinates, so planes stay planes and lines stay lines; the light
-itself is s = infinity, and a point is lit where its s is above that of the first surface. Where
-nothing is hit s = 0: at infinity, or at the end of the media. Back from a point, with d its vector
-from l (w = 1) or m (w = 0) and d = a across + b up + c axis,
+itself is s = infinity, and a point is lit where its s is above the s of the first surface. Where
+nothing is hit s = 0: at infinity, or at the end of the media. The map is inverted with the vector d
+from l (w = 1) or m (w = 0) to the point: for d = a across + b up + c axis,
 
     (u, v, s, 1) ~ (a, b, 1, c)  for w = 1,        (a, b, -c, 1)  for w = 0.
 
-A cube face has |across| = |up| = 1, the face of a spot tan(cutoff), so that its cone just fits; for
-a directional light they are half the sides of the rectangle [m].
+|across| and |up| are 1 for the face of a cube. For the face of a spot they are tan(cutoff), so that
+its cone just fits; for a directional light they are half the sides of the rectangle [m].
 """
 
 from dataclasses import dataclass
@@ -62,6 +62,8 @@ class Projection:
         """Return the scalar products of a vector [m] with the across, up and axis of a face [m]."""
         if self.basis:
             return tuple(dr.dot(vector, basis_vector) for basis_vector in self.basis)
+        # Faces 2k and 2k + 1 look along coordinate k, forwards and backwards; across and up are the
+        # next two coordinates, counted cyclically.
         x, y, z = vector.x, vector.y, vector.z
         axis = face >> 1
         a, b, c = (
@@ -79,10 +81,12 @@ class Projection:
         """
         a, b, c = self.products(face, vector)
         if self.basis:
+            # The basis is orthogonal, not of unit length; across and up of a spot are equally long.
             inverse = dr.rcp(dr.squared_norm(self.basis[0]))
             a, b = a * inverse, b * (inverse if self.w else dr.rcp(dr.squared_norm(self.basis[1])))
-        last = type(c)(weight)
-        return (a, b, last, c) if self.w else (a, b, -c, last)
+        # (a, b, 1, c) or (a, b, -c, 1) of a point; a direction has 0 for the 1.
+        lane_weight = type(c)(weight)
+        return (a, b, lane_weight, c) if self.w else (a, b, -c, lane_weight)
 
     def inverse_depth(self, place, distance):
         """Return the s of points that rays of the map meet: inverse planar depth [1/m],
@@ -91,7 +95,9 @@ class Projection:
         `place`: (u, v) on a face; `distance`: along the rays, infinite where nothing is met [m].
         """
         if not self.w:
+            # Rays start `depth` above the rectangle; nothing met before it has the height 0.
             return dr.maximum(self.depth - distance, 0)
+        # A point at planar depth 1 is sqrt(1 + |across|^2 (u^2 + v^2)) from the light.
         u, v = place
         across = dr.squared_norm(self.basis[0]) if self.basis else type(distance)(1)
         return dr.sqrt(dr.fma(across, dr.square(u) + dr.square(v), 1)) / distance
@@ -123,6 +129,7 @@ def light_basis(light: Light) -> tuple[Any, Any, Any] | None:
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
     across = dr.normalize(dr.cross(helper, axis))
+    # tan(cutoff), so that the cone just fits the face.
     square = light.cone.square_sin
     scale = dr.sqrt(square / (1 - square))
     return across * scale, dr.cross(axis, across) * scale, axis
@@ -140,6 +147,7 @@ def map_ray(light: Light, face, u, v) -> tuple[Any, Any]:
     across, up, axis = basis
     if light.w:
         return light.position, dr.normalize(across * u + up * v + axis)
+    # Parallel rays start before all shapes, `depth` above the rectangle where the media end.
     before = mi.Vector3d(light.position) - axis * mi.Float64(light.extent.depth)
     return before + across * u + up * v, axis
 
@@ -160,6 +168,7 @@ def cube_coordinates(d):
     """Return the face of a cube that a direction `d` of any length goes through, and u
     and v there, from -1 to 1.
     """
+    # The largest coordinate chooses the face. Divided by its size, the next two are u and v.
     size = dr.abs(d)
     x_major = (size.x >= size.y) & (size.x >= size.z)
     y_major = ~x_major & (size.y >= size.z)

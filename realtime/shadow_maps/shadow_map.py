@@ -60,7 +60,7 @@ class ShadowMaps:
 
     size: int  #: texels on a side
     distance: Any  #: of `ShadowMap`
-    projection: Projection | None  #: of a single light; those of several follow from the lights
+    projection: Projection | None  #: of a single light; None for several, from whom it follows
 
     def of(self, number: Any, light: Light) -> ShadowMap:
         """Return the maps of lights of some numbers."""
@@ -113,16 +113,17 @@ def cast_shadow_maps(scene, table: LightTable, size: int) -> ShadowMaps:
     Double = mi.Float64
     side, faces = size + 1, light_faces(table.rows)
     face, row, column = tiled_corners(table.count * faces, side)
-    there = (row < side) & (column < side)
+    # Squares of 4 x 4 corners reach beyond the face, where no ray is cast.
+    inside = (row < side) & (column < side)
     number = face // faces
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays
     # along their common edge.
     u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
-    cast = cast_map_rays(scene, table[number], (face - number * faces, u, v), there)
+    cast = cast_map_rays(scene, table[number], (face - number * faces, u, v), inside)
     distance = dr.empty(type(cast), table.count * faces * side * side)
-    dr.scatter(distance, cast, (face * side + row) * side + column, there)
+    dr.scatter(distance, cast, (face * side + row) * side + column, inside)
     projection = light_projection(table.rows) if table.count == 1 else None
-    # Evaluate it once: every kernel that reads it would cast the rays again.
+    # Evaluated once: every kernel that reads the distances would cast the rays again.
     dr.eval(distance, projection)
     return ShadowMaps(size, distance, projection)
 
@@ -131,6 +132,7 @@ def inverse_depth(shadow_map: ShadowMap):
     """Return the inverse planar depth [1/m], or the height for parallel rays [m], at
     every corner of the texels.
     """
+    # Corners lie face by face, row by row, at equal steps of u and v from -1 to 1.
     size, distance = shadow_map.size, shadow_map.distance
     Float = type(distance)
     index = dr.arange(mi.UInt32, dr.width(distance))
@@ -146,6 +148,7 @@ def tiled_corners(faces: int, side: int):
 
     The last squares reach beyond the face.
     """
+    # Squares a row, rounded up; lanes count squares, and the 16 corners within one.
     across = -(-side // 4)
     lane = dr.arange(mi.UInt32, faces * across * across * 16)
     square, within = lane // 16, lane % 16
@@ -177,6 +180,7 @@ def cast_map_rays(scene, light: Light, place, active=True):
     Float = type(light.position.x)
     start, unit = map_ray(light, *place)
     skipped: Any = 0
+    # Rays of a light sample start off its shape; the map counts from the sample.
     if light.facing is not None:
         start, skipped = light.rays_from(unit)
     ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(unit))
@@ -196,10 +200,13 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
         face = mi.UInt32(0)
         a, b, _, c = projection.homogeneous(face, d, 1)
         u, v = (a / c, b / c) if projection.w else (a, b)
+    # The nearest corner is the whole number below (u + 1) size/2 + 1/2.
     size = shadow_map.size
     column, row = (_nearest(dr.fma(place, 0.5 * size, 0.5 * (size + 1)), size) for place in (u, v))
     texel = shadow_map.first + (face * (size + 1) + row) * (size + 1) + column
     stored = dr.gather(Float, shadow_map.distance, texel)
+    # Distances are compared as squares. Parallel rays start `depth` above the rectangle, in which
+    # the light's position lies, from where d counts.
     if projection.w:
         return dr.squared_norm(d) <= dr.square(stored)
     return projection.products(face, d)[2] <= stored - projection.depth

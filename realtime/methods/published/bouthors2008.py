@@ -9,11 +9,11 @@ the stretches in clouds:
 
     opacity = sum (exp(-kappa_i x_{i+1}) - exp(-kappa_i x_i)) / kappa_i.
 
-Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa
-is missing, and each exponent has the local kappa times the whole distance instead of the depth
-cumulated up to there. As printed the opacity is negative, and more light comes out than went in; x
-is counted from where the ray enters the first cloud. In a grid kappa is that in the middle of a
-step.
+The sign of the sum is wrong: the sum integrates exp(-kappa x), which falls. The sum is a length,
+since the factor kappa is missing, and each exponent has the local kappa times the whole distance
+instead of the depth cumulated up to there. As printed the opacity is negative, and more light comes
+out than went in; x is counted from where the ray enters the first cloud. In a grid kappa is taken
+in the middle of a step.
 
 **Single scattering**, eq. 1: the light of a step between two nodes is e_{i+1} - e_i, with e =
 exp(-u) and u the depth of both segments. The other sign and the factor kappa dx/(kappa dx + dl)
@@ -30,8 +30,6 @@ from airlight.realtime.clouds.march import march, middle_density, voxel
 from airlight.realtime.clouds.single_scattering import CloudRays, light_once
 from airlight.realtime.methods.cloud_collectors import CloudCollectors
 from airlight.realtime.parameters import parameter
-
-_HALF = 0.5  # of the density, as printed
 
 
 @dataclass(frozen=True)
@@ -78,12 +76,13 @@ class CloudCollectors2008(CloudCollectors):
 
     @property
     def along_light(self):
-        """Whether thickness and depth in slabs are those along the light."""
+        """Whether thickness and depth in slabs are counted along the light."""
         return self.thickness == "light"
 
     def cut(self, phase, types):
         """Return the fraction of the light of a phase function that is cut from its peak [1]."""
-        return _HALF if self.peak == "half" else super().cut(phase, types)
+        # Half of the density is left, as printed.
+        return 0.5 if self.peak == "half" else super().cut(phase, types)
 
     def light_once(self, rays, beams, stride):
         """Return the radiance that clouds scatter once into rays, by beam and
@@ -104,6 +103,7 @@ class CloudCollectors2008(CloudCollectors):
 
 def printed_step(depth: Any, eye: tuple[Any, Any], segment: tuple[Any, Any]) -> Any:
     """Return eq. 1 of a step, from the depths to the `eye` and of the `segment` at its ends."""
+    # e_{i+1} - e_i: it should be the other way round, and is therefore negative in a cloud.
     return dr.exp(-(eye[1] + segment[1])) - dr.exp(-(eye[0] + segment[0]))
 
 
@@ -114,21 +114,24 @@ def printed_opacity(rays: CloudRays, stride: Any) -> Any:
     clouds, origin, direction = rays.clouds, rays.origin, rays.direction
     Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
 
+    # The sum carries the distance at which the ray enters the first cloud, from which x counts.
     def add(total, begin, finish, inside, cloud):
         first, sums = total
         rho = middle_density(clouds, origin, direction, begin, finish, cloud)
         kappas = [dr.gather(Float, sigma_t, cloud) * rho for sigma_t in clouds.sigma_t]
         first = dr.minimum(first, begin)
         near, far = begin - first, finish - first
+        # A step in vacuum adds nothing, and would divide by 0.
         terms = [
             dr.select(kappa > 0, (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
             for kappa in kappas
         ]
-        return (first, tuple(own + term for own, term in zip(sums, terms))), mi.Bool(True)
+        return (first, tuple(so_far + term for so_far, term in zip(sums, terms))), mi.Bool(True)
 
     def step(total, x, cloud):
         return stride * voxel(clouds, cloud)
 
     nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
     _, sums = march(rays.surfaces, origin, direction, rays.end, nothing, step=step, add=add)
+    # A grey medium has one sum for all three channels.
     return Color(*(sums * (3 // len(sums))))

@@ -5,7 +5,8 @@ the pixels that it covers.
 With Gamma(x) the airlight from the camera to x (eq. 1), the airlight of a ray is
 the signed sum of eq. 3,
 
-    L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
+    L = sum_n s_n Gamma(min(x_n, x_visible)),    s_n = +1 where the ray leaves the light,
+                                                 s_n = -1 where it enters the light,
 
 in any order: terms are added up as they come (`realtime.methods.published.billeter2010.raster`).
 The `static` mesh is the height field of the shadow map itself, an `adaptive` one has fewer
@@ -33,8 +34,6 @@ from airlight.realtime.shadow_maps.shadow_map import (
     map_memory,
     map_size,
 )
-
-_VERTEX = 8 * 8  # bytes to draw one: four doubles for each as it is, and four for it in the image
 
 
 @dataclass(frozen=True)
@@ -77,9 +76,9 @@ class LightVolumes2010(Method):
         if not isinstance(scene.medium, Homogeneous) or scene.medium.bounded_media:
             raise InputError(
                 f"method {self.name}: expected one homogeneous medium that fills all space, and "
-                "the scene has another; "
-                "use light-volumes"
+                "the scene has another; use light-volumes"
             )
+        # Without shadows there is no map and no mesh.
         if scene.features.shadows:
             check_maps(
                 scene.lights, self.map, sum(_memory_of(light, self.map) for light in scene.lights)
@@ -96,6 +95,7 @@ class LightVolumes2010(Method):
         """Return the airlight of every ray."""
         if state is not None:
             return mesh_airlight(view, light, state, kernel=kernel)
+        # Nothing casts a shadow: the light volume is everything before the surface.
         rays = view.lit_by(light, kernel)
         return rays.radiance(rays.gamma(view.distance))
 
@@ -108,5 +108,8 @@ def _memory_of(light: Light, size: int) -> int:
     """Return about how much the volume of a light takes, an upper bound
     where it is adaptive [bytes].
     """
+    # The map, the mesh, and what drawing takes for each vertex: four doubles of the vertex as it
+    # is, and four of it in the image.
     faces = light_faces(light)
-    return map_memory(light, size) + memory_needed(faces, size) + faces * (size + 1) ** 2 * _VERTEX
+    drawing = faces * (size + 1) ** 2 * (8 * 8)
+    return map_memory(light, size) + memory_needed(faces, size) + drawing

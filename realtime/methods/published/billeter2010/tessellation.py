@@ -28,7 +28,7 @@ As each corner is examined in the quad that would introduce it, a tessellation i
 more than a small multiple of the threshold: the errors of a corner and of the corners it was
 interpolated from add up. A plain Laplacian of the depth at the texels, with as many triangles, 227
 000 for six maps of 512^2 of the colonnade, leaves 5.8 times the error of the depth (root mean
-square) and 1.3 times that of the airlight (`airlight paper billeter`).
+square) and 1.3 times the error of the airlight (`airlight paper billeter`).
 
 Levels: a node of level l has N / 2^l texels on a side; level 0 is a face, level log2 N the texels.
 `divided[l]` has one flag for each node of each face, (faces, 2^l, 2^l), row by row, and nodes that
@@ -56,6 +56,7 @@ def configuration(sides: int) -> list[tuple[int, int, int]]:
 
     `sides`: which sides are divided, one bit each: 1 lower, 2 right, 4 upper, 8 left.
     """
+    # The corners of the ring have even numbers, the middles of its sides odd ones.
     middles = [2 * side + 1 for side in range(4) if sides >> side & 1]
     start = middles[0] if middles else 0
     ring = [k % 8 for k in range(start, start + 8) if k % 2 == 0 or k % 8 in middles]
@@ -76,8 +77,9 @@ def edges(height, threshold: float) -> list[Any]:
     size = height.shape[1] - 1
     marks_by_level = []
     for level in range(size.bit_length() - 1):
+        # Every half-th corner: the corners of the quads of this level, and their middles. Face by
+        # face, to save memory.
         half = size >> (level + 1)
-        # Face by face, to save memory.
         marks = [_marks(face_height[::half, ::half], threshold) for face_height in height]
         marks_by_level.append(np.stack(marks))
     return marks_by_level
@@ -89,6 +91,8 @@ def _marks(s, threshold: float):
     def departs(a, b, middle):
         return abs(a + b - 2 * middle) > 2 * threshold * middle
 
+    # On the sides along rows, on the sides along columns, and on the diagonal; a quad has two sides
+    # of each kind.
     along_rows = departs(s[::2, :-1:2], s[::2, 2::2], s[::2, 1::2])
     along_columns = departs(s[:-1:2, ::2], s[2::2, ::2], s[1::2, ::2])
     diagonal = departs(s[:-1:2, :-1:2], s[2::2, 2::2], s[1::2, 1::2])
@@ -98,8 +102,8 @@ def _marks(s, threshold: float):
 
 
 def divide(edge: list[Any]) -> list[Any]:
-    """Return which nodes are divided: those with an edge in or below them, and
-    what neighbours then need.
+    """Return which nodes are divided: nodes with an edge in or below them, and the nodes that
+    neighbours then need.
 
     From fine to coarse: where a node is divided, it and the four nodes across its sides must exist,
     so their parents are divided. Then the quads on both sides of an edge of the mesh differ by at
@@ -107,6 +111,7 @@ def divide(edge: list[Any]) -> list[Any]:
     """
     divided = list(edge)
     for level in reversed(range(1, len(edge))):
+        # A divided node and its four neighbours must exist; a node exists if its parent is divided.
         exists = divided[level].copy()
         for across in _across(divided[level]):
             exists |= across
@@ -152,12 +157,14 @@ def quads(divided: list[Any]):
     faces = len(divided[0])
     exists = np.ones((faces, 1, 1), bool)
     for level, flags in enumerate(divided):
+        # The quads of the mesh exist and are not divided; a side is divided if the node across is.
         numbers = np.flatnonzero(exists & ~flags)
         sides = np.zeros(len(numbers), np.uint8)
         for side, across in enumerate(_across(flags)):
             sides |= across.ravel()[numbers].astype(np.uint8) << side
         yield level, numbers, sides
         exists = np.repeat(np.repeat(flags, 2, axis=1), 2, axis=2)
+    # Quads as large as texels have no divided sides.
     numbers = np.flatnonzero(exists)
     yield len(divided), numbers, np.zeros(len(numbers), np.uint8)
 
@@ -165,15 +172,17 @@ def quads(divided: list[Any]):
 def triangles(divided: list[Any]):
     """Return the triangles of the quads, (m, 3) numbers of corners face by face and row by row.
 
-    `divided` is that of `divide`. Triangles are counter-clockwise in (column, row), and no corner
-    lies inside a side of one.
+    `divided`: the result of `divide`. Triangles are counter-clockwise in (column, row), and no
+    corner lies inside a side of a triangle.
     """
+    # Quads of one level with the same divided sides have one fan of triangles, at another corner.
     size = 2 ** len(divided)
     parts = []
     for level, numbers, sides in quads(divided):
         for sides_now in range(16):
             chosen = numbers[sides == sides_now] if len(numbers) else numbers
             if len(chosen):
+                # The fan as steps from the corner (0, 0) of each quad.
                 first, step = _first_corner(chosen, level, size)
                 fan = np.array(
                     [
@@ -194,7 +203,5 @@ def _first_corner(numbers, level: int, size: int):
 
 
 def _ring_offset(k: int, step: int, size: int) -> int:
-    """Return by how much the number of a corner of the ring exceeds that of
-    the quad's corner (0, 0).
-    """
+    """Return the number of a corner of the ring, less the number of the quad's corner (0, 0)."""
     return (RING[k][1] * step // 2) * (size + 1) + RING[k][0] * step // 2

@@ -2,7 +2,7 @@
 """Shadow planes as Biri, Arques and Michelin 2006 draw them: Gamma at every plane, with a
 stencil and a frame buffer.
 
-Silhouettes, their planes and the wedges are those of `realtime.methods.shadow_planes`.
+`realtime.methods.shadow_planes` finds the silhouettes, their planes and the wedges.
 
 Read in this order:
 

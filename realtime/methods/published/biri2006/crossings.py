@@ -9,13 +9,13 @@ rule reads: a plane that brings the count from zero up adds, one that brings it 
 subtracts. Without an order every plane counts.
 
 **Bounded media** (5.2). A ray is drawn in each medium by itself: its end is the exit from the
-medium or the surface before that, whose Gamma is added if it is lit, and the entry, a back facing
+medium or the surface before that, whose Gamma is added if it is lit. The entry, a back facing
 triangle of the bounds in the paper, is drawn in the order of the planes. It subtracts its Gamma if
 the stencil is zero, and sets the stencil to 255: planes closer to the camera do not pass. For
-order=paper an entry therefore counts by the cosine of the angle at the light between the camera and
-itself, planes of a larger cosine are left out, and it comes last. The paper asks for small
-triangles, whose middles stand for them in the order: here they are points. Otherwise planes behind
-it count.
+order=paper an entry therefore has a place by the cosine of the angle at the light between the
+camera and itself, planes of a larger cosine are left out, and the entry comes last. The paper asks
+for small triangles, whose middles stand for them in the order: here they are points. In the other
+orders the planes behind the entry count.
 
 **The frame buffer** holds the frame, not one sum: `start` is its content before.
 """
@@ -55,11 +55,11 @@ class _Draw:
     """Progress in drawing the planes of a ray."""
 
     place: Any  #: next entry to read
-    stencil: Any
-    quotient: Any  #: of the plane to draw
+    stencil: Any  #: layers of shadow so far
+    quotient: Any  #: D/x of the plane to draw
     number: Any  #: of the plane to draw
     factor: Any  #: how often it counts; 0 if none is ready
-    total: Any
+    total: Any  #: the radiance so far [W/(m^2 sr)]
 
 
 def sum_crossings(
@@ -75,24 +75,46 @@ def sum_crossings(
 ):
     """Add up Gamma over the crossings of every ray.
 
-    `planes`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a
-    bounded medium [m]; `gammas`: functions (plane, ray, x) and (x) that give the radiance of Gamma
-    at a crossing and at the surface; `order`: 'exact', 'paper' or 'none'; `buffer`: what keeps the
-    sum; None for float; `start`: what is in the buffer before, or None; `entry`: where rays enter a
-    bounded medium, or None. Returns `total`: the radiance; `lit`: whether the light reaches the
-    end.
+    Parameters
+    ----------
+    planes, ray
+        The planes and the rays.
+    distance
+        To the visible surface, or to the end in a bounded medium [m].
+    gammas
+        Functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the
+        surface [W/(m^2 sr)].
+    order
+        'exact', 'paper' or 'none'.
+    buffer
+        The buffer that holds the sum; None for float.
+    start
+        The content of the buffer before, or None.
+    entry
+        Where rays enter a bounded medium, or None.
+
+    Returns
+    -------
+    total
+        The radiance [W/(m^2 sr)].
+    lit
+        Whether the light reaches the end.
     """
     index = planes.index
     at_plane, at_surface = gammas
     ray_end = index.distance / distance
     width = dr.width(ray.x)
     Float = type(ray.x)
+    # The stencil starts with the layers over the visible surface, whose Gamma is added if no layer
+    # covers it.
     over_surface = _layers_at_end(index, ray, ray_end)
     lit = over_surface <= 0
     keep = buffer.stored if buffer else lambda value: value
     at_end = dr.select(lit, at_surface(distance), 0)
     total = keep(at_end if start is None else start + at_end)
     key = None if entry is None else _entry_key(index, ray, entry, order)
+    # Planes come from the surface towards the camera, or in the exact order from the camera on,
+    # where `index.layers` are between the light and the camera.
     begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
     draw = _Draw(
         dr.zeros(mi.UInt32, width),
@@ -103,6 +125,7 @@ def sum_crossings(
         total,
     )
 
+    # Each ray reads on until it has a plane that counts; then all rays evaluate Gamma together.
     def body(draw):
         (draw,) = dr.while_loop(
             state=(draw,),
@@ -110,6 +133,7 @@ def sum_crossings(
             body=lambda draw: (_next(planes, ray, ray_end, draw, order, key),),
             labels=("draw",),
         )
+        # x = D/quotient; a ray at the end of its list has no plane ready, and adds nothing.
         x = dr.minimum(
             index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance
         )
@@ -123,6 +147,8 @@ def sum_crossings(
     )
     if entry is None:
         return draw.total, lit
+    # The entry is drawn last: in the paper's order the stencil says whether it is lit, in the exact
+    # order the layers at the entry. Without an order it always counts.
     enters: Any = mi.Bool(True)
     if order == "paper":
         enters = draw.stencil == 0
@@ -137,8 +163,8 @@ def reaches(index: PlaneIndex, ray: RayPlanes, distance):
 
 
 def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
-    """Return the key of an entry: planes with a larger one count. It is -cos in the
-    paper's order, else D/x.
+    """Return the key of an entry, which planes are compared with: -cos of the angle at the light
+    in the paper's order, D/x in the other orders.
     """
     if order != "paper":
         return index.distance / entry.distance
@@ -153,10 +179,13 @@ def _next(
     planes: PaperPlanes, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key
 ) -> _Draw:
     """Read the next plane of the list."""
+    # D/x is larger before the end of the ray.
     quotient, crossed, gain, number = read_plane(
         planes.index, ray, draw.place, draw.place < ray.count
     )
     crossed &= quotient > ray_end
+    # In the paper's order an entry leaves out planes of a larger cosine. In the other orders planes
+    # before the entry change the stencil, but do not count.
     counts = crossed
     if entry_key is not None and order == "paper":
         crossed &= -dr.gather(type(ray.x), planes.centres, number, crossed) > entry_key
@@ -166,10 +195,14 @@ def _next(
     if order == "none":
         factor, stencil = gain, draw.stencil
     elif order == "paper":
+        # Coming from the surface: beyond a plane with a gain there is shadow. It adds its Gamma if
+        # the stencil is one, and takes its layers off; a loss subtracts if the stencil is zero.
         passes = dr.select(gain > 0, draw.stencil == 1, draw.stencil == 0)
         factor = dr.select(passes, dr.sign(gain), 0)
         stencil = draw.stencil - gain
     else:
+        # Coming from the camera: the plane that begins a shadow adds, the plane that ends it
+        # subtracts.
         stencil = draw.stencil + gain
         begins, ends = (draw.stencil <= 0) & (stencil > 0), (draw.stencil > 0) & (stencil <= 0)
         factor = dr.select(begins, 1, dr.select(ends, -1, 0))
@@ -185,6 +218,7 @@ def _next(
 
 def _layers_at_end(index: PlaneIndex, ray: RayPlanes, ray_end):
     """Return the layers over the visible surface."""
+    # Layers at the camera, and the gains of all planes before the end, in any order.
     Float, width = type(ray.x), dr.width(ray.x)
 
     def look(k, layers):

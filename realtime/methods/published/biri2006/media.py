@@ -4,7 +4,8 @@
 The paper puts a constant R for r in the exponent, and takes the distance x_n at which the ray
 enters from x. As printed it is
 
-    L = k_t exp(-k_t (r + R - x_n)) Omega/(4 pi h) int I exp(-k_t R (sin theta + 1)/cos theta) p dtheta,
+    L = k_t exp(-k_t (r + R - x_n)) Omega/(4 pi h)
+        int I exp(-k_t R (sin theta + 1)/cos theta) p dtheta,
 
 which cannot be meant: r before the integral is a variable of it, and the exponent within it counts
 R once more and lets h go. The exponent x - x_n + R with x = t + h tan theta gives
@@ -16,7 +17,7 @@ integral, which alone can be meant, and the exponent within it as it stands. A k
 polynomial for either (`realtime.methods.published.biri2006.polynomial`); without one they are
 summed over the panels of `realtime.scene.media.bounded_rays`. The paper treats each medium alone:
 the light reaches a body through vacuum, however many bodies are before it. The transmittance
-between the body and the camera is one factor for a ray, and is kept.
+between the body and the camera is one factor for a ray; it is applied here.
 """
 
 from collections.abc import Callable
@@ -62,23 +63,28 @@ class ConstantRays(BoundedRays):
         rate = super().growth(piece, x, r)
         if not self.printed:
             return rate
+        # The derivative of R (r + s)/h along the ray is R (1 + s/r)/h.
         s = x - self.geometry.foot
         return rate * (1 + self._distance(piece) * (1 + s / r) / self.height)
 
     def depths(self, piece, x, r, lengths):
         """Return the exponents with the constant R for the light's path, by channel."""
+        # The part of the exponent that is the same at all x: the depth before the medium, and
+        # sigma_t (R - x_n).
         distance = self._distance(piece)
         constants = [
             before + sigma * (distance - piece.begin)
             for before, sigma in zip(piece.before, piece.medium.sigma_t)
         ]
+        # As meant, the exponent grows with x alone.
         if not self.printed:
             return [
                 dr.fma(sigma, x, constant)
                 for sigma, constant in zip(piece.medium.sigma_t, constants)
             ]
+        # As printed, R (sin theta + 1)/cos theta takes the place of x - t, where t is the foot: by
+        # the form of (r + s)/h that does not cancel.
         s, h = x - self.geometry.foot, self.height
-        # (sin theta + 1)/cos theta, neither form cancels
         ratio = dr.select(s > 0, (r + s) / h, h / (r - s))
         depth = dr.fma(distance, ratio, self.geometry.foot)
         return [
@@ -95,6 +101,7 @@ class ConstantRays(BoundedRays):
         distance, polynomial = self._distance(piece), self.polynomial
         assert polynomial is not None
 
+        # Each channel has an exponent, and so a polynomial.
         def integral(x0, x1):
             channels = []
             for before, sigma in zip(piece.before, piece.medium.sigma_t):
@@ -151,9 +158,10 @@ def constant_rays(view: View, light: Light, kernel: Kernel | None, form: str) ->
 
 
 def gamma_in(rays: BoundedRays, x):
-    """Return the integral from where the rays enter their one piece up to the distance x,
-    and beyond, RGB [1/m^2].
+    """Return the integral from where the rays enter their one piece up to the distance x [m],
+    which may lie beyond the piece, RGB [1/m^2].
     """
+    # Panels may begin at the camera: before the piece they find no medium.
     if not isinstance(rays, ConstantRays) or rays.polynomial is None:
         return rays.airlight(type(x)(0), x)
     (piece,) = rays.pieces

@@ -4,7 +4,7 @@
 With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments
 [a_i, b_i] has the airlight
 
-    L = sum_i Gamma(b_i) - Gamma(a_i)                                                      (section 4.2).
+    L = sum_i Gamma(b_i) - Gamma(a_i)                                        (section 4.2).
 
 The paper evaluates Gamma on every plane, with a stencil buffer to leave out planes that are
 themselves in shadow. `order` chooses how that is decided:
@@ -14,9 +14,9 @@ themselves in shadow. `order` chooses how that is decided:
   the front facing planes increment the stencil, section 5.1.5 has the back facing ones add: the
   latter is right.)
 * `none` counts every plane: the artefact of Fig. 4.
-* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. That integrates
-  each lit segment; here its ends are two Gammas, whose difference loses digits where a segment is
-  short.
+* `exact` counts layers along each ray, from the camera on, as `shadow-planes` does. `shadow-planes`
+  integrates each lit segment; here the ends of a segment are two Gammas, whose difference loses
+  digits where the segment is short.
 
 Each of the other parameters adds one thing that the paper has: a polynomial comes with the kernel
 `taylor`.
@@ -80,15 +80,13 @@ class ShadowPlanes2006(Method):
     evaluation: str = parameter(
         "pixel",
         "Gamma at every crossing, or at the vertices of a mesh of each plane and of the surfaces, "
-        "interpolated, as "
-        "published",
+        "interpolated, as published",
         choices=("pixel", "vertex"),
     )
     buffer: str = parameter(
         "float",
         "the paper's frame buffer: 255 steps up to `white` for surfaces and all lights, rounded "
-        "and clamped after each "
-        "pass",
+        "and clamped after each pass",
         choices=("float", "8bit"),
     )
     white: float = parameter(
@@ -99,31 +97,27 @@ class ShadowPlanes2006(Method):
     )
     rows: int = parameter(
         16,
-        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond the "
-        "last Gamma is "
-        "constant",
+        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond "
+        "the last Gamma is constant",
         least=2,
     )
     ambient: float = parameter(
         0.0,
         "radiance of a constant light field in the medium, the paper's stand-in for multiple "
-        "scattering, which adds "
-        "albedo ambient (1 - exp(-sigma_t x)); the reference has none",
+        "scattering, which adds albedo ambient (1 - exp(-sigma_t x)); the reference has none",
         least=0,
         unit="W/(m^2 sr)",
     )
     media: str = parameter(
         "exact",
-        "bounded media: the true depth on both segments, or the constant R of section 4.2 as meant "
-        "or as printed, by "
-        "the polynomial of the kernel where it has one",
+        "bounded media: the true depth on both segments, or the constant R of section 4.2 as "
+        "meant or as printed, by the polynomial of the kernel where it has one",
         choices=FORMS,
     )
     cone: int = parameter(
         0,
-        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, "
-        "and planes bound no "
-        "light",
+        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone "
+        "itself, and planes bound no light",
         least=3,
         most=4096,
         also=(0,),
@@ -132,7 +126,7 @@ class ShadowPlanes2006(Method):
 
     @property
     def by_rays(self):
-        """Gamma at vertices is that of the whole image."""
+        """Gamma at every crossing belongs to one ray; Gamma at vertices to the whole image."""
         return self.evaluation == "pixel"
 
     @property
@@ -156,7 +150,7 @@ class ShadowPlanes2006(Method):
         return PaperPreparation(occluders, self.cone, self.order)
 
     def check(self, scene):
-        """Refuse a constant R without bounds, and bounded media that vertices cannot have."""
+        """Refuse bounded media that vertices cannot have."""
         if scene.medium.bounded_media and self.evaluation == "vertex":
             check_vertices(scene.medium, scene.lights)
 
@@ -165,6 +159,7 @@ class ShadowPlanes2006(Method):
         reaches the visible surface.
         """
         if state is None:
+            # Nothing casts a shadow: the ray is lit up to the surface.
             rays = self._lit(view, light, kernel)
             return rays.radiance(rays.gamma(view.distance)), True
         value, reached = self._drawn(view, light, state, kernel)
@@ -204,6 +199,7 @@ class ShadowPlanes2006(Method):
         total, surfaces = Color(0), Color(0)  # what the buffer holds, and what of that are surfaces
         lit: list[Any] = []
         for number, light in enumerate(view.lights):
+            # Frames cast rays for the shadows of a light at infinity on surfaces.
             planes = state[number] if view.features.shadows else None
             reached = True
             if planes is not None and light.w:
@@ -238,6 +234,7 @@ class ShadowPlanes2006(Method):
         # Planes take the place of a cone whose intensity does not fall within it.
         cone = bool(self.cone and light.cone is not None and not light.varies)
         airlight = self._lit(view, light.without_cone() if cone else light, kernel)
+        # Vertices in bounded media: medium by medium, each with a Gamma that begins where it does.
         if view.medium.bounded_media and self.evaluation == "vertex":
             start = type(view.medium.albedo)(0) if start is None else start
             assert isinstance(airlight, BoundedRays)
@@ -253,6 +250,7 @@ class ShadowPlanes2006(Method):
                 start=start,
             )
             return total, reaches(index, rays, view.distance)
+        # Without a buffer that rounds in between, the ends of each lit segment are found first.
         if self.order == "exact" and self.evaluation == "pixel" and buffer is None:
             return _differences(view, planes, rays, airlight)
         gammas = self._gammas(view, planes, airlight, cone=cone)
@@ -268,6 +266,7 @@ class ShadowPlanes2006(Method):
         def at(x):
             return airlight.radiance(airlight.gamma(x))
 
+        # At every crossing itself, or between the vertices of the planes and of the surfaces.
         if self.evaluation == "pixel":
             return lambda number, rays, x: at(x), at
         gamma = partial(gamma_at, view, airlight.light, kernel=airlight.kernel)
@@ -321,6 +320,7 @@ class PaperPreparation:
             used = components_in_view(occluders, camera, position)
             if shape is not None:  # the light's shape casts no shadow in its own light
                 used &= ~occluders.of_shape(shape)
+            # The cone of a spot as an occluder: a ring of edges close to the light.
             if self.cone and light.cone is not None:
                 axis, cosine = host_numbers(light.axis, light.cos_cutoff)
                 ring = cone_ring(axis, float(cosine[0]), self.cone)

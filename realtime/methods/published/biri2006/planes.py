@@ -8,10 +8,10 @@ distance c of the middle from the axis takes the place of that angle: cos psi = 
 ..., so -c has the order of the cosine.
 
 **A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32
-edges). Points outside the cone are in shadow, one layer deep. Its silhouette is a ring of edges
-about the axis, close to the light; the corners lie on the cone of the spot, so that the pyramid is
-inside it. As the light sees the ring it runs counter-clockwise, with no layer to its left and one
-to its right: every edge has the coefficient -1.
+edges). Points outside the cone are in shadow, one layer deep. The silhouette of the cone is a ring
+of edges about the axis, close to the light; the corners lie on the cone of the spot, so that the
+pyramid is inside it. As the light sees the ring it runs counter-clockwise, with no layer to its
+left and one to its right: every edge has the coefficient -1.
 """
 
 from dataclasses import dataclass
@@ -35,14 +35,14 @@ from airlight.realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 
-#: Distance of the ring of a spot from the light over that of the camera. All light passes within
-#: the ring, so it must be nearer to the light than anything that the picture shows.
+#: Distance of the ring of a spot from the light, over the distance of the camera from the light.
+#: All light passes within the ring, so it must be nearer to the light than anything in the picture.
 NEARNESS = 1e-6
 
 
 @dataclass(frozen=True)
 class PaperPlanes:
-    """The shadow planes of one light, and what the paper needs of them more."""
+    """The shadow planes of one light, with the edges and the order that the paper needs."""
 
     index: PlaneIndex
     centres: Any  #: cosine at the middle of the edge of every plane, section 5.1.4; w = 0: -c [m]
@@ -74,11 +74,13 @@ def paper_planes(
     layers = layers_between(occluders, light, basis, used=used)
     edges = silhouette(occluders, light, used=used)
     ends, coefficient = basis.coordinates(occluders.vertices[edges.edges]), edges.coefficient
+    # The ring of a spot, with a layer of shadow outside: the camera may lie there.
     if ring is not None:
         of_ring = NEARNESS * basis.distance * ring_edges(ring) @ basis.axes.T
         ends = np.concatenate([ends, of_ring])
         coefficient = np.concatenate([coefficient, np.full(len(ring), -1, dtype=np.int32)])
         layers += is_outside(ring, basis.axes[2])
+    # A plane may be parted in two: `planes.edge` says of each which edge it has.
     planes = parted(edge_planes(ends, coefficient, w=basis.w))
     ends = ends[planes.edge]
     centres = edge_centres(ends, basis.w)
@@ -92,8 +94,9 @@ def paper_planes(
 
 
 def edge_centres(ends: Array, w: int) -> Array:
-    """Return by what planes are ordered towards the camera, of the ends (planes,
-    2, 3) of their edges [m].
+    """Return the values by which planes are ordered towards the camera, from the ends (planes,
+    2, 3) of their edges [m]: the cosine at the middle of the edge, or for w = 0 minus its distance
+    from the axis.
     """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     if w:
@@ -107,6 +110,7 @@ def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
     `axis`: of the spot, a unit vector; `cos_cutoff`: cosine of the half angle of the cone, in (0,
     1); `sides`: edges of the ring, 3 or more.
     """
+    # The coordinate axis that is farthest from the spot's axis gives a product that is not small.
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     above = np.cross(across, axis)  # looking along the axis, `across` is to the right of it

@@ -74,12 +74,14 @@ def bounded_taylor(
 ):
     """Return the airlight integral of a bounded medium by the polynomial [1/m].
 
-    `printed`: whether the coefficients are those of the annex; `x0` and `x1` bound a
+    `printed`: whether to take the coefficients of the annex; `x0` and `x1` bound a
     segment of any length [m].
 
     Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the
     medium. The paper prints no coefficients for the derived exponent.
     """
+    # As printed, the coefficients of the medium without bounds with R for h; derived, the series of
+    # exp(-a tan theta) times the phase function's.
     if segment.printed:
         coefficients = coefficients_of(
             segment.sigma_t * segment.distance, phase, degree, printed=printed
@@ -87,13 +89,13 @@ def bounded_taylor(
     elif printed:
         raise InputError(
             "kernel taylor-printed: the paper prints no coefficients for the exponent that section "
-            "4.2 must mean; use "
-            "media=printed, or the kernel 'taylor'"
+            "4.2 must mean; use media=printed, or the kernel 'taylor'"
         )
     else:
         check_degree(degree)
         series = tangent_series(segment.sigma_t * geometry.height, degree)
         coefficients = series_product(series, phase_series(phase, degree, "taylor"), degree)
+    # exp(-sigma_t (foot + R - x_n)), with the depth before the medium.
     depth = dr.fma(segment.sigma_t, geometry.foot, segment.depth)
     if segment.printed:
         # e^-b, which the coefficients leave out
@@ -103,11 +105,13 @@ def bounded_taylor(
 
 def tangent_series(a: Any, degree: int) -> list[Any]:
     """Return the coefficients of exp(-a tan theta) in powers of theta, up to a degree."""
+    # T' = 1 + T^2.
     tangent = [0.0]
     for n in range(degree):
         tangent.append(
             (float(n == 0) + sum(tangent[k] * tangent[n - k] for k in range(n + 1))) / (n + 1)
         )
+    # e = exp(-a T): e' = -a T' e.
     series = [type(a)(1)]
     for n in range(1, degree + 1):
         series.append((-a / n) * sum((k * tangent[k]) * series[n - k] for k in range(1, n + 1)))
