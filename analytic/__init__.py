@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight equation in float64 and in as many digits as wanted: the side of the reference.
+"""The airlight equation in float64 and in any number of digits: the side of the reference.
 
-Names and units are those of DESIGN section 2: lengths in metres, extinction in 1/m, J in 1/m.
+DESIGN section 2 defines names and units: lengths in metres, extinction in 1/m, J in 1/m.
 
 Read in this order:
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one stopwatch: what work takes, by the wall clock and of the processors.
+"""The one stopwatch: how long work takes, by the wall clock and of the processors.
 
-The time of the wall clock is what a user waits for. The processor time of all threads is beside it:
-other load on the machine changes it least. Work on a device is done when its arrays are ready:
-`validation.clock.timed` waits for them.
+A user waits for the time of the wall clock. The processor time of all threads is reported with it,
+because other load on the machine changes it least. Work on a device is done when its arrays are
+ready: `validation.clock.timed` waits for them.
 """
 
 import time

@@ -14,16 +14,16 @@ Its moments are <r^k> = r_n^k Gamma(gamma + k)/Gamma(gamma): the mean square rad
     kappa = N_0 <Q_ext pi r^2> = N_0 pi <r^2> Q,        Q = <Q_ext r^2>/<r^2>.
 
 Equation 4 of the paper prints kappa = N_0 pi r_e^2: it has the square of the effective radius for
-the mean square radius, (gamma + 2)^2 for gamma (gamma + 1), and lacks Q. For gamma = 2 the one is
-2.67 times too much, the other 2.14 times too little. `Optics.printed_extinction` is the printed
-value.
+the mean square radius, (gamma + 2)^2 for gamma (gamma + 1), and lacks Q. For gamma = 2 the wrong
+square is 2.67 times too much, the missing Q 2.14 times too little. `Optics.printed_extinction` is
+the printed value.
 
 **Sizes.** With u = r/r_n both averages have the weight u^(gamma + 1) exp(-u). The rule is the
 midpoint rule between the quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption
 has resonances too narrow for any rule: the rule samples them at random, and the error falls as
 slowly as the number of sizes grows. The sizes of the rule are therefore part of the definition of a
-phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says what more sizes
-would change.
+phase function here, and `realtime.droplets` takes the same sizes; `Droplets.sizes` says what more
+sizes would change.
 
 **Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at
 most in the cosine: 2 S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and
@@ -44,7 +44,7 @@ is scattered into other directions as before,
     kappa' = (1 - albedo f) kappa,        albedo' = albedo (1 - f)/(1 - albedo f).
 
 The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy.
-Here nothing is left below the angle, and the density is lowered by the fraction that is cut.
+Here the function is 0 below the angle, and the density is lowered by the fraction that is cut.
 
 Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the
 full phase function divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since
@@ -70,21 +70,10 @@ Array = NDArray[np.float64]
 #: light).
 WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}
 
-#: Sizes in the average up to r_e = 6 um; beyond, fewer in inverse proportion, but at least a
-#: quarter. *Measured* at 6 um, green: twice as many move Q by 1.1e-4, g by 4e-5, the phase function
-#: by 0.1 % (median), 0.8 % (largest).
-SIZES = 6400
-
-_RADII = (2.0, 50.0)  # r_e [um]
-_TAIL = 1e-9
-_BLOCKS = 16  # of sizes, each with its own number of terms
-_COLUMNS = 1024  # cosines at a time
-_ANGLES = 16  # of the spline, for each term of the series
-
 
 @dataclass(frozen=True)
 class Droplets:
-    """The sizes of droplets, by default those of Bouthors 2008: cumulus.
+    """The sizes of droplets, by default the cumulus of Bouthors 2008.
 
     Raises
     ------
@@ -97,7 +86,7 @@ class Droplets:
     number: float = 4e8  #: N_0, droplets in a volume [1/m^3]
 
     def __post_init__(self):
-        low, high = _RADII
+        low, high = 2.0, 50.0  # r_e [um]
         if not low <= self.effective_radius <= high:
             raise InputError(
                 f"the effective radius is {self.effective_radius} um; expected {low:g} to {high:g} "
@@ -123,17 +112,26 @@ class Droplets:
     @property
     def sizes(self) -> int:
         """How many sizes are averaged."""
-        return round(SIZES * min(1.0, max(0.25, 6 / self.effective_radius)))
+        # Up to r_e = 6 um all of them; beyond, fewer in inverse proportion, but at least a quarter.
+        # *Measured* at 6 um, green: twice as many move Q by 1.1e-4, g by 4e-5, the phase function
+        # by 0.1 % (median), 0.8 % (largest).
+        most = 6400
+        return round(most * min(1.0, max(0.25, 6 / self.effective_radius)))
 
     def nodes(self, count: int) -> tuple[Array, Array]:
         """Return `count` radii in increasing order [um] and weights of an
         average weighted by r^2 [1].
         """
+        # The weight u^(gamma + 1) exp(-u) is the density of a gamma distribution of shape
+        # gamma + 2; the rule leaves out this fraction of it at both ends.
+        tail = 1e-9
         low, high = (
-            inverse(self.gamma + 2, _TAIL)
+            inverse(self.gamma + 2, tail)
             for inverse in (scipy.special.gammaincinv, scipy.special.gammainccinv)
         )
         u = low + (high - low) * (np.arange(count) + 0.5) / count
+        # The weight over its largest value, at u = gamma + 1, as the power of u overflows for large
+        # gamma. The division by the sum cancels the factor.
         density = np.exp((self.gamma + 1) * np.log(u / (self.gamma + 1)) - (u - self.gamma - 1))
         return u * self.scale, density / density.sum()
 
@@ -164,6 +162,7 @@ class Optics:
     @property
     def extinction(self) -> float:
         """Return kappa = N_0 pi <r^2> Q [1/m]."""
+        # 1e-12 turns um^2 into m^2.
         return (
             self.droplets.number
             * np.pi
@@ -196,7 +195,10 @@ class Optics:
     @cached_property
     def spline(self) -> "scipy.interpolate.CubicSpline":
         """The phase function [1] over the scattering angle [rad]."""
-        angle = np.linspace(0, np.pi, _ANGLES * len(self.chi) + 1)
+        # Sixteen angles for each term keep the error below 1e-8 of the value. p is even about both
+        # ends, so that its slope there is 0 (`clamped`).
+        angles = 16
+        angle = np.linspace(0, np.pi, angles * len(self.chi) + 1)
         return scipy.interpolate.CubicSpline(angle, self.series(np.cos(angle)), bc_type="clamped")
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
@@ -208,6 +210,8 @@ class Optics:
         """Return the phase function [1] from sin^2 and cos^2 of half the scattering
         angle, arrays of one shape.
         """
+        # The arc tangent of both roots is exact near 0 and near pi, where an arc cosine loses
+        # digits.
         return self.spline(2 * np.arctan2(np.sqrt(down), np.sqrt(up)))
 
     def fraction(self, low: float, high: float) -> float:
@@ -221,53 +225,66 @@ def optics(
 ) -> Optics:
     """Return how droplets extinguish and scatter light.
 
-    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air
+    `droplets`: their sizes; the cumulus of Bouthors 2008 by default; `wavelength`: of light in air
     [um], one of `WATER`; `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises
     InputError for another wavelength.
 
     Valid for all `Droplets`. Takes some seconds at r_e = 6 um, and a minute at 50
-    um; the results are kept.
+    um; the results are cached.
     """
-    kinds = droplets or Droplets()
+    distribution = droplets or Droplets()
     if wavelength not in WATER:
         raise InputError(
             f"the wavelength is {wavelength} um; expected "
             f"{', '.join(f'{each:g}' for each in WATER)} um"
         )
+    # The radii of the rule, in increasing order, as sizes x = 2 pi r/wavelength.
     m = complex(WATER[wavelength])
-    radius, weight = kinds.nodes(sizes or kinds.sizes)
+    radius, weight = distribution.nodes(sizes or distribution.sizes)
     x = 2 * np.pi * radius / wavelength
+    # N of the largest sphere. The intensities are polynomials of degree 2 N - 1 at most, and so are
+    # the Legendre polynomials of the moments: 2 N + 1 Gauss nodes integrate their products exactly.
     count = terms(float(x[-1]))
     nodes, fractions = np.polynomial.legendre.leggauss(2 * count + 1)
+    # Small spheres need few terms: each block has as many as its largest sphere.
+    block_count = 16
     blocks = [
-        (part, *coefficients(x[part], m)) for part in np.array_split(np.arange(len(x)), _BLOCKS)
+        (part, *coefficients(x[part], m)) for part in np.array_split(np.arange(len(x)), block_count)
     ]
+    # Weighted by r^2 (`Droplets.nodes`): <Q r^2>/<r^2>.
     extinction = scattering = 0.0
     for part, a, b in blocks:
         efficiency = summed(x[part], a, b)
         extinction += float(weight[part] @ efficiency.extinction)
         scattering += float(weight[part] @ efficiency.scattering)
+    # This many cosines at a time: pi_n and tau_n of all of them would be 2 N^2 numbers each.
+    columns = 1024
     phase = np.empty_like(nodes)
-    for start in range(0, len(nodes), _COLUMNS):
-        chosen = slice(start, start + _COLUMNS)
-        pi, tau = angular_functions(nodes[chosen], count)
-        # An intensity is 2 (|S_1|^2 + |S_2|^2)/(x^2 Q_sca) with weights Q_sca: the
-        # sizes' own Q_sca cancels.
-        phase[chosen] = sum(
+    for start in range(0, len(nodes), columns):
+        part_of_nodes = slice(start, start + columns)
+        pi, tau = angular_functions(nodes[part_of_nodes], count)
+        # A sphere scatters 2 (|S_1|^2 + |S_2|^2)/(x^2 Q_sca) and counts with Q_sca in the mean,
+        # which therefore cancels.
+        phase[part_of_nodes] = sum(
             2 * (weight[part] / x[part] ** 2) @ intensities(a, b, pi, tau) for part, a, b in blocks
         )
     return Optics(
-        kinds, wavelength, m, extinction, scattering, _moments(nodes, fractions, phase, 2 * count)
+        distribution,
+        wavelength,
+        m,
+        extinction,
+        scattering,
+        _moments(nodes, fractions, phase, 2 * count),
     )
 
 
 @dataclass(frozen=True)
 class Modified:
-    """The phase function without its forward peak, divided by what is left."""
+    """The phase function without its forward peak, divided by the fraction of the rest."""
 
     full: Optics
 
-    angle: ClassVar[float] = 5.0  #: below which nothing is left [degrees]
+    angle: ClassVar[float] = 5.0  #: below which the function is 0 [degrees]
 
     @cached_property
     def removed(self) -> float:
@@ -287,6 +304,7 @@ class Modified:
         """Return the phase function [1] from sin^2 and cos^2 of half the scattering
         angle, arrays of one shape.
         """
+        # `down` is sin^2 of half the angle, and so is the edge.
         edge = np.sin(np.deg2rad(0.5 * self.angle)) ** 2
         return np.where(down < edge, 0.0, self.full.from_half(down, up)) / (1 - self.removed)
 
@@ -294,11 +312,16 @@ class Modified:
 def _moments(cos_scatter: Array, weights: Array, values: Array, count: int) -> Array:
     """Return (1/2) sum weights values P_l for l < count over that for l = 0, (count,)."""
     weighted = 0.5 * weights * values
-    before, last = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
+    # P_{-1}, which counts 0 times, and P_0; then the recurrence of Legendre polynomials.
+    lower, legendre = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
     sums = np.empty(count)
     for order in range(count):
-        sums[order] = weighted @ last
-        before, last = last, ((2 * order + 1) * cos_scatter * last - order * before) / (order + 1)
+        sums[order] = weighted @ legendre
+        lower, legendre = (
+            legendre,
+            ((2 * order + 1) * cos_scatter * legendre - order * lower) / (order + 1),
+        )
+    # chi_0 is 1 by definition: divided by it, values may be in any unit.
     return sums / sums[0]
 
 
@@ -307,10 +330,13 @@ def _integral(phase: Optics, low: float, high: float) -> float:
     (P_{l+1} - P_{l-1}) chi_l.
     """
     edges = np.cos(np.deg2rad([high, low]))
-    before, last = np.ones(2), edges.copy()
+    # P_0 and P_1 at both edges.
+    lower, legendre = np.ones(2), edges.copy()
+    # The term of l = 0, (1/2) int dcos.
     total = 0.5 * np.array(edges)
     for order in range(1, len(phase.chi)):
-        after = ((2 * order + 1) * edges * last - order * before) / (order + 1)
-        total += 0.5 * phase.chi[order] * (after - before)
-        before, last = last, after
+        # (2 l + 1) int P_l dcos = P_{l+1} - P_{l-1}: no quadrature is needed.
+        higher = ((2 * order + 1) * edges * legendre - order * lower) / (order + 1)
+        total += 0.5 * phase.chi[order] * (higher - lower)
+        lower, legendre = legendre, higher
     return float(total[1] - total[0])

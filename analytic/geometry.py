@@ -48,11 +48,14 @@ def foot_and_height(
         for name, value in (("origin", origin), ("direction", direction), ("light", light))
     )
     length = np.sqrt(np.sum(d * d, axis=-1))
+    # Directions of float32 renderers are of length 1 to their rounding only. 1e-5 lets them pass,
+    # and refuses vectors that nobody has divided by their length.
     if np.any(np.abs(length - 1) > 1e-5):
         worst = float(length.flat[np.argmax(np.abs(length - 1))])
         raise InputError(
             f"a direction has length {worst:.6g}; expected length 1: divide it by its length"
         )
+    # v goes from the origin to the light.
     try:
         v, d, length = np.broadcast_arrays(p - o, d, length[..., None])
     except ValueError:
@@ -61,11 +64,15 @@ def foot_and_height(
             "expected (n, 3) or (3,) each"
         ) from None
     v, d, length = np.atleast_2d(v), np.atleast_2d(d), np.atleast_2d(length)[:, 0]
+    # Products are divided by the length, not the components of the direction, which would be
+    # rounded once more.
     foot = np.sum(v * d, axis=1) / length
+    # The components of (l - o) x w, which cancel where the ray passes close to the light.
     cross = [
         _difference_of_products(v[:, i], d[:, j], v[:, j], d[:, i])
         for i, j in ((1, 2), (2, 0), (0, 1))
     ]
+    # hypot does not square: heights near the smallest and the largest numbers survive.
     height = np.hypot(np.hypot(cross[0], cross[1]), cross[2]) / length
     return foot, height
 
@@ -95,6 +102,7 @@ def _product_error(a: Array, b: Array, product: Array) -> Array:
 
 
 def _split(a: Array) -> tuple[Array, Array]:
-    scaled = 134217729.0 * a  # 2^27 + 1
+    # Times 2^27 + 1, and taken back: the rounding of the sum leaves the upper 26 bits of a.
+    scaled = 134217729.0 * a
     high = scaled - (scaled - a)
     return high, a - high

@@ -12,20 +12,20 @@ is closed: with u = (b - a)/H,
 
     (1/(b - a)) int_a^b exp(-(z - z_i)/H) dz = exp(-(a - z_i)/H) phi(u),      phi(u) = (1 - e^-u)/u,  phi(0) = 1.
 
-From the lower end u >= 0: phi lies in (0, 1], its condition number is 1 at most, and horizontal
-segments are no special case. From the upper end e^u would overflow where the value is small. Up to
-infinity, dz > 0 the vertical component of a direction, a layer gives sigma_i H_i exp(-(z -
-z_i)/H_i)/dz.
+The mean is taken from the lower end, where u >= 0: phi lies in (0, 1], its condition number is 1 at
+most, and horizontal segments are no special case. From the upper end e^u would overflow where the
+value is small. A ray up to infinity, dz > 0 the vertical component of its direction, has in a layer
+the optical depth sigma_i H_i exp(-(z - z_i)/H_i)/dz.
 
-**The sun.** Let E(x) = tau(o, x) + tau(x, sun), mu > 0 the height of the sun (the vertical
-component of the direction to it). Since tau(x, sun) = (1/mu) int_z^cap sigma_t dz, dE/dx = sigma_t
-(1 - dz/mu) in any medium of height alone: over an interval (a, b)
+**The sun.** Let E(x) = tau(o, x) + tau(x, sun), and mu > 0 the vertical component of the direction
+to the sun. tau(x, sun) = (1/mu) int_z^cap sigma_t dz, hence dE/dx = sigma_t (1 - dz/mu) in any
+medium of height alone: over an interval (a, b)
 
     K = int sigma_t p exp(-E) dx = p(cos) exp(-E(a)) tau(a,b) phi(q),     q = (1 - dz/mu) tau(a,b),
 
-and from the other end, exp(-E(b)) tau(a,b) phi(-q), for q < 0. This is the result of plane-parallel
-single scattering (Chandrasekhar 1960). For an interval without end that goes down or level,
-tau(a,b) is infinite and tau phi(q) is 1/(1 - dz/mu).
+and for q < 0, from the other end, p(cos) exp(-E(b)) tau(a,b) phi(-q). This is the result of
+plane-parallel single scattering (Chandrasekhar 1960). An unbounded interval that goes down or level
+has an infinite tau(a,b), for which tau phi(q) is 1/(1 - dz/mu).
 
 **Lights at places.** In w = asinh((x - foot)/h), r = h cosh w,
 
@@ -60,12 +60,6 @@ from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-_WIDEST = 2.4  # of the first panels, in w
-_SCALE_HEIGHTS = 4.0  # that a first panel spans at most
-_MOST = 4096  # first panels of an interval
-_CHUNK = 4096  # panels evaluated at once
-_UNBOUNDED = 60.0  # beyond the foot in w: 1/cosh w has fallen to 1e-26
 
 
 @dataclass(frozen=True)
@@ -105,6 +99,7 @@ class HeightFog:
     cap: float = np.inf
 
     def __post_init__(self):
+        # A layer of extinction 0 counts for nothing; a scale height is divided by.
         for layer in self.layers:
             if not (np.isfinite(layer.sigma_t) and layer.sigma_t >= 0 and np.isfinite(layer.base)):
                 raise InputError(
@@ -143,6 +138,7 @@ class HeightFog:
         for layer in self.layers:
             if layer.sigma_t > 0:
                 above = z - layer.base
+                # The logarithm of a sum of exponentials, each of which may overflow below its base.
                 total = np.logaddexp(
                     total,
                     np.log(layer.sigma_t)
@@ -162,16 +158,19 @@ class HeightFog:
         start, end, length = np.broadcast_arrays(
             *(np.asarray(v, dtype=np.float64) for v in (start, end, length))
         )
+        # The mean density is taken from the lower end, whichever way the segment goes.
         low, high = np.minimum(start, end), np.maximum(start, end)
         a, b = np.clip(low, self.floor, self.cap), np.clip(high, self.floor, self.cap)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            # A level segment is in the fog or it is not; of others the part
-            # between floor and cap is.
+            # A level segment is in the fog as a whole or not at all; the fog holds the part of any
+            # other segment between floor and cap.
             inside = np.where(
                 high > low, (b - a) / (high - low), (low >= self.floor) & (low <= self.cap)
             )
+            # Segments that nothing cuts keep their length to the last digit.
             within = np.where((a == low) & (b == high), length, length * inside)
             tau = self._mean(a, b) * within
+        # Where a segment has no length in the fog, the mean density there may be infinite.
         return np.where(within > 0, tau, 0.0)
 
     def column(self, z: ArrayLike) -> Array:
@@ -180,14 +179,18 @@ class HeightFog:
         """
         z = np.clip(np.asarray(z, dtype=np.float64), self.floor, self.cap)
         with np.errstate(over="ignore", invalid="ignore"):
+            # Infinite without a cap: the column of the constant part has no end.
             total = self.constant * (self.cap - z) if self.constant > 0 else np.zeros_like(z)
             for layer in self.layers:
                 if layer.sigma_t == 0:
                     continue
+                # A clamped layer is constant over the length `below` and exponential from `from_z`
+                # on.
                 from_z, below = z, np.zeros_like(z)
                 if self.clamped:
                     below = np.minimum(np.maximum(layer.base - z, 0.0), self.cap - z)
                     from_z = np.maximum(z, min(layer.base, self.cap))
+                # int_{from_z}^{cap} exp(-(z - z_i)/H) dz = H exp(up) (1 - exp(-(cap - from_z)/H)).
                 up = (layer.base - from_z) / layer.scale_height
                 shallow = -np.expm1((from_z - self.cap) / layer.scale_height)
                 total = total + layer.sigma_t * (below + layer.scale_height * np.exp(up) * shallow)
@@ -200,6 +203,7 @@ class HeightFog:
         start, end, length, rise = np.broadcast_arrays(
             *(np.asarray(v, dtype=np.float64) for v in (start, end, length, rise))
         )
+        # Segments without end are computed as segments of no length, and then replaced.
         unbounded = np.isinf(length)
         finite = self.optical_depth(
             start, np.where(unbounded, start, end), np.where(unbounded, 0.0, length)
@@ -214,11 +218,14 @@ class HeightFog:
             np.asarray(z, dtype=np.float64), np.asarray(rise, dtype=np.float64)
         )
         with np.errstate(divide="ignore", invalid="ignore"):
+            # The column of a slanted ray is longer by the inverse of its vertical component.
             sloped = np.where(rise > 0, self.column(z), self._below(z)) / np.abs(rise)
+        # A level ray never leaves its height.
         return np.where(rise == 0, np.where(self.log_density(z) > -np.inf, np.inf, 0.0), sloped)
 
     def _below(self, z: Array) -> Array:
         """Return the optical depth straight down from heights [m]; infinite without a floor."""
+        # Every layer goes on downwards: the column is infinite where there is any density.
         if np.isinf(self.floor):
             return np.full(
                 z.shape,
@@ -235,12 +242,16 @@ class HeightFog:
             if layer.sigma_t == 0:
                 continue
             scale = layer.scale_height
+            # The closed mean of the module docstring, from the lower end.
             if not self.clamped:
                 total += layer.sigma_t * np.exp((layer.base - low) / scale) * phi(rise / scale)
                 continue
+            # The fraction of the rise that lies below the base, where a clamped layer has its full
+            # extinction: for level segments all or nothing, for a base at infinity all.
             below = np.clip(layer.base - low, 0.0, rise)
             part = np.where(rise > 0, below / np.where(rise > 0, rise, 1.0), low < layer.base)
             part = np.where(np.isinf(below), 1.0, part)
+            # The exponential part begins at the base, or at the lower end if that is higher.
             start = np.maximum(low, layer.base)
             above = np.exp((layer.base - start) / scale) * phi(
                 np.maximum(high - start, 0.0) / scale
@@ -252,6 +263,7 @@ class HeightFog:
 def phi(u: ArrayLike) -> Array:
     """Return (1 - e^-u)/u [1], 1 at u = 0, for u >= 0, to 2 ulp."""
     u = np.asarray(u, dtype=np.float64)
+    # expm1 loses nothing for small u; 0/0 is the limit 1.
     safe = np.where(u == 0, 1.0, u)
     return np.where(u == 0, 1.0, -np.expm1(-safe) / safe)
 
@@ -302,29 +314,39 @@ def height_fog_sun(
     origin, rise, x0, x1, p = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (origin, rise, x0, x1, phase))
     )
-    # Where floor and cap leave nothing of an interval, both ends are one.
+    # Infinite ends and level rays divide by 0 in lanes that are not selected.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         to_floor, to_cap = (fog.floor - origin) / rise, (fog.cap - origin) / rise
+        # The distances at which a ray enters the layer between floor and cap and leaves it; a level
+        # ray is in it everywhere or nowhere.
         level = rise == 0
         outside = level & ((origin < fog.floor) | (origin > fog.cap))
         enter = np.where(level, -np.inf, np.minimum(to_floor, to_cap))
         leave = np.where(level, np.inf, np.maximum(to_floor, to_cap))
+        # The part (a, b) of the interval in the fog. Where nothing is in it, both ends are one,
+        # also at infinity.
         a = np.maximum(x0, enter)
         b = np.maximum(np.where(outside, a, np.minimum(x1, leave)), a)
         b = np.where(np.isinf(a), a, b)
+        # The heights of both ends; a level ray keeps the height of its origin, as 0 times infinity
+        # is none.
         za, zb = (origin + np.where(level, 0.0, rise * x) for x in (a, b))
         tau = np.where(b > a, fog.along(za, zb, b - a, rise), 0.0)
-        first = fog.optical_depth(origin, za, a) + fog.unbounded(za, sun)
-        last = fog.along(origin, zb, b, rise) + np.where(
+        # E(a) and E(b). A ray that goes up without end has nothing above it at b.
+        depth_at_a = fog.optical_depth(origin, za, a) + fog.unbounded(za, sun)
+        depth_at_b = fog.along(origin, zb, b, rise) + np.where(
             np.isinf(zb) & (rise > 0), 0.0, fog.unbounded(zb, sun)
         )
+        # dE/dx = bend sigma_t, and q of the derivation.
         bend = 1 - rise / sun
         q = bend * tau
-        from_first = np.exp(-first) * np.where(
+        # From the end where E is smaller, so that phi has an argument of at least 0. An infinite
+        # tau has the limit 1/bend.
+        from_a = np.exp(-depth_at_a) * np.where(
             np.isinf(tau), 1 / bend, tau * phi(np.where(np.isinf(q), 0.0, np.abs(q)))
         )
-        from_last = np.exp(-last) * tau * phi(np.abs(q))
-        value = np.where(q >= 0, from_first, from_last)
+        from_b = np.exp(-depth_at_b) * tau * phi(np.abs(q))
+        value = np.where(q >= 0, from_a, from_b)
     return np.where((b > a) & (tau > 0), p * value, 0.0)
 
 
@@ -347,6 +369,7 @@ def height_fog_segments(
     Returns `value`, `error`: K [1/m^2] and an estimate of its absolute error, of shape (N,); both
     infinite where the light is on an interval.
     """
+    # Columns 0 to 4 are the fields of `HeightRays`, 5 and 6 the ends of the intervals.
     columns = np.broadcast_arrays(
         *(
             np.asarray(v, dtype=np.float64)
@@ -355,6 +378,8 @@ def height_fog_segments(
     )
     columns = tuple(np.atleast_1d(column) for column in columns)
     count = len(columns[0])
+    # The integral diverges where the light lies on the interval, and in fog; 1/height would
+    # overflow below this height [m].
     through = (
         (columns[3] < 1e-290)
         & (columns[5] <= columns[2])
@@ -362,14 +387,19 @@ def height_fog_segments(
         & (columns[5] < columns[6])
     )
     through &= np.isfinite(fog.log_density(columns[4]))
+    # Parts on which the density is smooth; an interval has several, or none where it misses the
+    # fog.
     owner, low, high = _smooth_parts(fog, columns[0], columns[1], columns[5], columns[6])
-    keep = ~through[owner]
-    owner, low, high = owner[keep], low[keep], high[keep]
+    mask = ~through[owner]
+    owner, low, high = owner[mask], low[mask], high[mask]
+    # Each part has the ray of its interval.
     rows = HeightRays(*(column[owner] for column in columns[:5]))
     start, _, width, height = log_distance(rows.foot, rows.height, low, high)
-    unbounded = np.maximum(-start, 0.0) + _UNBOUNDED
+    # 60 beyond the foot in w, 1/cosh w has fallen to 1e-26: unbounded parts end there.
+    unbounded = np.maximum(-start, 0.0) + 60.0
     parts = _Parts(fog, rows, owner, start, np.minimum(width, unbounded), height)
     evaluate = partial(_evaluate, parts, phase, shadow_scale, weight)
+    # Panels belong to parts, and parts to intervals, whose sums meet the tolerance.
     value, error = adapted(_first_panels(parts, phase.kinks), evaluate, owner, count, rtol)
     value[through] = error[through] = np.inf
     return value, error
@@ -403,7 +433,10 @@ def _smooth_parts(
     is beyond floor and cap.
     """
     owner, low, high = np.arange(len(x0)), x0, x1
+    # Each height cuts every part in two, so that parts double; those without length are dropped.
     for z in fog.kinks:
+        # A level ray never crosses the height: 0/0 and infinities go to an end, where they cut
+        # nothing.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             cut = np.nan_to_num((z - origin) / rise, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
         cut = np.clip(cut[owner], low, high)
@@ -412,8 +445,10 @@ def _smooth_parts(
             np.concatenate([low, cut]),
             np.concatenate([cut, high]),
         )
-        keep = low < high
-        owner, low, high = owner[keep], low[keep], high[keep]
+        mask = low < high
+        owner, low, high = owner[mask], low[mask], high[mask]
+    # A part lies between floor and cap as a whole or not at all: one point decides, on unbounded
+    # parts a point somewhat beyond the start.
     middle = np.where(np.isinf(high), low + 1.0 + np.abs(low), 0.5 * (low + high))
     inside = np.isfinite(fog.log_density(origin[owner] + rise[owner] * middle)) & (low < high)
     return owner[inside], low[inside], high[inside]
@@ -423,15 +458,21 @@ def _first_panels(parts: _Parts, kinks: Array) -> tuple[Index, Array, Array]:
     """Cut parts at the kinks of the phase function, and into panels that are narrow
     enough in w and in height.
     """
+    # Light and phase function have the singularities of `analytic.panels`, and need its width.
+    widest = 2.4
     part, start, width = cut_at_kinks(parts.start, parts.width, kinks)
-    part, start, width = equal_panels(part, start, width, np.maximum(np.ceil(width / _WIDEST), 1))
+    part, start, width = equal_panels(part, start, width, np.maximum(np.ceil(width / widest), 1))
+    # Heights at both ends of every panel.
     span = np.stack([start, start + width], axis=1) + parts.start[part, None]
     _, z = parts.heights(part, span)
     least = min(
         (layer.scale_height for layer in parts.fog.layers if layer.sigma_t > 0), default=np.inf
     )
-    count = np.ceil(np.abs(z[:, 1] - z[:, 0]) / (_SCALE_HEIGHTS * least))
-    return equal_panels(part, start, width, np.clip(np.nan_to_num(count, posinf=_MOST), 1, _MOST))
+    # The density turns the exponent by Im z/H, so that a panel spans four scale heights at most.
+    # Intervals that would need more panels than `most` leave the rest to the halving of `adapted`.
+    scale_heights, most = 4.0, 4096
+    count = np.ceil(np.abs(z[:, 1] - z[:, 0]) / (scale_heights * least))
+    return equal_panels(part, start, width, np.clip(np.nan_to_num(count, posinf=most), 1, most))
 
 
 def _evaluate(
@@ -444,14 +485,20 @@ def _evaluate(
     width: Array,
 ) -> Panels:
     """Integrate panels of parts by both rules."""
-    both, noise = np.empty((len(part), 2)), np.empty(len(part))
-    for first in range(0, len(part), _CHUNK):
-        block = slice(first, first + _CHUNK)
-        both[block], noise[block] = _evaluate_block(
+    chunk = 4096  # panels evaluated at once
+    integrals, noise = np.empty((len(part), 2)), np.empty(len(part))
+    for first in range(0, len(part), chunk):
+        block = slice(first, first + chunk)
+        integrals[block], noise[block] = _evaluate_block(
             parts, phase, shadow_scale, weight, part[block], start[block], width[block]
         )
     return Panels(
-        part, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0])
+        part,
+        start,
+        width,
+        integrals[:, 0],
+        np.abs(integrals[:, 0] - integrals[:, 1]),
+        noise * np.abs(integrals[:, 0]),
     )
 
 
@@ -468,26 +515,34 @@ def _evaluate_block(
         parts.fog,
         HeightRays(*(getattr(parts.rays, name)[part, None] for name in HeightRays.__annotations__)),
     )
+    # The nodes in w, and for each the distance s from the foot, the height z and the distance x
+    # along the ray, which rounding may leave below 0 at the camera.
     half = 0.5 * width[:, None]
     w = (parts.start[part] + start)[:, None] + half + half * WIDE.nodes
     s, z = parts.heights(part, w)
     x = np.maximum(rays.foot + s, 0.0)
+    # r = h cosh w, from e^|w|, which the phase function needs as well.
     growth = np.exp(np.abs(w))
     cosh = 0.5 * (growth + 1 / growth)
     r = parts.height[part, None] * cosh
+    # The light path counts over the fraction `shadow_scale` of its length, next to the point.
     near = z + shadow_scale * (rays.light - z)
-    # depths beyond the largest number leave nothing
+    # sigma_t exp(-depth)/r by the sum of logarithms: both factors may leave the range of numbers
+    # where their product does not. Infinite depths leave no light.
     with np.errstate(invalid="ignore", over="ignore"):
         depth = fog.optical_depth(rays.origin, z, x) + fog.optical_depth(z, near, shadow_scale * r)
         f = np.exp(np.nan_to_num(fog.log_density(z) - depth, nan=-np.inf, neginf=-np.inf)) / r
     if not phase.is_constant:
-        # e^|w|/(2 cosh w) and e^-|w|/(2 cosh w)
+        # cos = -tanh w: (1 + |cos|)/2 = e^|w|/(2 cosh w) and (1 - |cos|)/2 = e^-|w|/(2 cosh w).
+        # Beyond the foot, w > 0, light is scattered backwards.
         behind, ahead = growth / (2 * cosh), 1 / (2 * cosh * growth)
         f *= phase.from_half(np.where(w > 0, behind, ahead), np.where(w > 0, ahead, behind))
     if weight is not None:
         f *= weight(x, parts.owner[part])
     middle = WIDE.nodes.size // 2
-    # The exponent's rounding: its own size, and that of heights in scale heights.
+    # The rounding error in units of epsilon, at the middle node. The exponent counts with its size.
+    # A height is exact to epsilon of its size; in scale heights that is a relative error of the
+    # density, and of the depth as often as the depth counts.
     size = 16 + 4 * np.minimum(depth[:, middle], 745.0) + np.abs(w[:, middle])
     for layer in fog.layers:
         if layer.sigma_t > 0:

@@ -2,7 +2,7 @@
 """Scattering of a plane wave by a homogeneous sphere (Mie 1908), in NumPy.
 
 A sphere of radius r has the size x = 2 pi r / wavelength and the refractive index m = n + i k
-relative to what is around it, k >= 0 where it absorbs. With the Riccati-Bessel functions psi_n(x) =
+relative to its surroundings, k >= 0 where it absorbs. With the Riccati-Bessel functions psi_n(x) =
 x j_n(x), chi_n(x) = -x y_n(x) and xi_n = psi_n - i chi_n, and the logarithmic derivative D_n =
 psi_n'/psi_n, the fields outside have the coefficients (Bohren and Huffman 1983, eq. 4.88)
 
@@ -48,10 +48,6 @@ from airlight.errors import InputError
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MARGIN = 16  # terms by which the logarithmic derivative starts beyond those that are needed,
-_WIDTHS = 8.0  # and widths of the transition at n = |z|
-_LARGEST = 2e4  # size up to which the recurrences were tried
-
 
 @dataclass(frozen=True)
 class Efficiencies:
@@ -80,23 +76,29 @@ def coefficients(size: ArrayLike, index: complex) -> tuple[Complex, Complex]:
     refractive index relative to the surroundings [1], k >= 0. Raises InputError for a size outside
     1e-6 to 2e4 or an index that is no refractive index.
 
-    Valid for what `InputError` does not name. Beyond a sphere's own number of
-    terms its coefficients are 0.
+    Valid for all numbers that are not refused. Beyond the number of terms that a sphere needs
+    (`terms`) its coefficients are 0.
     """
     x, m = checked(size, index)
-    own = np.array([terms(each) for each in x])
-    count = int(own.max())
+    # All spheres share arrays that are as long as the largest needs.
+    counts = np.array([terms(each) for each in x])
+    count = int(counts.max())
+    # Without absorption m x is real, and so is the whole recurrence of D_n.
     inner = m if m.imag else m.real
     derivative = _logarithmic_derivative(count, inner * x)
     a = np.zeros((count, len(x)), dtype=np.complex128)
     b = np.zeros_like(a)
+    # psi_0 and psi_{-1}, chi_0 and chi_{-1}, with which the upward recurrences start.
     psi, psi_before = np.sin(x), np.cos(x)
     chi, chi_before = np.cos(x), -np.sin(x)
     for n in range(1, count + 1):
-        needed = own >= n
+        # A sphere that has all of its terms rests at psi = 0 and chi = 1, as its chi would grow
+        # until it overflows.
+        needed = counts >= n
         psi, psi_before = np.where(needed, (2 * n - 1) / x * psi - psi_before, 0.0), psi
         chi, chi_before = np.where(needed, (2 * n - 1) / x * chi - chi_before, 1.0), chi
         xi, xi_before = psi - 1j * chi, psi_before - 1j * chi_before
+        # The brackets of a_n and of b_n in eq. 4.88.
         electric, magnetic = derivative[n] / inner + n / x, derivative[n] * inner + n / x
         a[n - 1] = np.where(
             needed, (electric * psi - psi_before) / (electric * xi - xi_before), 0.0
@@ -110,8 +112,8 @@ def coefficients(size: ArrayLike, index: complex) -> tuple[Complex, Complex]:
 def efficiencies(size: ArrayLike, index: complex) -> Efficiencies:
     """Return the efficiencies and mean cosines of spheres.
 
-    Parameters, `Raises` and validity are those of `coefficients`; published values for sizes up to
-    1e4 are met to their digits.
+    Parameters, refused numbers and validity are as for `coefficients`; the digits of published
+    values are met for sizes up to 1e4.
     """
     x, _ = checked(size, index)
     return summed(x, *coefficients(x, index))
@@ -124,7 +126,9 @@ def summed(x: Array, a: Complex, b: Complex) -> Efficiencies:
     n = np.arange(1, len(a) + 1)[:, None]
     extinction = 2 * np.sum((2 * n + 1) * (a + b).real, axis=0) / x**2
     scattering = 2 * np.sum((2 * n + 1) * (np.abs(a) ** 2 + np.abs(b) ** 2), axis=0) / x**2
+    # 1 - 2 (n % 2) is (-1)^n.
     back = np.abs(np.sum((2 * n + 1) * (1 - 2 * (n % 2)) * (a - b), axis=0)) ** 2 / x**2
+    # The first sum of g Q_sca pairs n with n + 1, so that it has one term less.
     neighbours = (a[:-1] * a[1:].conj() + b[:-1] * b[1:].conj()).real
     n_less = n[:-1]
     asymmetry = np.sum(n_less * (n_less + 2) / (n_less + 1) * neighbours, axis=0)
@@ -138,12 +142,13 @@ def angular_functions(cos_scatter: Array, count: int) -> tuple[Array, Array]:
     """
     pi = np.empty((count, len(cos_scatter)))
     tau = np.empty_like(pi)
-    before, last = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
+    # pi_0 = 0 and pi_1 = 1; the recurrence begins with n = 2.
+    pi_before, pi_n = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
     for n in range(1, count + 1):
         if n > 1:
-            before, last = last, ((2 * n - 1) * cos_scatter * last - n * before) / (n - 1)
-        pi[n - 1] = last
-        tau[n - 1] = n * cos_scatter * last - (n + 1) * before
+            pi_before, pi_n = pi_n, ((2 * n - 1) * cos_scatter * pi_n - n * pi_before) / (n - 1)
+        pi[n - 1] = pi_n
+        tau[n - 1] = n * cos_scatter * pi_n - (n + 1) * pi_before
     return pi, tau
 
 
@@ -155,14 +160,15 @@ def intensities(a: Complex, b: Complex, pi: Array, tau: Array) -> Array:
     """
     n = np.arange(1, len(a) + 1)[:, None]
     weight = (2 * n + 1) / (n * (n + 1))
-    # S_1 + S_2 takes a + b with pi + tau, S_1 - S_2 takes a - b with pi - tau, and the
-    # squares add up to twice ours.
+    # S_1 + S_2 takes a + b with pi + tau, S_1 - S_2 takes a - b with pi - tau, and the two squares
+    # add up to 2 (|S_1|^2 + |S_2|^2).
     plus, minus = ((weight * each).T for each in (a + b, a - b))
     sums, differences = pi[: len(a)] + tau[: len(a)], pi[: len(a)] - tau[: len(a)]
     total = np.zeros((len(plus), pi.shape[1]))
-    for left, right in ((plus, sums), (minus, differences)):
-        for part in (left.real, left.imag):
-            total += np.square(np.ascontiguousarray(part) @ right)
+    # pi and tau are real: the real and the imaginary part of an amplitude are real products.
+    for amplitudes, functions in ((plus, sums), (minus, differences)):
+        for part in (amplitudes.real, amplitudes.imag):
+            total += np.square(np.ascontiguousarray(part) @ functions)
     return 0.5 * total
 
 
@@ -171,10 +177,11 @@ def checked(size: ArrayLike, index: complex) -> tuple[Array, complex]:
 
     Raises InputError as `coefficients` does.
     """
+    largest = 2e4  # up to which the recurrences were tried
     x = np.atleast_1d(np.asarray(size, dtype=np.float64))
-    if not x.size or not np.all((x >= 1e-6) & (x <= _LARGEST)):
+    if not x.size or not np.all((x >= 1e-6) & (x <= largest)):
         raise InputError(
-            f"the size 2 pi r/wavelength is {size!r}; expected numbers from 1e-6 to {_LARGEST:g}"
+            f"the size 2 pi r/wavelength is {size!r}; expected numbers from 1e-6 to {largest:g}"
         )
     m = complex(index)
     if (
@@ -190,12 +197,16 @@ def checked(size: ArrayLike, index: complex) -> tuple[Array, complex]:
 
 def _logarithmic_derivative(count: int, z: NDArray[Any]) -> NDArray[Any]:
     """Return D_n(z) for n = 0 to count, (count + 1, sizes)."""
+    # The start: eight widths |z|^(1/3) of the transition beyond |z|, or the last term that is
+    # needed, and 16 terms more, in which an error of the zero there dies out.
+    widths, margin = 8.0, 16
     largest = float(np.abs(z).max())
-    start = max(count, int(largest + _WIDTHS * largest ** (1 / 3))) + _MARGIN
+    start = max(count, int(largest + widths * largest ** (1 / 3))) + margin
     derivative = np.zeros((count + 1, len(z)), dtype=z.dtype)
-    last = np.zeros_like(z)
+    d_n = np.zeros_like(z)
     for n in range(start, 0, -1):
-        last = n / z - 1 / (last + n / z)
+        # D_{n-1} = n/z - 1/(D_n + n/z), eq. 4.89.
+        d_n = n / z - 1 / (d_n + n / z)
         if n - 1 <= count:
-            derivative[n - 1] = last
+            derivative[n - 1] = d_n
     return derivative

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight integral of millions of segments in float64, each to a tolerance that its
-own error estimate meets.
+error estimate meets.
 
 The integral is taken in w = asinh((x - foot)/height) (DESIGN section 2), with E = e^w = q/h, where
 every quantity is free of cancellation and of overflow:
@@ -8,8 +8,8 @@ every quantity is free of cancellation and of overflow:
     J = (1/h) int_{w0}^{w1} exp(-sigma_t (foot + h E)) p(cos) 2E/(1 + E^2) dw
     (1 + cos)/2 = 1/(1 + E^2),      (1 - cos)/2 = E^2/(1 + E^2).
 
-A segment from the light that counts only s times in the exponent (`shadow_scale`) turns
-x + r into x + s r, that is
+A light path that counts only s times in the exponent (`shadow_scale`) turns x + r into x + s r,
+that is
 
     foot + h (E - 1/E)/2 + s h (E + 1/E)/2  =  foot + h ((1 + s)/2 E - (1 - s)/2 1/E).
 
@@ -21,8 +21,8 @@ Gauss rules with n nodes on a panel of half width H hence converge as rho^(-2n),
 H'^2), H' = pi/(2H) (Trefethen 2013, Approximation Theory and Approximation Practice, theorem 19.3).
 
 Each panel is integrated by the 21 nodes of Kronrod, its error estimated by the difference from the
-10 of Gauss among them: the estimate is that of the worse rule, an upper bound by many digits for
-smooth integrands. Panels of segments that miss the tolerance are halved until they meet it.
+10 of Gauss among them: the estimate is the error of the worse rule, for smooth integrands an upper
+bound by many digits. Panels of segments that miss the tolerance are halved until they meet it.
 
 A table of a phase function cuts a segment at each of its entries. These narrow panels, of 0.1 at
 most, have a rho of 63 or more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's
@@ -44,15 +44,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Weight = Callable[[Array, Index], Array]
 
-# width of the first panels: rho = 2.97, so that Gauss's ten nodes are right to about 1e-9 to 1e-11
-_PANEL = 2.4
-_NARROW = 0.1  # width in w up to which a panel has Kronrod's 7 nodes, and not 21
-_NEGLIGIBLE = 44.0  # e-folds after which the rest of a segment is below 1e-19 of it
 _CHUNK = 8192  # panels evaluated at once: 1.4 MB an array
-_HALVINGS = 40
-# height over distance below which a light beside the segment may as well be at this height
-_NEAR_ZERO = 1e-15
-_AT_LIGHT = 1e-290  # height [m] below which 1/height would overflow
 
 
 @dataclass(frozen=True)
@@ -119,7 +111,8 @@ def airlight_segments(
     integrand = _Integrand(phase, float(shadow_scale), weight)
     n = len(columns[0])
     value, error = np.zeros(n), np.zeros(n)
-    # Fewer segments at once where a table cuts each of them into many panels.
+    # One chunk after another bounds the memory; a table cuts each segment into many panels, so that
+    # fewer segments make a chunk.
     step = max(64, _CHUNK // (1 + len(phase.kinks)))
     for first in range(0, n, step):
         rows = np.arange(first, min(first + step, n))
@@ -136,8 +129,12 @@ def _integrate_chunk(
     """Integrate the segments of one chunk; `rows` are their numbers in the caller's input."""
     value, error = np.zeros(len(rows)), np.zeros(len(rows))
     foot, height, x0, x1, _ = columns
-    through_light = (height < _AT_LIGHT) & (x0 <= foot) & (foot <= x1) & (x0 < x1)
+    # The integral diverges where the light lies on the segment; below this height [m] 1/height
+    # would overflow.
+    at_light = 1e-290
+    through_light = (height < at_light) & (x0 <= foot) & (foot <= x1) & (x0 < x1)
     value[through_light] = error[through_light] = np.inf
+    # Segments without length stay 0.
     regular = np.flatnonzero((x0 < x1) & ~through_light)
     if len(regular):
         segments = _segments([c[regular] for c in columns], rows[regular], integrand)
@@ -167,27 +164,39 @@ def log_distance(
     height, above 0 [m].
     """
     s0, s1 = x0 - foot, x1 - foot
-    beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
-    height = np.maximum(height, _NEAR_ZERO * beside)
+    # A light on the ray has the height 0, for which w is not defined. Where the segment does not
+    # hold the foot, the light may as well be at this height, a fraction of the distance between
+    # foot and segment.
+    near_zero = 1e-15
+    gap = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+    height = np.maximum(height, near_zero * gap)
     start = np.arcsinh(s0 / height)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        # The closed form above, for segments that do not hold the foot; the others are a difference
+        # of two values of opposite sign. Both are computed for all, and lanes that overflow are not
+        # selected.
         r0, r1 = np.hypot(height, s0), np.hypot(height, s1)
-        apart = np.arcsinh((x1 - x0) * (s0 + s1) / (s1 * r0 + s0 * r1))
-        width = np.where(s0 * s1 > 0, apart, np.arcsinh(s1 / height) - start)
+        one_sided = np.arcsinh((x1 - x0) * (s0 + s1) / (s1 * r0 + s0 * r1))
+        width = np.where(s0 * s1 > 0, one_sided, np.arcsinh(s1 / height) - start)
         width = np.where(np.isinf(x1), np.inf, width)
+        # E = q/h, by the branch of q in which nothing cancels (`analytic.geometry`).
         scale = np.where(s0 > 0, (s0 + r0) / height, height / (r0 - s0))
     return start, scale, width, height
 
 
 def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segments:
-    """Change variables to w, and cut off what the exponential or 1/cosh w makes negligible."""
+    """Change variables to w, and cut segments off where the exponential or 1/cosh w has made the
+    rest negligible.
+    """
     foot, height, x0, x1, sigma_t = columns
     start, scale, width, height = log_distance(foot, height, x0, x1)
     folds = _folds(integrand)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        # The exponent grows by (1 + s)/2 sigma_t h E0 (e^(w - w0) - 1), and more for s < 1: this is
+        # where it has grown by the e-folds.
         thickness = 0.5 * (1 + integrand.shadow_scale) * sigma_t * height * scale
         width = np.minimum(width, np.log1p(folds / thickness))
-    # 1/cosh w falls by an e-fold for each unit of w behind the foot.
+    # Behind the foot, w > 0, the factor 1/cosh w falls by an e-fold for each unit of w.
     width = np.minimum(width, np.maximum(-start, 0.0) + min(folds, 120.0))
     return _Segments(rows, foot, height, sigma_t, start, scale, width)
 
@@ -198,18 +207,22 @@ def _folds(integrand: _Integrand) -> float:
     """
     phase = integrand.phase
     if isinstance(phase, Tabulated) or integrand.weight is not None:
-        # zeros are possible: only what underflows is left out, which costs one panel more
+        # The integrand may be 0 where the decay is least, so that no decay makes the rest
+        # negligible: only what underflows, exp(-745), is left out, which costs one panel more.
         return 745.0
     ends = phase(np.array([-1.0, 0.0, 1.0]))
     if ends.min() == 0:
         return 745.0
-    return float(_NEGLIGIBLE + np.log(ends.max() / ends.min()))
+    # After 44 e-folds the rest of a segment is below 1e-19 of it. A lobe can weigh the far end more
+    # than the near one, by the ratio of its largest value to its smallest: so many e-folds more.
+    negligible = 44.0
+    return float(negligible + np.log(ends.max() / ends.min()))
 
 
 @dataclass(frozen=True)
 class Panels:
-    """Panels and what the two rules gave for them, arrays of shape (m,); the last
-    three may be (m, columns).
+    """Panels with their integrals by two rules, arrays of shape (m,); the last three may be
+    (m, columns).
     """
 
     owner: Index  #: row of the segment, in its chunk
@@ -236,18 +249,25 @@ def adapted(
     tolerance of each [1]. Returns `value`, `error`: the sums and estimates of their errors,
     (count,), or (count, columns): all columns share panels.
     """
+    # A sum that still misses its tolerance after so many halvings says so by its error.
+    halvings = 40
     panels = evaluate(*first)
-    for _ in range(_HALVINGS):
+    for _ in range(halvings):
         owner = row[panels.owner]
+        # A sum is right when the errors of its panels together are within its tolerance.
         allowed = rtol * np.abs(_summed(owner, panels.value, count))
         missed = _summed(owner, panels.error, count) > allowed
         if not missed.any():
             break
+        # Otherwise each panel may take an equal part of the tolerance. Those that exceed it are
+        # halved, unless their error is rounding, which no halving removes.
         fraction = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
         misses = missed[owner] & (panels.error > fraction[owner]) & (panels.error > panels.noise)
+        # Columns share their panels: a panel that one column needs halved is halved for all.
         halve = np.any(misses.reshape(len(misses), -1), axis=1)
         if not halve.any():
             break
+        # Both halves of every such panel are evaluated in one call.
         width = 0.5 * panels.width[halve]
         starts = np.concatenate([panels.start[halve], panels.start[halve] + width])
         halves = evaluate(np.tile(panels.owner[halve], 2), starts, np.tile(width, 2))
@@ -264,10 +284,12 @@ def _summed(owner: Index, values: Array, n: int) -> Array:
 
 def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Array]:
     """Cut the segments at the kinks of the phase function and into
-    panels no wider than `_PANEL`.
+    panels that are narrow enough for smooth integrands.
     """
+    # rho = 2.97 for this width, so that Gauss's ten nodes are right to about 1e-9 to 1e-11.
+    widest = 2.4
     owner, start, width = cut_at_kinks(segments.start, segments.width, kinks)
-    return equal_panels(owner, start, width, np.maximum(np.ceil(width / _PANEL), 1))
+    return equal_panels(owner, start, width, np.maximum(np.ceil(width / widest), 1))
 
 
 def cut_at_kinks(begin: Array, width: Array, kinks: Array) -> tuple[Index, Array, Array]:
@@ -277,11 +299,11 @@ def cut_at_kinks(begin: Array, width: Array, kinks: Array) -> tuple[Index, Array
     owner: Index = np.arange(len(begin), dtype=np.int64)
     if not len(kinks):
         return owner, np.zeros(len(begin)), width
-    # cos = -tanh w, so the kinks in increasing order of w are those in
-    # decreasing order of the cosine.
-    at = np.clip(np.arctanh(-kinks[::-1]) - begin[:, None], 0.0, width[:, None])
-    ends = np.concatenate([np.zeros((len(begin), 1)), at, width[:, None]], axis=1)
+    # cos = -tanh w: w increases where the cosine falls, so that the kinks come in reverse.
+    places = np.clip(np.arctanh(-kinks[::-1]) - begin[:, None], 0.0, width[:, None])
+    ends = np.concatenate([np.zeros((len(begin), 1)), places, width[:, None]], axis=1)
     pieces = np.diff(ends, axis=1)
+    # A kink beyond an interval was clipped to its end and leaves a piece without width.
     owner, piece = np.nonzero(pieces > 0)
     return owner, ends[owner, piece], pieces[owner, piece]
 
@@ -291,6 +313,7 @@ def equal_panels(
 ) -> tuple[Index, Array, Array]:
     """Cut intervals into equal panels, `count` of each; return their owners, starts and widths."""
     times = count.astype(np.int64)
+    # 0, 1, .. within each interval: the running number less the number of its first panel.
     number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
     width = np.repeat(width / times, times)
     return np.repeat(owner, times), np.repeat(start, times) + number * width, width
@@ -300,13 +323,18 @@ def _evaluate(
     segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array
 ) -> Panels:
     """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
-    both = np.empty((len(owner), 2))
+    integrals = np.empty((len(owner), 2))
     noise = np.empty(len(owner))
     for pair, block in blocks_by_rule(width, _CHUNK):
         panels = owner[block], start[block], width[block]
-        both[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
+        integrals[block], noise[block] = _evaluate_block(segments, integrand, pair, *panels)
     return Panels(
-        owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0])
+        owner,
+        start,
+        width,
+        integrals[:, 0],
+        np.abs(integrals[:, 0] - integrals[:, 1]),
+        noise * np.abs(integrals[:, 0]),
     )
 
 
@@ -315,7 +343,8 @@ def blocks_by_rule(width: Array, most: int) -> Iterator[tuple[Pair, Index]]:
 
     `width`: of the panels, in w, (panels,) [1]; `most`: how many panels at once.
     """
-    narrow = width <= _NARROW
+    # Up to this width in w seven nodes of Kronrod suffice (module docstring, last paragraph).
+    narrow = width <= 0.1
     for pair, chosen in ((NARROW, narrow), (WIDE, ~narrow)):
         panels = np.flatnonzero(chosen)
         for first in range(0, len(panels), most):
@@ -330,11 +359,16 @@ def _evaluate_block(
     """
     foot, height, sigma_t = segments.foot[owner], segments.height[owner], segments.sigma_t[owner]
     middle, half = start + 0.5 * width, 0.5 * width
+    # E = e^w at the nodes: e^(w - w0) times E at the start of the segment, which `log_distance` has
+    # without cancellation.
     e = np.exp(middle[:, None] + half[:, None] * pair.nodes)
     e *= segments.scale[owner, None]
     inverse = 1 / e
+    # 2E/(1 + E^2) = 1/cosh w.
     kernel = 2 / (e + inverse)
     s = integrand.shadow_scale
+    # The exponent sigma_t (foot + h ((1 + s)/2 E - (1 - s)/2 1/E)), whose last term is 0 for a
+    # physical light path. Arrays are reused, so that a block stays in the cache.
     up_rate = 0.5 * (1 + s) * sigma_t * height
     exponent = up_rate[:, None] * e
     exponent += (sigma_t * foot)[:, None]
@@ -343,13 +377,18 @@ def _evaluate_block(
     f = np.exp(np.negative(exponent, out=exponent), out=exponent)
     f *= kernel
     if not integrand.phase.is_constant:
+        # sin^2 and cos^2 of half the scattering angle: E^2/(1 + E^2) and 1/(1 + E^2).
         kernel *= 0.5
         f *= integrand.phase.from_half(e * kernel, inverse * kernel)
     if integrand.weight is not None:
+        # x = foot + h sinh w.
         x = foot[:, None] + 0.5 * height[:, None] * (e - inverse)
         f *= integrand.weight(x, segments.index[owner])
+    # From the interval [-1, 1] of the rules to the width of the panel, and the factor 1/h of J.
     scale = half / height
     with np.errstate(over="ignore"):
+        # The rounding error in units of epsilon: of the factors, of the exponent's constant part,
+        # and of its part with E, whose relative error grows with the distance in w from the start.
         size = (
             16 + np.abs(sigma_t * foot) + (1 + up_rate * e[:, len(pair.nodes) // 2]) * (1 + middle)
         )
@@ -357,7 +396,7 @@ def _evaluate_block(
 
 
 def _joined(panels: Panels, keep: NDArray[np.bool_], more: Panels) -> Panels:
-    """Return the panels that are kept followed by more."""
+    """Return the panels under a mask, followed by more."""
     fields = ("owner", "start", "width", "value", "error", "noise")
     return Panels(*(np.concatenate([getattr(panels, f)[keep], getattr(more, f)]) for f in fields))
 
@@ -369,6 +408,7 @@ def _checked(
     names = ("foot", "height", "x0", "x1", "sigma_t")
     try:
         columns = [np.asarray(c, dtype=np.float64) for c in (foot, height, x0, x1, sigma_t)]
+        # Numbers are rows of one entry.
         columns = [np.atleast_1d(c) for c in np.broadcast_arrays(*columns)]
     except (TypeError, ValueError) as reason:
         raise InputError(
@@ -380,20 +420,22 @@ def _checked(
             "column each"
         )
     for name, column in zip(names, columns):
-        fine = np.isfinite(column) if name != "x1" else ~np.isnan(column)
+        # Only x1 may be infinite.
+        valid = np.isfinite(column) if name != "x1" else ~np.isnan(column)
         if name in ("height", "sigma_t"):
-            fine &= column >= 0
+            valid &= column >= 0
+        # The third column is x0.
         if name == "x1":
-            fine &= column >= columns[2]
-        if not fine.all():
-            row = int(np.argmin(fine))
-            wanted = {
+            valid &= column >= columns[2]
+        if not valid.all():
+            row = int(np.argmin(valid))
+            expected = {
                 "height": "a number >= 0",
                 "sigma_t": "a number >= 0",
                 "x1": "a number >= x0, or inf",
             }
             raise InputError(
                 f"{name} of row {row} is {column[row]}; expected "
-                f"{wanted.get(name, 'a finite number')}"
+                f"{expected.get(name, 'a finite number')}"
             )
     return tuple(columns)

@@ -43,7 +43,7 @@ from airlight.errors import InputError, nearest
 
 Array = NDArray[np.float64]
 
-#: Those that scenes have, and those of Biri 2006.
+#: The phase functions of scenes, and of Biri 2006.
 PHASE_NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated")
 
 
@@ -155,11 +155,13 @@ class _Power(PhaseFunction):
     @property
     def _ends(self) -> tuple[int, int]:
         """The numerator and the denominator of the mean."""
+        # The mean of up^n is 1/(n + 1), n = 2^squarings; the mean of the sum is 1 + weight/(n + 1).
         below = 2**self.squarings + 1
         return below + self.weight, below
 
     def _value(self, down: Array, up: Array) -> Array:
         above, below = self._ends
+        # Squaring up again and again gives up^(2^squarings) without a logarithm.
         for _ in range(self.squarings):
             up = np.square(up)
         return (1 + self.weight * up) / (above / below)
@@ -170,7 +172,7 @@ class _Power(PhaseFunction):
         return (1 + self.weight * ((1 + mpf(cos_scatter)) / 2) ** 2**self.squarings) * below / above
 
     def series(self, degree: int) -> list[float]:
-        """Return the coefficients by those of the power of (1 - sin)/2."""
+        """Return the coefficients, from the series of the power of (1 - sin)/2."""
         above, below = self._ends
         lobe = _power_series(_scaled_plus(_cosine(degree), 0.5, 0.5), 2**self.squarings)
         return _scaled_plus(lobe, self.weight * below / above, below / above)
@@ -215,6 +217,7 @@ class HenyeyGreenstein(PhaseFunction):
 
     def _value(self, down: Array, up: Array) -> Array:
         g = self.g
+        # 1 + g^2 - 2 g c as a sum of two terms that are both positive.
         base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
         return (1 - g) * (1 + g) / (base * np.sqrt(base))
 
@@ -237,7 +240,7 @@ class Tabulated(PhaseFunction):
     Raises
     ------
     InputError
-        For fewer than two values, negative or infinite ones, and those that are all 0.
+        For fewer than two values, negative or infinite ones, or none above 0.
     """
 
     #: from cosine -1 (backward) to +1 (forward), in any unit: they are divided by their mean
@@ -250,15 +253,18 @@ class Tabulated(PhaseFunction):
 
     def _value(self, down: Array, up: Array) -> Array:
         values = np.asarray(self.table)
+        # `up` is (1 + c)/2, so that the regular cosines are regular in it.
         return np.interp(up, np.linspace(0.0, 1.0, len(values)), values / _table_mean(values))
 
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate one cosine in mpmath."""
         values = [mpf(v) for v in self.table]
-        last = len(values) - 1
-        mean = (mp.fsum(values) - (values[0] + values[last]) / 2) / last
-        position = (1 + mpf(cos_scatter)) / 2 * last
-        cell = min(max(int(mp.floor(position)), 0), last - 1)
+        cells = len(values) - 1
+        # The trapezoid rule, which is exact for a function that is linear between its values.
+        mean = (mp.fsum(values) - (values[0] + values[cells]) / 2) / cells
+        position = (1 + mpf(cos_scatter)) / 2 * cells
+        # The cell that holds the cosine; c = 1 belongs to the last one.
+        cell = min(max(int(mp.floor(position)), 0), cells - 1)
         fraction = position - cell
         return (values[cell] * (1 - fraction) + values[cell + 1] * fraction) / mean
 
@@ -320,6 +326,7 @@ class HgDraine(PhaseFunction):
 
     def _value(self, down: Array, up: Array) -> Array:
         first, second = (lobe.from_half(down, up) for lobe in self._lobes)
+        # up - down is c.
         rise = 1 + self.alpha * np.square(up - down)
         return (1 - self.weight) * first + self.weight * second * rise / self.norm
 
@@ -328,13 +335,15 @@ class HgDraine(PhaseFunction):
         c = mpf(cos_scatter)
         first, second = (lobe.mp(c) for lobe in self._lobes)
         alpha, weight = mpf(self.alpha), mpf(self.weight)
+        # The fits are taken in float64; from them on all is exact to mpmath's precision.
         norm = 1 + alpha * (1 + 2 * mpf(self.g_d) ** 2) / 3
         return (1 - weight) * first + weight * second * (1 + alpha * c * c) / norm
 
     def series(self, degree: int) -> list[float]:
-        """Return the coefficients of both lobes, the second times those of 1 + alpha sin^2."""
+        """Return the coefficients of both lobes, the second times 1 + alpha sin^2."""
         first, second = (lobe.series(degree) for lobe in self._lobes)
         cosine = _cosine(degree)
+        # c^2 = sin^2 theta in the second lobe's factor (1 + alpha c^2)/norm.
         rise = _scaled_plus(_product(cosine, cosine), self.alpha / self.norm, 1 / self.norm)
         draine = _product(second, rise)
         return [(1 - self.weight) * a + self.weight * b for a, b in zip(first, draine)]
@@ -357,10 +366,10 @@ class Mie(PhaseFunction):
 
     def __post_init__(self) -> None:
         if self.wavelength not in WATER:
-            known = ", ".join(f"{each:g}" for each in WATER)
+            wavelengths = ", ".join(f"{each:g}" for each in WATER)
             raise InputError(
-                f"the wavelength of '{self.name}' is {self.wavelength} um; expected one of {known} "
-                "um"
+                f"the wavelength of '{self.name}' is {self.wavelength} um; expected one of "
+                f"{wavelengths} um"
             )
 
     @property
@@ -374,16 +383,21 @@ class Mie(PhaseFunction):
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate the Legendre series, whose moments count as exact, at one cosine in mpmath."""
         c = mpf(cos_scatter)
-        total, before, last = mp.zero, mp.zero, mp.one
+        # P_{-1}, which counts 0 times, and P_0.
+        total, lower, legendre = mp.zero, mp.zero, mp.one
         for order, moment in enumerate(self._optics.chi.tolist()):
-            total += (2 * order + 1) * mpf(moment) * last
-            before, last = last, ((2 * order + 1) * c * last - order * before) / (order + 1)
+            total += (2 * order + 1) * mpf(moment) * legendre
+            # (l + 1) P_{l+1} = (2 l + 1) c P_l - l P_{l-1}.
+            lower, legendre = (
+                legendre,
+                ((2 * order + 1) * c * legendre - order * lower) / (order + 1),
+            )
         return total
 
 
 @dataclass(frozen=True)
 class MieModified(Mie):
-    """Water droplets without the forward peak, divided by what is left."""
+    """Water droplets without the forward peak, divided by the fraction of the rest."""
 
     name = "mie-modified"
 
@@ -393,6 +407,7 @@ class MieModified(Mie):
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate one cosine in mpmath."""
         c = mpf(cos_scatter)
+        # Forward of the edge of the peak the function is 0; the rest is scaled to the mean 1.
         if c > self.kinks[0]:
             return mp.zero
         return super().mp(c) / (1 - mpf(Modified(self._optics).removed))
@@ -430,17 +445,20 @@ def phase_from_words(
     """Return a phase function by words such as 'hg', 'hg-draine:12' and 'mie:6:2:0.55'.
 
     `words`: a name, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
-    'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default; `g`:
+    'mie-modified' r_e [um], gamma and the wavelength [um]; missing numbers have defaults; `g`:
     of 'hg' where the words do not say it; `table`: of 'tabulated', see `Tabulated`. Raises
     InputError for an unknown name, numbers that are none or too many of them, those out of range,
     and 'tabulated' without a table.
     """
+    # A name, and numbers behind it, parted by colons.
     name, *cells = words.strip().lower().split(":")
     if name not in _NUMBERS:
         near = nearest(name, _NUMBERS) or "."
         raise InputError(
             f"no phase function is called '{name}'{near} Use one of {', '.join(_NUMBERS)}"
         )
+    # A name says how many numbers it takes: too many of them and words that are no numbers have a
+    # message each.
     make, most = _NUMBERS[name]
     if len(cells) > most:
         raise InputError(
@@ -452,12 +470,14 @@ def phase_from_words(
         raise InputError(
             f"the phase function is '{words}'; expected numbers after '{name}', parted by colons"
         ) from None
+    # A table has too many values for words: it comes by itself.
     if name == "tabulated":
         if table is None:
             raise InputError(
                 "the phase function 'tabulated' came without a table; give one, or use another name"
             )
         return Tabulated(table)
+    # A scene may have g as a number of its own; words that say it have precedence.
     if name == "hg" and not numbers:
         return HenyeyGreenstein(g)
     return make(*numbers)
@@ -478,6 +498,7 @@ def _product(first: list[float], second: list[float]) -> list[float]:
 
 def _power_series(u: list[float], n: float) -> list[float]:
     """Return the series of U^n by Miller's recurrence."""
+    # k U_0 P_k = sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}, from P_0 = U_0^n on.
     p = [u[0] ** n]
     for k in range(1, len(u)):
         p.append(
@@ -492,6 +513,7 @@ def _scaled_plus(series: list[float], factor: float, constant: float) -> list[fl
 
 
 def _table_mean(values: Array) -> float:
+    # The trapezoid rule over equal steps: the values at both ends count half.
     return float((values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1))
 
 
@@ -502,17 +524,20 @@ def _checked_table(table: Sequence[float]) -> tuple[float, ...]:
         raise InputError(
             f"the table of a phase function is {table!r}; expected a list of numbers"
         ) from None
+    # One value has no interval over which to be linear.
     if len(values) < 2:
         raise InputError(
             f"the table of a phase function has {len(values)} value; expected at least 2, from -1 "
             "to +1"
         )
+
     for index, value in enumerate(values):
         if not (math.isfinite(value) and value >= 0):
             raise InputError(
                 f"value {index} of the phase function's table is {value}; expected finite values "
                 ">= 0"
             )
+    # Values are divided by their mean.
     if _table_mean(np.asarray(values)) <= 0:
         raise InputError(
             "all values of the phase function's table are 0; expected at least one above 0"

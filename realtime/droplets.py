@@ -3,10 +3,10 @@
 
 **The phase function of droplets as a cosine series of the scattering angle.**
 
-The sizes are those of Bouthors 2008, eq. 3: with u = r/r_n the weight of an average over the cross
-sections is u^(gamma + 1) exp(-u), r_n = r_e/(gamma + 2). The rule takes the same midpoints as
-`analytic.droplets`: spheres have resonances too narrow for any rule, so the sizes are part of what
-is computed.
+Droplets have the sizes of Bouthors 2008, eq. 3: with u = r/r_n the weight of an average over the
+cross sections is u^(gamma + 1) exp(-u), r_n = r_e/(gamma + 2). The rule takes the same midpoints as
+`analytic.droplets`: spheres have resonances too narrow for any rule, so the result belongs to these
+sizes.
 
 Amplitudes of N terms are polynomials of degree N in the cosine, their squares of degree 2 N at
 most. As a function of the angle the square is a sum of cos(k angle), k <= 2 N, and its values at 2
@@ -44,8 +44,8 @@ table is over
     w = a/(a + b),    0 forward, 1 backward,    angle = 2 atan2(w, 1 - w),    d(angle)/dw = 2/(w^2 + (1 - w)^2),
 
 which near both ends is half the angle from there, and costs two roots and a division. Between
-entries the function is Hermite's cubic of their values and slopes: with eight entries for each term
-of the series it differs from it by less than 1e-6 of the value.
+entries the function is Hermite's cubic of their values and slopes. With eight entries for each term
+of the series the cubics differ from the series by less than 1e-6 of the value.
 """
 
 from dataclasses import dataclass
@@ -60,9 +60,6 @@ Array = NDArray[np.float64]
 
 # refractive index by wavelength [um], Hale and Querry 1973
 _WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}
-_TAIL, _SIZES, _REFERENCE_RADIUS = 1e-9, 6400, 6.0  # as `analytic.droplets` has them
-_GROUPS = 24  # of sizes with one number of terms each
-_CHUNK = 512  # angles at a time
 
 
 @dataclass(frozen=True)
@@ -79,17 +76,19 @@ class DropletSeries:
 
     def slopes(self, angle: Array) -> Array:
         """Return dp/d(angle) [1/rad] at scattering angles [rad], (angles,)."""
+        # d/d(angle) of cos(k angle) is -k sin(k angle).
         k = np.arange(len(self.cosines))
         return -np.sin(np.outer(angle, k)) @ (k * self.cosines)
 
     def fraction_below(self, angle: float) -> float:
         """Return the fraction of the light [1] that is scattered by less than an angle [rad].
 
-        It is (1/2) int_0^angle p sin: of cos(k t) sin t the integral is that of (sin((k +
-        1) t) - sin((k - 1) t))/2.
+        It is (1/2) int_0^angle p sin t dt, where cos(k t) sin t = (sin((k + 1) t) - sin((k - 1)
+        t))/2.
         """
         k = np.arange(len(self.cosines), dtype=np.float64)
         up, down = k + 1, k - 1
+        # int_0^angle sin(m t) dt = (1 - cos(m angle))/m, and 0 for m = 0, which k = 1 has.
         with np.errstate(divide="ignore", invalid="ignore"):
             falling = np.where(down == 0, 0.0, (1 - np.cos(down * angle)) / down)
         return float(self.cosines @ (0.25 * ((1 - np.cos(up * angle)) / up - falling)))
@@ -105,41 +104,56 @@ def droplet_series(
     above 0; `wavelength`: one of 0.65, 0.55, 0.45 [um]. Raises InputError for numbers out of these
     ranges.
 
-    Takes some seconds at 6 um, a minute at 50 um; the results are kept.
+    Takes some seconds at 6 um, a minute at 50 um; the results are cached.
     """
     from scipy.fft import dct
     from scipy.special import gammainccinv, gammaincinv
 
     _check(radius, gamma, wavelength)
-    count = round(_SIZES * min(1.0, max(0.25, _REFERENCE_RADIUS / radius)))
-    low, high = gammaincinv(gamma + 2, _TAIL), gammainccinv(gamma + 2, _TAIL)
+    # As many sizes as `analytic.droplets` takes, at the midpoints between the same quantiles of
+    # u^(gamma + 1) exp(-u): all 6400 up to r_e = 6 um, and a quarter at least.
+    tail, sizes, reference_radius = 1e-9, 6400, 6.0
+    count = round(sizes * min(1.0, max(0.25, reference_radius / radius)))
+    low, high = gammaincinv(gamma + 2, tail), gammainccinv(gamma + 2, tail)
     u = low + (high - low) * (np.arange(count) + 0.5) / count
+    # The weight over its largest value, at u = gamma + 1, as the power of u overflows for large
+    # gamma.
     weight = np.exp((gamma + 1) * np.log(u / (gamma + 1)) - (u - gamma - 1))
     weight /= weight.sum()
     scale = radius / (gamma + 2)
+    # x = 2 pi r/wavelength in increasing order: the last sphere has the most terms.
     size = 2 * np.pi * scale * u / wavelength
     most = int(term_counts(size[-1:])[0])
     groups = [
         (part, *phase_shift_coefficients(size[part], _WATER[wavelength]))
         for part in _grouped(count)
     ]
+    # Q_ext = 2/x^2 sum (2 n + 1) Re(a_n + b_n) of each sphere, in the mean weighted by r^2.
     efficiency = 0.0
     for part, a, b in groups:
         degeneracy = 2 * np.arange(1, a.shape[1] + 1) + 1
         efficiency += float(weight[part] @ (2 * ((a + b).real @ degeneracy) / size[part] ** 2))
+    # A polynomial of degree 2 N in the cosine follows from its values at 2 N + 1 angles.
     angle = np.pi * np.arange(2 * most + 1) / (2 * most)
     values = np.zeros_like(angle)
-    for start in range(0, len(angle), _CHUNK):
-        plus, minus = angular_factors(np.cos(angle[start : start + _CHUNK]), most)
+    chunk = 512  # angles at a time
+    for start in range(0, len(angle), chunk):
+        plus, minus = angular_factors(np.cos(angle[start : start + chunk]), most)
         for part, a, b in groups:
+            # A sphere scatters |S_1 + S_2|^2 + |S_1 - S_2|^2 over x^2, up to a factor that the mean
+            # over the sphere takes out below.
             fraction = weight[part] / size[part] ** 2
-            values[start : start + _CHUNK] += _scattered(fraction, a + b, plus) + _scattered(
+            values[start : start + chunk] += _scattered(fraction, a + b, plus) + _scattered(
                 fraction, a - b, minus
             )
+    # The transform of type 1 counts the first and the last coefficient twice.
     cosines = dct(values, type=1) / (len(values) - 1)
     cosines[[0, -1]] *= 0.5
+    # The mean over the sphere: (1/2) int cos(k t) sin t dt = 1/(1 - k^2) for even k, 0 for odd
+    # ones.
     even = np.arange(0, len(cosines), 2)
     mean = float(np.sum(cosines[even] / (1.0 - even**2)))
+    # pi <r^2> of the droplets [um^2].
     area = np.pi * gamma * (gamma + 1) * scale**2
     return DropletSeries(cosines / mean, efficiency, area * efficiency)
 
@@ -158,11 +172,17 @@ def _check(radius: float, gamma: float, wavelength: float) -> None:
 
 
 def _grouped(count: int) -> list[NDArray[np.int64]]:
-    return np.array_split(np.arange(count), _GROUPS)
+    """Return the numbers of sizes in groups, each of which shares one number of terms."""
+    groups = 24
+    return np.array_split(np.arange(count), groups)
 
 
 def _scattered(fraction: Array, coefficients: NDArray[np.complex128], factors: Array) -> Array:
-    """Return the sum over the sizes of share |amplitude|^2, (angles,)."""
+    """Return the sum over the sizes of fraction |amplitude|^2, (angles,).
+
+    `fraction`: by size; `coefficients`: (sizes, terms); `factors`: of `angular_factors`.
+    """
+    # The factors are real: real and imaginary parts of the amplitudes are real products.
     used = factors[: coefficients.shape[1]]
     real, imaginary = (
         np.ascontiguousarray(part) @ used for part in (coefficients.real, coefficients.imag)
@@ -171,9 +191,6 @@ def _scattered(fraction: Array, coefficients: NDArray[np.complex128], factors: A
 
 
 Complex = NDArray[np.complex128]
-
-# where downward recurrences start: widths x^(1/3) of the transition, and terms
-_WIDTHS, _MARGIN = 8.0, 20
 
 
 def term_counts(size: Array) -> NDArray[np.int64]:
@@ -188,23 +205,32 @@ def phase_shift_coefficients(size: Array, index: float) -> tuple[Complex, Comple
     `size`: x of each sphere [1], (sizes,); `index`: m, the real refractive index relative
     to the surroundings [1].
 
-    Valid for sizes from 0.01 to 5000. Beyond a sphere's own number of terms its coefficients are 0.
+    Valid for sizes from 0.01 to 5000. Beyond the terms that a sphere needs its coefficients are 0.
     """
     counts = term_counts(size)
     count = int(counts.max())
+    # R_n at y = m x and at x, for all spheres as far as the largest needs.
     inner, outer = _ratios(index * size, count + 1), _ratios(size, count + 1)
     chi = np.empty((count + 1, len(size)))
     chi[0] = np.cos(size)
-    before = -np.sin(size)  # chi_{-1}
+    # chi_0 above, and chi_{-1}: chi_n = (2 n - 1)/x chi_{n-1} - chi_{n-2} goes upwards from them.
+    chi_before = -np.sin(size)
     a, b = np.zeros((len(size), count), np.complex128), np.zeros((len(size), count), np.complex128)
     for n in range(1, count + 1):
+        # A sphere that has all of its terms rests at chi = 1, as its chi would grow until it
+        # overflows.
         used = counts >= n
-        chi[n], before = np.where(used, (2 * n - 1) / size * chi[n - 1] - before, 1.0), chi[n - 1]
-        # The Wronskian for n, then psi_n by its ratio.
+        chi[n], chi_before = (
+            np.where(used, (2 * n - 1) / size * chi[n - 1] - chi_before, 1.0),
+            chi[n - 1],
+        )
+        # psi_{n-1} by the Wronskian, then psi_n by its ratio to it.
         psi = outer[n] / (chi[n] - outer[n] * chi[n - 1])
+        # psi_n' = psi_n (1/R_n - n/x), chi_n' = chi_{n-1} - n/x chi_n, and D = psi_n'(y)/psi_n(y).
         psi_slope = psi * (1 / outer[n] - n / size)
         chi_slope = chi[n - 1] - n / size * chi[n]
         derivative = 1 / inner[n] - n / (index * size)
+        # In a_n the factor m is at the second terms of p and q, in b_n at the first ones.
         for coefficient, first, second in ((a, 1.0, index), (b, index, 1.0)):
             p = first * derivative * psi - second * psi_slope
             q = first * derivative * chi[n] - second * chi_slope
@@ -214,11 +240,15 @@ def phase_shift_coefficients(size: Array, index: float) -> tuple[Complex, Comple
 
 def _ratios(argument: Array, count: int) -> Array:
     """Return R_n = psi_n/psi_{n-1} for n = 0 to count, (count + 1, sizes); row 0 is not used."""
+    # The start lies eight widths x^(1/3) of the transition beyond n = x, or at the last ratio that
+    # is needed, and 20 terms further: there psi_n/psi_{n-1} is about x/(2 n + 1).
+    widths, margin = 8.0, 20
     largest = float(argument.max())
-    start = int(max(count, largest + _WIDTHS * largest ** (1 / 3))) + _MARGIN
+    start = int(max(count, largest + widths * largest ** (1 / 3))) + margin
     ratios = np.ones((count + 1, len(argument)))
     ratio = argument / (2 * start + 1)
     for n in range(start - 1, 0, -1):
+        # 1/R_n = (2 n + 1)/x - R_{n+1}.
         ratio = 1 / ((2 * n + 1) / argument - ratio)
         if n <= count:
             ratios[n] = ratio
@@ -235,9 +265,11 @@ def angular_factors(cosine: Array, count: int) -> tuple[Array, Array]:
     `cosine`: of the scattering angle, (angles,); `count`: largest n.
     """
     plus, minus = np.empty((count, len(cosine))), np.empty((count, len(cosine)))
+    # P_0 and P_1, P_0' and P_1'.
     legendre_before, legendre = np.ones_like(cosine), cosine.copy()
     slope_before, slope = np.zeros_like(cosine), np.ones_like(cosine)
     for n in range(1, count + 1):
+        # tau_n = cos P_n' - (2 cos P_n' - n (n + 1) P_n), as `slope` is P_n' and thus pi_n.
         tau = n * (n + 1) * legendre - cosine * slope
         factor = (2 * n + 1) / (n * (n + 1))
         plus[n - 1], minus[n - 1] = factor * (slope + tau), factor * (slope - tau)
@@ -250,7 +282,6 @@ def angular_factors(cosine: Array, count: int) -> tuple[Array, Array]:
     return plus, minus
 
 
-_ENTRIES = 8  # for each term of the series
 CUT = 5.0  #: angle below which the modified phase function has no peak [degrees]
 
 
@@ -267,18 +298,20 @@ class DropletTable:
 def droplet_table(
     radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55
 ) -> DropletTable:
-    """Return the table of droplets; parameters, `Raises` and times are
-    those of `droplet_series`.
-    """
+    """Return the table of droplets; parameters, errors and times as of `droplet_series`."""
     series = droplet_series(radius, gamma, wavelength)
-    cells = _ENTRIES * len(series.cosines)
+    entries = 8  # for each term of the series (module docstring, last paragraph)
+    cells = entries * len(series.cosines)
     w = np.linspace(0.0, 1.0, cells + 1)
     angle = 2 * np.arctan2(w, 1 - w)
     values, slopes = np.empty_like(w), np.empty_like(w)
+    # 1024 angles at a time bound the matrix of all cosines.
     for start in range(0, len(w), 1024):
         part = slice(start, start + 1024)
         values[part], slopes[part] = series.values(angle[part]), series.slopes(angle[part])
+    # dp/d(angle) d(angle)/dw, times the spacing of w: what Hermite's cubic takes in a cell.
     slopes *= 2 / (w * w + (1 - w) ** 2) / cells
+    # The first angle at which the peak has fallen to half.
     half = angle[np.argmax(values < 0.5 * values[0])]
     return DropletTable(
         np.stack([values, slopes], axis=1).ravel(), float(np.tan(0.5 * half)), len(series.cosines)

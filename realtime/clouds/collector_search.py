@@ -23,9 +23,9 @@ Where a cloud is no slab:
 
 * p above the filtered face: d = 0. The filter removes bumps of the cloud.
 * p deeper than the slab is thick: t = d. There is cloud down to p at least.
-* The sun below the tangent plane, or in it: mu_L is `LEAST_COSINE` at least, and n is turned
-  towards the sun until it is. Normals of a map face the light, so means of them are never below the
-  plane; at silhouettes they come close to it.
+* The sun below the tangent plane, or in it: mu_L is 0.02 at least, and n is turned towards the sun
+  until it is. Normals of a map face the light, so that the sun is never below the plane of their
+  mean; at silhouettes it comes close to the plane.
 * Opposed normals whose mean is 0 (both sides of a ridge): n is the direction towards the sun.
 * The sun in the zenith: x is any horizontal direction, as the transport does not depend on it.
 
@@ -41,20 +41,20 @@ where light enters. The search solves
 
     (c, sigma) = F(P(c, sigma)).
 
-Seen along the light, the map from c to c maps the plane into itself. On a slab the map is constant:
+Seen along the light, the map from c to F maps a plane into itself. On a slab the map is constant:
 the first step is right and the second confirms it. On a cloud the map varies with the normal of the
-surface at c, times the distance from c to p: where both are large it is no contraction, and steps
-overshoot.
+surface at c, times the distance from c to p: where both are large the map is no contraction, and
+steps overshoot.
 
 * *Projection*. c' is the point of the tangent plane that c lies over, along the light: it differs
   from c where the surface curves.
 * *Step*. c' + w (F - c'), no longer than the new sigma (the paper's bound on |c_i - c_(i-1)|): the
   surface was filtered by sigma, and says nothing of what lies further away.
-* *Two-cycles*. Where the map has a slope below -1 along the line between two places, the steps go
+* *Two-cycles*. Where the map has a slope s below -1 along the line between two places, the steps go
   to and fro between them without end. w is 1 at first, and is halved after every step that turns
-  back (its scalar product with the last step is negative). The mean of the map and the identity
-  with the weight w has the slope 1 - w (1 - s), which is within (-1, 1) for every s from 1 - 2/w
-  on: -3 for w = 1/2, -7 for 1/4.
+  back (its scalar product with the last step is negative). The mean of the map with the weight w
+  and the identity has the slope 1 - w (1 - s), which is within (-1, 1) for every s from 1 - 2/w
+  to 1: from -3 for w = 1/2, from -7 for 1/4.
 * *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the
   collector of the last frame.
 * *Cover*. Light enters where there is cloud. Only the fraction A of the collector, read from the
@@ -62,22 +62,21 @@ overshoot.
   weight it.
 * *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu|
   upwards, (t - d)/mu downwards. The eye gets the light that was scattered into the ray over the
-  depth T, not L: the light is weighted by (1
-  - exp(-T))/(1 - exp(-L)), as if its source were uniform. Where the ray leaves the slab
-    through the lit face (mu < 0),
-  p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin
-  parts are too bright, and slopes that face away from the sun are black.
-* *End*. After `iterations` steps, or where a step has no length. The light is that of the last
-  slab: F gives it with the place and the width.
+  depth T, not L: the light is weighted by (1 - exp(-T))/(1 - exp(-L)), as if its source were
+  uniform. Where the ray leaves the slab through the lit face (mu < 0), p lies |mu| T deep at least,
+  as there is cloud so far. With the paper's L silhouettes of thin parts are too bright, and slopes
+  that face away from the sun are black.
+* *End*. After `iterations` steps, or where a step has no length. The last slab gives the light: F
+  has it with the place and the width.
 
 The distance |F - c'| / sigma of the last step says how far the search is from its end:
 `CollectorLight.missed`.
 
 **The light of all sets of orders at points of a cloud under one sun:** one search for each set.
 
-A frame leaves to the next the collectors of each set: the vectors from the points to the centres,
-and the widths, which are 0 where there is none. Where the camera moved, a point of the next frame
-is displaced from the point whose collector it takes, and its collector is displaced, too.
+A frame hands the collectors of each set on to the next frame: the vectors from the points to the
+centres, and the widths, which are 0 where there is no collector. Where the camera moved, a point of
+the next frame is displaced from the point whose collector it takes, and the collector by as much.
 """
 
 from dataclasses import dataclass, replace
@@ -89,7 +88,6 @@ import mitsuba as mi
 from airlight.realtime.clouds.canonical.transport_grid import Transport
 from airlight.realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
 
-LEAST_COSINE = 0.02  #: of the sun over a tangent plane
 _LEAST_LENGTH = 1e-4  #: of a mean of unit normals that has a direction
 
 
@@ -129,12 +127,16 @@ def tangent_slab(
     """
     Float = type(surface.cover)
     normal, mu_l = _facing(surface.normal, axis)
+    # The depth of p below the face [m]; points above it count as on it.
     below = dr.maximum(dr.dot(surface.middle - point, normal), 0)
+    # Z lies along the light, and the slab across its face.
     depth, thickness = extinction * below, extinction * surface.thickness
     if along_light:
         depth /= mu_l
     else:
         thickness *= mu_l
+    # The horizontal part of w_L. With the sun in the zenith it has no direction: any level one will
+    # do, here the cross product with an axis that is not along the normal.
     along = axis + normal * mu_l
     length = dr.norm(along)
     helper = dr.select(dr.abs(normal.x) < 0.5, type(normal)(1, 0, 0), type(normal)(0, 1, 0))
@@ -142,10 +144,12 @@ def tangent_slab(
         length > _LEAST_LENGTH, along / length, dr.normalize(dr.cross(helper, normal))
     )
     beside = dr.cross(normal, along)
+    # v in the system of the slab; where v is vertical, phi counts as 0.
     mu = dr.clip(dr.dot(toward, normal), -1, 1)
     x, y = dr.dot(toward, along), dr.dot(toward, beside)
     sine = dr.sqrt(dr.square(x) + dr.square(y))
     flat = sine > 0
+    # Cloud reaches down to p at least.
     return TangentSlab(
         thickness=dr.maximum(thickness, depth),
         depth=depth,
@@ -161,21 +165,18 @@ def tangent_slab(
 
 
 def _facing(normal: Any, axis: Any) -> tuple[Any, Any]:
-    """Return a unit normal that faces the light by `LEAST_COSINE` at least, and its cosine."""
+    """Return a unit normal that faces the light by a cosine of 0.02 at least, and its cosine."""
+    # Opposed normals may have a mean without direction: then n is the direction towards the sun.
     length = dr.norm(normal)
     normal = dr.select(length > _LEAST_LENGTH, normal / length, -axis)
     cosine = -dr.dot(normal, axis)
-    # n + s (-w_L), whose cosine is c: s = c sqrt((1 - a^2)/(1 - c^2)) - a, with a that of n.
+    # n + s (-w_L), whose cosine is c for s = c sqrt((1 - a^2)/(1 - c^2)) - a, a the cosine of n.
+    least_cosine = 0.02  # of the sun over a tangent plane
     sine = dr.sqrt(dr.maximum(1 - dr.square(cosine), 0))
-    turn = LEAST_COSINE / (1 - LEAST_COSINE**2) ** 0.5 * sine - cosine
-    low = cosine < LEAST_COSINE
+    turn = least_cosine / (1 - least_cosine**2) ** 0.5 * sine - cosine
+    low = cosine < least_cosine
     normal = dr.select(low, dr.normalize(dr.fma(axis, -turn, normal)), normal)
-    return normal, dr.select(low, type(cosine)(LEAST_COSINE), dr.minimum(cosine, 1))
-
-
-_SKIN = 0.01  #: of a slab, which is left on the way out of it [mean free paths]
-_LEVEL = 1e-4  #: cosine of a direction that never leaves
-_NARROWEST = 1e-3  #: width of a collector [mean free paths]: where no light comes there is none
+    return normal, dr.select(low, type(cosine)(least_cosine), dr.minimum(cosine, 1))
 
 
 @dataclass(frozen=True)
@@ -229,16 +230,18 @@ def collector_light(
 ) -> CollectorLight:
     """Find the collectors of one set of orders, and the light that comes from them.
 
-    `light_map`: of the cloud under one sun; `transport`: see `Transport`; `set_number`: what the
-    transport is asked for; `point`: points in the cloud or on it [m]; `toward`: unit directions in
-    which light leaves them; `extinction`: of the cloud [1/m]; `behind`: optical depth of the clouds
-    on the ray behind each point; `start`: with which the search starts; `search`: how it goes on;
-    `active`: lanes to compute; in the others the collector stays and no light comes.
+    `light_map`: of the cloud under one sun; `transport`: see `Transport`; `set_number`: of the
+    orders, for the transport; `point`: points in the cloud or on it [m]; `toward`: unit directions
+    in which light leaves them; `extinction`: of the cloud [1/m]; `behind`: optical depth of the
+    clouds on the ray behind each point; `start`: with which the search starts; `search`: how it
+    goes on; `active`: lanes to compute; in the others the collector stays and no light comes.
     """
     Float = type(start.width)
     lanes = max(dr.width(point), dr.width(toward))
 
-    def step(index, going, centre, width, last, weight, radiance, missed):
+    def step(index, going, centre, width, last_step, weight, radiance, missed):
+        # P(c, sigma): the slab that touches the surface filtered by sigma, where c lies along the
+        # light.
         surface = filtered_surface(light_map, centre, width)
         slab = tangent_slab(
             surface,
@@ -249,26 +252,32 @@ def collector_light(
             along_light=search.along_light,
         )
         slab = _reaching_behind(slab, behind)
-        found, c_x, c_y, spread = transport(
+        # F: the radiance, and the place and the width where light enters.
+        light, c_x, c_y, spread = transport(
             set_number, slab.thickness, slab.depth, slab.mu, slab.cos_phi, slab.sin_phi, slab.mu_l
         )
-        found *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
+        # *Way* and *cover*: the light of the depth T behind p, and only where the map has cloud.
+        light *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
         if search.covered:
-            found *= dr.minimum(surface.cover, 1)
+            light *= dr.minimum(surface.cover, 1)
         path = dr.rcp(extinction)
-        wanted = slab.foot + slab.along * (c_x * path) + slab.beside * (c_y * path)
-        new_width = dr.maximum(spread, _NARROWEST) * path
+        target = slab.foot + slab.along * (c_x * path) + slab.beside * (c_y * path)
+        # Where no light comes a collector has no width, but is divided by it.
+        new_width = dr.maximum(spread, 1e-3) * path
         # c' lies where the line along the light through c meets the face: (c' - foot) . n = 0.
         over = dr.dot(centre - slab.foot, slab.normal) / slab.mu_l
         projected = dr.fma(light_map.axis, over, centre)
-        way = wanted - projected
+        # The step F - c'. Its weight is halved for good where it turns back; it is no longer than
+        # the new sigma.
+        way = target - projected
         distance = dr.norm(way)
-        weight = dr.select(dr.dot(way, last) < 0, 0.5 * weight, weight)
+        weight = dr.select(dr.dot(way, last_step) < 0, 0.5 * weight, weight)
         fraction = dr.minimum(weight, new_width / dr.maximum(distance, 1e-20))
         moved = dr.fma(way, fraction, projected)
         relative = distance / new_width
-        return index + 1, relative > 0, moved, new_width, way, weight, found, relative
+        return index + 1, relative > 0, moved, new_width, way, weight, light, relative
 
+    # The counter, lanes that go on, c and sigma, the last step, w, the radiance, |F - c'|/sigma.
     state = (
         dr.zeros(mi.UInt32, lanes),
         dr.full(dr.mask_t(Float), True, lanes) & active,
@@ -283,15 +292,17 @@ def collector_light(
         state=state,
         cond=lambda index, going, *rest: going & (index < search.iterations),
         body=step,
-        labels=("index", "going", "centre", "width", "last", "weight", "radiance", "missed"),
+        labels=("index", "going", "centre", "width", "last_step", "weight", "radiance", "missed"),
     )
     return CollectorLight(Collector(centre, width), radiance, missed)
 
 
 def _reaching_behind(slab: TangentSlab, behind: Any) -> TangentSlab:
     """Return a slab with the point so deep that there is something of it behind."""
-    skin = dr.minimum(_SKIN, 0.5 * slab.thickness)
+    # The least way out of the slab: a hundredth of a mean free path, or half of a thinner slab.
+    skin = dr.minimum(0.01, 0.5 * slab.thickness)
     deep = dr.maximum(slab.depth, dr.maximum(skin, -slab.mu * behind))
+    # Through the lit face, p is |mu| T deep at least; downwards, a skin remains below it.
     depth = dr.select(
         slab.mu < 0, dr.minimum(deep, slab.thickness), dr.minimum(slab.depth, slab.thickness - skin)
     )
@@ -300,8 +311,10 @@ def _reaching_behind(slab: TangentSlab, behind: Any) -> TangentSlab:
 
 def _way(slab: TangentSlab) -> Any:
     """Return the optical length of the slab behind the point."""
+    # L = d/|mu| to the lit face, (t - d)/mu to the other one. A direction that is more level than
+    # the cosine 1e-4 counts as one with it.
     across = dr.select(slab.mu < 0, slab.depth, slab.thickness - slab.depth)
-    return dr.maximum(across / dr.maximum(dr.abs(slab.mu), _LEVEL), 1e-4)
+    return dr.maximum(across / dr.maximum(dr.abs(slab.mu), 1e-4), 1e-4)
 
 
 @dataclass(frozen=True)
@@ -335,8 +348,8 @@ def light_of_orders(
     """
     cold = cold_start(light_map, point)
     Float, Vector = type(cold.width), type(cold.centre)
-    # By set the collector, which is at first that of the last frame, and the
-    # light that comes from it.
+    # By set the collector, at first from the last frame, and the light that comes from it, in
+    # arrays of each lane that a loop can index by the number of the set.
     centres, widths = (dr.alloc_local(kind, sets, value=kind(0)) for kind in (Vector, Float))
     radiances = dr.alloc_local(Float, sets, value=Float(0))
     for number, collector in enumerate(last or ()):
@@ -358,6 +371,7 @@ def light_of_orders(
             search=search,
             active=active,
         )
+        # From the point, so that the collector moves with it; no width where lanes are not active.
         centres[number] = light.collector.centre - point
         widths[number] = dr.select(active, light.collector.width, 0)
         radiances[number] = light.radiance
@@ -379,7 +393,5 @@ def light_of_orders(
 def _warm(cold: Collector, last: Collector, point) -> Collector:
     """Return the collector with which a search starts: the last frame's where there is one."""
     way, width = last.centre, last.width
-    there = width > 0
-    return Collector(
-        dr.select(there, point + way, cold.centre), dr.select(there, width, cold.width)
-    )
+    mask = width > 0
+    return Collector(dr.select(mask, point + way, cold.centre), dr.select(mask, width, cold.width))

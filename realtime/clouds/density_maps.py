@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""How much of a cloud lies between a sun and a point, in a map: what a segment of
-single scattering looks up.
+r"""How much of a cloud lies between a sun and a point, in a map that segments of single scattering
+look up.
 
-A ray of the light through each texel marches through a cloud. It keeps l = int rho dx, in metres of
-full density, at layers whose heights lie
+A ray of the light through each texel marches through a cloud. It stores l = int rho dx, in metres
+of full density, at layers whose heights are
 
     h_k = front - (front - back) (k/K)^2,        k = 0 .. K,
 
 between the first and the last place of the ray with any density: narrow where the light comes in
-and much of it is left, wide behind. A look-up is linear in k between two layers, and between the
-four nearest texels, each with its own front and back. That is a deep shadow map (Lokovic and Veach
+and is still strong, wide behind. A look-up is linear in k between two layers, and between the four
+nearest texels, each with its own front and back. Such a map is a deep shadow map (Lokovic and Veach
 2000), which the paper names as its future work: a depth map alone takes the way from the first
 surface for cloud of one density, without wisps and gaps. The depth of a segment is sigma_t l, so
 that other extinctions need no new map.
@@ -19,15 +19,15 @@ the eye and from the sun.
 
 Bouthors et al. 2008, sections 6.1 and 8, take for the lit surface the first voxel with rho > rho_0
 along the light, and slabs between it and the far side. A slab has one extinction, a cloud one at
-every place; but slabs depend on optical lengths alone. So
+every place; but slabs depend on optical lengths alone. Hence slabs have
 
-    sigma_s = sigma_t mean(rho where rho > rho_0)        stands for the extinction of slabs: that of the cloud's body,
-    Z = int rho dx / mean(rho where rho > rho_0)         for their thickness along the light, from the surface on,
+    sigma_s = sigma_t mean(rho where rho > rho_0)   as extinction, like the body of the cloud,
+    Z = int rho dx / mean(rho where rho > rho_0)    as thickness along the light behind the surface,
 
 whose product is the true optical thickness of the cloud, gaps and wisps counted with their
-densities. The light map keeps front and front - Z, so that the filter and the search are the same
+densities. The light map stores front and front - Z, so that the filter and the search are the same
 as for homogeneous clouds. Depths below the surface, and the ways to collectors, are lengths times
-sigma_s: exact where rho equals that of the body, which is everywhere except in a layer at the
+sigma_s: exact where rho is the density of the body, which is everywhere except in a layer at the
 surface.
 
 Along a ray the density is taken at the ends of steps of a voxel, and the place between two of them
@@ -69,6 +69,7 @@ class LightDepths:
         """Return l of points [m]."""
         u, v, height, _ = self.projection.homogeneous(mi.UInt32(0), point - self.position, 1)
         Float = type(height)
+        # Texels have their values in their middles, u and v go from -1 to 1.
         (column, x), (row, y) = (
             cell_of(dr.fma(0.5 * SIZE, place + 1, -0.5), SIZE) for place in (u, v)
         )
@@ -77,8 +78,10 @@ class LightDepths:
             for along, weight_along in ((0, 1 - x), (1, x)):
                 texel = (row + down) * SIZE + column + along
                 front, back = (
-                    dr.gather(Float, own, texel, active) for own in (self.front, self.back)
+                    dr.gather(Float, heights, texel, active) for heights in (self.front, self.back)
                 )
+                # The layer k = K sqrt((front - height)/(front - back)), of this texel's front and
+                # back.
                 fraction = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
                 layer, between = cell_of(dr.sqrt(fraction) * LAYERS, LAYERS + 1)
                 first = texel * (LAYERS + 1) + layer
@@ -104,6 +107,8 @@ def light_depths(
     opaque: all clouds share kernels; `stride`: how long the steps are at most [voxels].
     """
     Float = type(light.position.x)
+    # One ray of the light for each texel, from before all shapes; a height is `top` less the
+    # distance along the ray.
     start, axis, texel = texel_rays(light, SIZE)
     Vector = type(light.position)
     origin, direction = Vector(start), Vector(axis) + dr.zeros(Vector, SIZE * SIZE)
@@ -114,24 +119,27 @@ def light_depths(
     def full_step(total, x, number):
         return stride * voxel(clouds, number)
 
+    # First march: the first and the last place of each ray with any density of this cloud.
     def widen(total, begin, end, inside, number):
         first, last = total
-        there = (number == cloud) & (
+        dense = (number == cloud) & (
             middle_density(clouds, origin, direction, begin, end, number) > 0
         )
         return (
-            dr.select(there, dr.minimum(first, begin), first),
-            dr.select(there, end, last),
+            dr.select(dense, dr.minimum(first, begin), first),
+            dr.select(dense, end, last),
         ), mi.Bool(True)
 
     first, last = march(
         surfaces, origin, direction, Float(dr.inf), nothing, step=full_step, add=widen
     )
-    there = dr.isfinite(first)
-    first, last = dr.select(there, first, 0), dr.select(there, last, 0)
+    # Rays that meet none of the cloud take no part in the second march.
+    mask = dr.isfinite(first)
+    first, last = dr.select(mask, first, 0), dr.select(mask, last, 0)
     dr.eval(first, last)
     lengths = dr.zeros(Float, SIZE * SIZE * (LAYERS + 1))
 
+    # Second march: l at the layers. A step ends at the next layer at the latest.
     def to_layer(total, x, number):
         layer, *_ = total
         ahead = first + (last - first) * dr.square(Float(layer + 1) / LAYERS) - x
@@ -139,26 +147,30 @@ def light_depths(
 
     def add(total, begin, end, inside, number):
         layer, length = total
-        own = number == cloud
+        in_cloud = number == cloud
         rho = middle_density(clouds, origin, direction, begin, end, number)
-        length = dr.select(own, dr.fma(rho, end - begin, length), length)
-        # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
+        length = dr.select(in_cloud, dr.fma(rho, end - begin, length), length)
+        # The layer that the step has reached: k from the fraction of the way, with room for the
+        # rounding of the distance.
         fraction = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
         reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(fraction), LAYERS, 1e-3)), LAYERS)
-        # The next layer keeps this length if the ray leaves the cloud before it; a
+        # The next layer has this length, too, if the ray leaves the cloud before it; otherwise a
         # later step writes over it.
-        dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
-        dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))
+        dr.scatter(
+            lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), in_cloud
+        )
+        dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, in_cloud & (reached > layer))
         return (dr.maximum(layer, reached), length), end < last
 
     nothing = dr.zeros(mi.UInt32, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
-    march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=there)
-    # Layers in vacuum, where no step ends, have what the one before them has.
+    march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=mask)
+    # No step ends at layers in vacuum: they have the length of the layer before them.
     lengths = dr.block_prefix_reduce(dr.ReduceOp.Max, lengths, LAYERS + 1, exclusive=False)
+    # Distances as heights, from the order of rays to the order of texels.
     arrays = []
     for distance in (first, last):
         heights = dr.zeros(Float, SIZE * SIZE)
-        dr.scatter(heights, dr.select(there, top - distance, 0), texel)
+        dr.scatter(heights, dr.select(mask, top - distance, 0), texel)
         arrays.append(heights)
     dr.eval(lengths, arrays)
     front, back = arrays
@@ -181,6 +193,7 @@ def sun_depths(
 
 def depths_memory(Float: Any) -> int:
     """Return how much the map of a cloud and a sun takes [bytes]."""
+    # K + 1 lengths, front and back of each texel.
     return SIZE * SIZE * (LAYERS + 3) * bytes_of(Float)
 
 
@@ -190,7 +203,7 @@ class DenseSurface:
 
     distance: Any  #: infinite where they never do [m]
     cloud: Any  #: the number of the cloud there
-    behind: Any  #: int rho dx from there on, 0 where it was not asked for [m]
+    behind: Any  #: int rho dx from there on, of a single cloud; 0 for all clouds together [m]
 
 
 def dense_surface(
@@ -207,9 +220,9 @@ def dense_surface(
     """Return where rays first meet more than a density.
 
     `surfaces`, `clouds`, `origin`, `direction`, `end`, `stride`: as for
-    `realtime.clouds.march.depths_along`; `threshold`: rho_0 [1]; `only`: the number of a cloud that
-    is seen alone, with what the rays meet behind its surface; None for all, where rays end at the
-    surface.
+    `realtime.clouds.march.depths_along`; `threshold`: rho_0 [1]; `only`: the number of a single
+    cloud, behind whose surface rays go on to add up its density; None for all clouds, where rays
+    end at the surface.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
     density = clouds.density
@@ -220,10 +233,13 @@ def dense_surface(
 
     def add(total, begin, finish, inside, cloud):
         distance, number, behind = total
-        own = mi.Bool(True) if only is None else cloud == only
-        searches = own & ~dr.isfinite(distance)
+        # A ray searches until it has met the surface.
+        candidate = mi.Bool(True) if only is None else cloud == only
+        searches = candidate & ~dr.isfinite(distance)
         first = density.at(origin + direction * begin, cloud, searches)
         second = density.at(origin + direction * finish, cloud, searches)
+        # Either the step begins above the threshold, where a ray enters the cloud, or rho passes it
+        # between both ends, where it is linear.
         at_once = searches & (first > threshold)
         passes = searches & ~at_once & (second > threshold)
         fraction = dr.select(passes, (threshold - first) / (second - first), 0)
@@ -232,8 +248,10 @@ def dense_surface(
         number = dr.select(met, cloud, number)
         if only is None:
             return (distance, number, behind), ~met
+        # With one cloud alone the ray goes on behind the surface: int rho dx of the steps from
+        # there on, of the step with the surface only the part behind it.
         rho = middle_density(clouds, origin, direction, begin, finish, cloud)
-        counted = own & dr.isfinite(distance)
+        counted = candidate & dr.isfinite(distance)
         behind += dr.select(
             counted, rho * (finish - dr.maximum(begin, dr.select(counted, distance, 0))), 0
         )
@@ -279,10 +297,11 @@ def lit_dense_surface(
         stride=stride,
         only=cloud,
     )
-    there = dr.isfinite(met.distance)
-    distance = dr.select(there, met.distance, 0)
-    front = dr.select(there, Float(light.extent.depth) - distance, 0)
-    back = dr.select(there, front - met.behind / dr.gather(Float, body, cloud), 0)
-    lit = LitSurfaces(size, texel, there, front, back)
+    mask = dr.isfinite(met.distance)
+    distance = dr.select(mask, met.distance, 0)
+    # The height of the surface, and Z below it; rays that meet no surface have 0 for both.
+    front = dr.select(mask, Float(light.extent.depth) - distance, 0)
+    back = dr.select(mask, front - met.behind / dr.gather(Float, body, cloud), 0)
+    lit = LitSurfaces(size, texel, mask, front, back)
     dr.eval(lit)
     return lit

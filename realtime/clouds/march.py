@@ -9,9 +9,9 @@ at, and a table of normals.
 what follows from them.**
 
 A stretch of a ray between two crossings lies in a cloud if and only if the ray leaves one at its
-end. The start of the ray need not be known, and a crossing that rounding hides, or shows twice,
-costs a stretch of its own length: the sum over the stretches is right to the rounding of a
-distance.
+end. Nobody needs to know whether the ray starts in a cloud. Where rounding hides a crossing, or
+shows one twice, a stretch as short as the rounding is lost or added: the sum over the stretches is
+right to the rounding of a distance.
 
 Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond
 it, 4e-6 of the distance and of the coordinates, is not seen.
@@ -25,9 +25,9 @@ the stretch for certain.
 
 A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint
 rule, whose error falls with dx^2. In a grid steps start as long as a voxel, and grow with the depth
-tau to the eye like exp(tau/s), s = `SPREAD`: what lies behind tau shows with exp(-tau), so all
-steps have about the same fraction in what is wrong of it. A homogeneous cloud is one of density 1,
-without voxels: its stretches are the steps.
+tau to the eye like exp(tau/s), s = `SPREAD`: light from behind tau is attenuated by exp(-tau), so
+that all steps add about the same error. A homogeneous cloud has the density 1 and no voxels: its
+stretches are the steps.
 """
 
 from collections.abc import Callable
@@ -68,16 +68,19 @@ def cloud_surfaces(scene: Scene) -> CloudSurfaces:
     shapes = scene.boundaries
     rows = [_rows(shape) for shape in shapes]
     numbers = [shape_number(shape) for shape in shapes]
+    # Hits carry the number of a shape in Mitsuba's registry: two tables lead from it to the rows of
+    # the shape's normals and to the number of the cloud.
     first, cloud = (
         np.zeros(max(numbers) + 1, dtype=np.uint32),
         np.zeros(max(numbers) + 1, dtype=np.uint32),
     )
-    first[numbers] = np.cumsum([0] + [len(own) for own in rows[:-1]])
+    first[numbers] = np.cumsum([0] + [len(shape_rows) for shape_rows in rows[:-1]])
     cloud[numbers] = np.arange(len(shapes))
     facets = aligned_array(mi.Float, np.concatenate(rows).ravel())
     spheres = not all(shape.is_mesh() for shape in shapes)
     firsts, clouds = (aligned_array(mi.UInt32, values) for values in (first, cloud))
     surfaces = CloudSurfaces(scene_of(shapes), firsts, clouds, facets, spheres, len(shapes) > 1)
+    # Recorded functions take the tables as inputs, and not as constants of their kernels.
     dr.make_opaque(surfaces.first, surfaces.cloud, surfaces.facets)
     return surfaces
 
@@ -91,11 +94,14 @@ def outward_normal(surfaces: CloudSurfaces, hit, point, active):
         row = dr.gather(
             mi.UInt32, surfaces.first, dr.reinterpret_array(mi.UInt32, hit.shape), active
         )
+    # Without spheres each triangle has its row, and no fourth number is asked for.
     if not surfaces.spheres:
         x, y, z, _ = dr.gather(
             four_numbers(mi.Float), surfaces.facets, row + hit.prim_index, active
         )
         return mi.Vector3f(x, y, z)
+    # The first row of a shape says whether it is a sphere; the normal of one points from its
+    # centre.
     ball = dr.gather(four_numbers(mi.Float), surfaces.facets, row, active).w > 0
     x, y, z, _ = dr.gather(
         four_numbers(mi.Float), surfaces.facets, row + dr.select(ball, 0, hit.prim_index), active
@@ -107,6 +113,7 @@ def outward_normal(surfaces: CloudSurfaces, hit, point, active):
 def _rows(shape):
     """Return the rows of a shape, (rows, 4)."""
     if not shape.is_mesh():  # a sphere
+        # The centre of a sphere is the centre of its box; the 1 marks it.
         box = shape.bbox()
         centre = 0.5 * (
             np.array(box.min, dtype=np.float64).ravel()
@@ -116,13 +123,12 @@ def _rows(shape):
     vertices, faces = mesh_triangles(shape)
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # The flag reverses the normals that the order of the corners gives.
     area *= -1.0 if shape.has_flipped_normals() else 1.0
     length = np.linalg.norm(area, axis=1, keepdims=True)
+    # A triangle without area has no normal.
     normals = np.divide(area, length, out=np.zeros_like(area), where=length > 0)
     return np.column_stack([normals, np.zeros(len(normals))])
-
-
-_STEP = 4e-6  # beyond a crossing, of the distance and of the largest coordinate
 
 
 @dataclass(frozen=True)
@@ -131,7 +137,7 @@ class Crossing:
 
     distance: Metres  #: from the origin, infinite where there is no boundary any more [m]
     leaves: PerRay  #: whether the stretch before it lies in a cloud
-    cloud: PerRay  #: the number of the cloud that is left or entered; 0 where there is none
+    cloud: PerRay  #: the number of the cloud that the boundary encloses; 0 where there is none
     normal: PerRay  #: outward unit normal of the boundary
 
 
@@ -143,10 +149,11 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     Returns `crossing`: its distance is larger than `x`.
     """
     Float = type(x)
+    # The ray starts beyond the crossing at x, so that it does not meet the same boundary again.
     begin = dr.select(x > 0, x + _clearance(origin, x), 0)
     start = mi.Point3f(origin + direction * begin)
-    # Camera rays and segments side by side start close together and go alike: told so, Embree
-    # takes a third of the time.
+    # Camera rays and segments side by side start close together and go alike: with that hint
+    # Embree takes a third of the time.
     ray = mi.Ray3f(start, mi.Vector3f(direction))
     hit = surfaces.geometry.ray_intersect_preliminary(ray, coherent=True, active=active)
     valid = hit.is_valid() & active
@@ -157,6 +164,7 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
         cloud = dr.gather(
             mi.UInt32, surfaces.cloud, dr.reinterpret_array(mi.UInt32, hit.shape), valid
         )
+    # The ray leaves a cloud where it goes the way of the outward normal.
     return Crossing(
         dr.select(valid, begin + Float(t), dr.inf),
         valid & (dr.dot(normal, mi.Vector3f(direction)) > 0),
@@ -168,13 +176,13 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
 def _clearance(origin, x) -> Metres:
     """Return how far from a boundary at a distance a point is on one side of it for certain [m]."""
     size = dr.maximum(dr.maximum(dr.abs(origin.x), dr.abs(origin.y)), dr.abs(origin.z))
-    return _STEP * (x + size)
+    # Float32 rounds distances and coordinates to 6e-8 of their size.
+    return 4e-6 * (x + size)
 
 
 SPREAD = 2.0  #: s
 #: A depth behind which nothing shows: exp(-20) = 2e-9.
 OPAQUE = 20.0
-_SHORTEST = 1e-6  # of a step, of the distance: rounding leaves as much
 
 
 def march(
@@ -197,14 +205,19 @@ def march(
     `add`: (total, begin, end, inside, cloud) -> total, and whether to go on, for steps [m] in the
     cloud of a number: the first in a stretch has no length, and says where it begins; `inside` is
     `end`, moved off a boundary into the stretch; `active`: lanes to compute; `first`: the first
-    crossing, if it is known. The loop changes no other lanes than those that go on.
+    crossing, if it is known. The loop changes lanes only while they go on.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
+    # The shortest step, as a fraction of the distance: rounding does not take it away.
+    shortest = 1e-6
 
     def stretch(x, crossing=None):
         """Return where the next stretch in a cloud begins and ends; both are one place
         where rounding hides it.
         """
+        # The next boundary. If the ray leaves a cloud there, the stretch began at x; otherwise it
+        # begins there, and ends where the ray leaves. A second entry in its place shows that
+        # rounding hid an exit: the stretch then has no length, and the march goes on behind it.
         near = next_crossing(surfaces, origin, direction, x) if crossing is None else crossing
         far = next_crossing(
             surfaces, origin, direction, near.distance, ~near.leaves & (near.distance < end)
@@ -214,12 +227,16 @@ def march(
         return begin, dr.minimum(edge, end), dr.select(near.leaves, near.cloud, far.cloud)
 
     def body(x, edge, cloud, opens, total, going):
-        longest = dr.maximum(step(total, x, cloud), _SHORTEST * x)
+        longest = dr.maximum(step(total, x, cloud), shortest * x)
+        # The first step of a stretch has no length: it says where the stretch begins.
         target = dr.select(opens, x, dr.minimum(x + longest, edge))
+        # Depths are looked up inside the stretch, off the boundary at either end, but never beyond
+        # the middle of the stretch or of the step.
         clear = _clearance(origin, target)
         entered = dr.minimum(target + clear, 0.5 * (target + edge))
         leaving = dr.select(target < edge, target, dr.maximum(target - clear, 0.5 * (x + target)))
         total, goes_on = add(total, x, target, dr.select(opens, entered, leaving), cloud)
+        # At the end of a stretch the next one is looked for, in the lanes that have reached it.
         opens = goes_on & ~opens & (target >= edge) & (edge < end)
         x, edge, cloud = dr.if_stmt(
             args=(target, edge, cloud),
@@ -268,22 +285,26 @@ def depths_along(
 
     `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`,
     `active`, `first`: as of `march`; lanes that are not active have a depth of 0; `stride`: how
-    long the first steps are in grids [voxels]; `seen`: whether the depths are those of what the eye
-    sees: there steps grow, and end behind `OPAQUE`.
+    long the first steps are in grids [voxels]; `seen`: whether the rays are rays of the eye, on
+    which steps grow, and end behind `OPAQUE`.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
+    # Homogeneous clouds have no voxels: one step takes the whole stretch.
     seen &= clouds.density is not None
 
     def step(depths, x, cloud):
+        # Steps of the eye grow with the depth, by exp(tau/s), up to the depth behind which nothing
+        # shows.
         length = stride * voxel(clouds, cloud) if clouds.density is not None else dr.inf
         return length * dr.exp(dr.minimum(least(depths), OPAQUE) / SPREAD) if seen else length
 
     def add(depths, begin, finish, inside, cloud):
         length = (finish - begin) * middle_density(clouds, origin, direction, begin, finish, cloud)
         depths = tuple(
-            dr.fma(dr.gather(Float, own, cloud), length, depth)
-            for own, depth in zip(clouds.sigma_t, depths)
+            dr.fma(dr.gather(Float, sigma_t, cloud), length, depth)
+            for sigma_t, depth in zip(clouds.sigma_t, depths)
         )
+        # Rays of the eye end where the least dense channel is opaque.
         return depths, least(depths) < OPAQUE if seen else mi.Bool(True)
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)

@@ -7,14 +7,14 @@ N steps of a ray of the depth T in clouds end at
 
     tau_k = -s log(1 - (k/N) (1 - exp(-T/s))),        k = 1 .. N,        tau_N = T:
 
-equal fractions of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own
-extinction; light that is extinguished less on its way in than on the way out needs nodes further
-in, so that s is larger. From a node at the depth tau the next is -s log(1 - exp(tau/s) (1 -
-exp(-T/s))/N) away.
+equal fractions of the integral of exp(-tau/s). With s = 1 each step would take the same part of the
+ray's extinction. Light that is attenuated less on its way in than on its way out comes from further
+in and needs nodes there, so that s is larger. From a node at the depth tau the next is -s log(1 -
+exp(tau/s) (1 - exp(-T/s))/N) away.
 
-In a grid of densities T is the depth that the ray had if they were 1 everywhere, and the next node
-is at most so far away at full density. No step is longer than those of `realtime.clouds.march`,
-which see the voxels.
+In a grid of densities T is the depth that the ray would have with the density 1 everywhere, and the
+distance to the next node is the distance at full density. No step is longer than the steps of
+`realtime.clouds.march`, which see the voxels.
 
 **The opacity of clouds along a ray.**
 
@@ -26,7 +26,7 @@ passes with the transmittance
 **Single scattering in clouds, by steps on which the segments of the light are linear.**
 
 Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x),
-and the eye after tau(x) more; of phase function P/4 pi and albedo w,
+and the eye after tau(x) more; with the phase function P/4 pi and the albedo w,
 
     L = w E P/(4 pi) int kappa exp(-tau(x) - l(x)) dx.
 
@@ -35,7 +35,7 @@ On a step u = tau + l is linear between two nodes, du = kappa dx + dl, so that w
     int kappa exp(-u) dx = kappa dx/(kappa dx + dl) (e_i - e_{i+1}),
 
 and kappa dx e where dl = -kappa dx. In a polyhedron l is linear between kinks and jumps, where rays
-and segments cross edges, so the error is that of the steps with one of these in them.
+and segments cross edges: only steps that hold a kink or a jump have an error.
 
 Octaves of a light (`realtime.methods.cloud_octaves`) have the segment a l with a factor a each, and
 a phase function each: the same sum with u = tau + a l.
@@ -66,8 +66,6 @@ from airlight.realtime.numerics.array_types import PerRay, chosen_value
 from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.bounded import Clouds
-
-_LAST = 1.0001  # times the fraction of a step: rounding leaves none behind the last
 
 
 def opacity_of(depths: tuple[Any, ...], Color) -> Any:
@@ -153,21 +151,26 @@ def light_once(
     """
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
     channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
+    # T of the nodes: at the density 1 everywhere in a grid, otherwise the depth of the ray.
     way, full = (rays.surfaces, rays.origin, rays.direction, rays.end), rays.depths
     if clouds.density is not None:
         even = replace(clouds, density=None)
         full = depths_along(way[0], even, *way[1:], stride=stride, seen=False, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
-    # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series,
-    # which it exceeds, are not.
-    fraction = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (_LAST / steps)
+    # (1 - exp(-T/s))/N, and a little more, so that rounding leaves no step behind the last. In thin
+    # clouds the difference is lost in rounding; the first two terms of its series, which it
+    # exceeds, are not.
+    fraction = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (1.0001 / steps)
 
     def step(total, x, cloud):
         depths, *_ = total
-        kappa = sum(dr.gather(Float, own, cloud) for own in clouds.sigma_t) / channels
+        kappa = sum(dr.gather(Float, sigma_t, cloud) for sigma_t in clouds.sigma_t) / channels
+        # exp(tau/s), and the depth of the step to the next node. For small p rounding takes
+        # -log(1 - p) away, and p stands for it, its limit from below.
         growth = exp_bounded(dr.minimum(sum(depths) / channels, OPAQUE) / SPREAD)
         part = fraction * growth
         ahead = SPREAD * dr.maximum(part, -dr.log(dr.maximum(1 - part, 1e-30)))
+        # From depth to distance; behind the last node a step takes the rest of the stretch.
         node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
         return (
             node
@@ -177,17 +180,27 @@ def light_once(
 
     def add(total, begin, end, inside, cloud):
         depths, segments, lit, sums = total
+        # l and the visibility of the light at the end of the step; at its beginning the step before
+        # had them.
         next_segments, next_lit = reaching(rays, beams, inside)
         length = (end - begin) * middle_density(
             clouds, rays.origin, rays.direction, begin, end, cloud
         )
-        own = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
-        after = tuple(depth + part for depth, part in zip(depths, own))
-        shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
+        step_depths = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
+        after = tuple(depth + part for depth, part in zip(depths, step_depths))
+        visibility = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
         ends = (depths, after), (segments, next_segments)
         # Where a stretch begins, so do the segments: its first step has no length.
         sums = with_step(
-            clouds, beams, sums, own, *ends, shown, cloud, end > begin, integral or step_integral
+            clouds,
+            beams,
+            sums,
+            step_depths,
+            *ends,
+            visibility,
+            cloud,
+            end > begin,
+            integral or step_integral,
         )
         return (after, next_segments, next_lit, sums), least(after) < OPAQUE
 
@@ -217,7 +230,7 @@ def with_step(
     clouds: Clouds,
     beams: Sequence[Beam],
     sums,
-    own,
+    step_depths,
     depths,
     segments,
     lit,
@@ -228,9 +241,11 @@ def with_step(
     """Return sums by beam and octave with the light of a step in a cloud of some
     number, where it has a length.
 
-    `own`, `depths`: as of `step_light`; `segments`: at both ends, by beam and channel [1]; `lit`:
-    by beam, what no surface hides [1].
+    `step_depths`, `depths`: as of `step_light`; `segments`: at both ends, by beam and channel [1];
+    `lit`: by beam, the fraction that no surface hides [1].
     """
+    # One phase function for all clouds is a factor of the ray (`finished`); several differ from
+    # step to step.
     albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud)
     several = len(clouds.phases) > 1
     phase = dr.gather(mi.UInt32, clouds.phase, cloud) if several else None
@@ -238,16 +253,18 @@ def with_step(
         tuple(
             total
             + dr.select(
-                long, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0
+                long,
+                term * (albedo * visibility * (chosen_value(values, phase) if several else 1)),
+                0,
             )
             for total, term, values in zip(
                 totals,
-                step_light(beam, own, depths, (was, now), integral),
+                step_light(beam, step_depths, depths, (was, now), integral),
                 beam.phases,
                 strict=True,
             )
         )
-        for beam, totals, was, now, shown in zip(beams, sums, *segments, lit, strict=True)
+        for beam, totals, was, now, visibility in zip(beams, sums, *segments, lit, strict=True)
     )
 
 
@@ -263,11 +280,11 @@ def finished(clouds: Clouds, beams: Sequence[Beam], sums) -> tuple[tuple[Any, ..
     )
 
 
-def step_light(beam: Beam, own, depths, segments, integral: StepIntegral) -> list[Any]:
+def step_light(beam: Beam, step_depths, depths, segments, integral: StepIntegral) -> list[Any]:
     """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
 
-    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `segments`: tau and l
-    at its two ends, by channel [1].
+    `beam`: the light; `step_depths`: the depth of the step, by channel [1]; `depths`, `segments`:
+    tau and l at its two ends, by channel [1].
     """
     Color = type(beam.irradiance)
     by_octave = []
@@ -275,9 +292,10 @@ def step_light(beam: Beam, own, depths, segments, integral: StepIntegral) -> lis
         parts = [
             integral(part, (before, then), (scale * segment, scale * next_segment))
             for part, before, then, segment, next_segment in zip(
-                own, *depths, *segments, strict=True
+                step_depths, *depths, *segments, strict=True
             )
         ]
+        # One channel stands for all three where media are grey.
         by_octave.append(Color(*(parts * (3 // len(parts)))))
     return by_octave
 
@@ -286,10 +304,14 @@ def step_integral(depth, eye, segment):
     """Return the integral over a step of a `depth`, from the depths to the `eye` and of
     the `segment` at the ends.
     """
-    first, last = eye[0] + segment[0], eye[1] + segment[1]
+    # kappa dx (e_i - e_{i+1})/(u_{i+1} - u_i), from the end where exp(-u) is larger, so that the
+    # other factor, (1 - exp(-|du|))/|du|, is at most 1; it is 1 where u does not change.
+    first, second = eye[0] + segment[0], eye[1] + segment[1]
     change = dr.abs(depth + (segment[1] - segment[0]))
     _, less = exp_expm1_bounded(-change)
-    return depth * exp_bounded(-dr.minimum(first, last)) * dr.select(change > 0, -less / change, 1)
+    return (
+        depth * exp_bounded(-dr.minimum(first, second)) * dr.select(change > 0, -less / change, 1)
+    )
 
 
 def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
@@ -300,9 +322,10 @@ def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, 
     a point, by channel [1].
     """
     Color = type(rays.clouds.albedo)
-    seen = dr.isfinite(rays.end)
-    place = rays.origin + rays.direction * dr.select(seen, rays.end, 0)
-    return dr.select(seen, Color(*(dr.exp(-depth) for depth in segment(place, seen))), 1)
+    # Rays that meet no surface end at infinity: their place is the origin, and counts for nothing.
+    mask = dr.isfinite(rays.end)
+    place = rays.origin + rays.direction * dr.select(mask, rays.end, 0)
+    return dr.select(mask, Color(*(dr.exp(-depth) for depth in segment(place, mask))), 1)
 
 
 def sky_behind(lights: Sequence[Light], distance, Color) -> PerRay | None:

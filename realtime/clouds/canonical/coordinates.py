@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The coordinates of the canonical transport, and which factors of the light of a
-slab its grid leaves out.
+"""The coordinates of the canonical transport, and the factors of the light of a slab that its
+grid leaves out.
 
 **The eight sets of orders of Bouthors 2008, section 5.1**, and the layers of images by
 set; order 1 stands apart.
 
-**The phase function scattered n times**, P_s: the mean over the orders of a set.
+**The phase function of n scatterings**, P_s: the mean over the orders of a set.
 
 **The coordinates**, so that few entries serve:
 
@@ -15,15 +15,15 @@ set; order 1 stands apart.
     direction    asin(mu)/pi + 1/2
     azimuth      phi/pi
 
-**The effect of an order by itself.** With n the first order of a set and m the mean of
-its orders, each less 1,
+**The steep powers of an order.** With n the first order of a set and m the mean of its orders, each
+less 1, the light of the set has the factor exp(r),
 
     r = n log(t/(t + 0.02)) + m log(1 + d/m) - d        (31-inf: the first term alone):
 
 thin slabs scatter with the power n of their thickness, and deep in thick ones the light of an order
 is d^m exp(-d), as in Poisson's distribution.
 
-**Interpolation on simplices:** the entries around a place of a regular grid, and what each counts.
+**Interpolation on simplices:** the entries around a place of a regular grid, and their weights.
 
 With the fractions f of the place in its cell sorted so that f_1 >= f_2 >= .., and the
 strides s_i in that order,
@@ -92,8 +92,6 @@ def order_layer(order: int) -> str:
 Array = NDArray[Any]
 
 ENTRIES = 1025  #: at even angles from 0 to pi
-_DEGREES = 800
-_LEAST = 1e-3  #: of the mean, below which nothing is divided by it
 
 
 def repeated_scattering(phase: SlabPhase) -> Array:
@@ -102,21 +100,29 @@ def repeated_scattering(phase: SlabPhase) -> Array:
     n scatterings of a beam without a boundary multiply Legendre moments: the mean over the orders
     of a set of sum (2 l + 1) chi_l^n P_l. The set without end counts as isotropic.
     """
+    degrees = 800
     cosines = np.cos(np.linspace(0.0, np.pi, ENTRIES))
-    moments = phase.moments(_DEGREES)
+    moments = phase.moments(degrees)
+    # The coefficients (2 l + 1) <chi_l^n> of each set.
     series = []
     for first, last in SETS:
         if math.isfinite(last):
             powers = np.mean([moments**order for order in range(first, int(last) + 1)], axis=0)
         else:
-            powers = np.eye(1, _DEGREES)[0]
-        series.append((2 * np.arange(_DEGREES) + 1) * powers)
-    before, now = np.zeros_like(cosines), np.ones_like(cosines)
+            powers = np.eye(1, degrees)[0]
+        series.append((2 * np.arange(degrees) + 1) * powers)
+    # The sums over l of all sets at once, P_l by its recurrence.
+    lower, legendre = np.zeros_like(cosines), np.ones_like(cosines)
     total = np.zeros((len(SETS), ENTRIES))
     for degree, strengths in enumerate(np.array(series).T):
-        total += strengths[:, None] * now
-        before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
-    return np.maximum(total, _LEAST)
+        total += strengths[:, None] * legendre
+        lower, legendre = (
+            legendre,
+            ((2 * degree + 1) * cosines * legendre - degree * lower) / (degree + 1),
+        )
+    # The radiance of slabs is divided by P_s, which counts as this fraction of the mean at least.
+    least = 1e-3
+    return np.maximum(total, least)
 
 
 def at_angle(table: Array, cosines: Array) -> Array:
@@ -130,13 +136,13 @@ THINNEST, THICKEST = 0.01, 200.0
 LOWEST_SUN = 0.02
 THICKNESS_SHIFT = 0.02
 DEPTH_SCALE = 0.1
-HORIZON = 1e-4  #: cosine of the entries at mu = 0
 
 
 def thicknesses(count: int) -> Array:
     """Return thicknesses at even steps [mean free paths]."""
     low, high = np.log(np.array([THINNEST, THICKEST]) + THICKNESS_SHIFT)
     values = np.exp(np.linspace(low, high, count)) - THICKNESS_SHIFT
+    # The ends without the rounding of logarithm and exponential.
     values[0], values[-1] = THINNEST, THICKEST
     return values
 
@@ -163,11 +169,12 @@ def depths(count: int, t: float) -> Array:
     """Return depths at even steps of their coordinate; the ends are just inside, where
     the source has its limit.
     """
-    wanted = np.linspace(0.0, 1.0, count)
+    targets = np.linspace(0.0, 1.0, count)
     low, high = np.zeros(count), np.full(count, t)
+    # The coordinate grows with the depth: it is inverted by halving, to the rounding of a depth.
     for _ in range(80):
         middle = (low + high) / 2
-        above = depth_coordinate(middle, t) < wanted
+        above = depth_coordinate(middle, t) < targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     values = (low + high) / 2
     values[0], values[-1] = 1e-4 * t, (1 - 1e-4) * t
@@ -177,6 +184,7 @@ def depths(count: int, t: float) -> Array:
 def steep_powers(number: int, t: float, d: Array) -> Array:
     """Return r of a set at depths in a slab."""
     first, last = SETS[number]
+    # n and m of the derivation are orders less 1.
     thin = (first - 1) * np.log(t / (t + THICKNESS_SHIFT))
     if not math.isfinite(last):
         return np.full_like(d, thin)
@@ -188,6 +196,7 @@ def way_behind(d: Array, t: float, mu: Array) -> Array:
     """Return the way L from points back to where the line of sight enters
     the slab [mean free paths].
     """
+    # A line of sight at the horizon never leaves the slab.
     return np.where(mu < 0, d, t - d) / np.maximum(np.abs(mu), 1e-9)
 
 
@@ -195,6 +204,8 @@ def place_fractions(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
     """Return the coordinates of thickness, depth and the cosine of the sun's
     zenith angle, from 0 to 1.
     """
+    # The logarithm of the thickness, the ratio of logarithms of depths, and the root of the sun's
+    # height: the module docstring's coordinates, from the first entry to the last.
     low, high = (math.log(end + THICKNESS_SHIFT) for end in (THINNEST, THICKEST))
     upper, lower = (dr.log(1 + length / DEPTH_SCALE) for length in (d, t - d))
     low_sun = lowest_sun_coordinate()
@@ -205,14 +216,6 @@ def place_fractions(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
     )
 
 
-#: Networks that sort so many numbers by comparisons of pairs.
-_NETWORKS = {
-    2: ((0, 1),),
-    3: ((0, 2), (0, 1), (1, 2)),
-    5: ((0, 3), (1, 4), (0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (3, 4), (2, 3)),
-}
-
-
 def around(
     places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0
 ) -> list[tuple[Any, Any]]:
@@ -221,6 +224,8 @@ def around(
     `places`: coordinates from 0 to 1; two, three or five; `sides`: entries along each, the last of
     which lie side by side; `first`: index of the first entry.
     """
+    # The entry with the lowest indices around the place, and by axis the fraction f of the place in
+    # its cell with the stride to the next entry.
     base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []
     for axis, (place, side) in enumerate(zip(places, sides, strict=True)):
@@ -228,11 +233,19 @@ def around(
         stride = math.prod(sides[axis + 1 :])
         base += cell * stride
         pairs.append((fraction, mi.UInt32(stride)))
-    for first, second in _NETWORKS[len(pairs)]:
+    # Sorted so that f_1 >= f_2 >= ..: networks compare the same pairs of axes in all lanes.
+    networks = {
+        2: ((0, 1),),
+        3: ((0, 2), (0, 1), (1, 2)),
+        5: ((0, 3), (1, 4), (0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (3, 4), (2, 3)),
+    }
+    for first, second in networks[len(pairs)]:
         (a, p), (b, q) = pairs[first], pairs[second]
-        less = a < b
-        pairs[first] = dr.select(less, b, a), dr.select(less, q, p)
-        pairs[second] = dr.select(less, a, b), dr.select(less, p, q)
+        swap = a < b
+        pairs[first] = dr.select(swap, b, a), dr.select(swap, q, p)
+        pairs[second] = dr.select(swap, a, b), dr.select(swap, p, q)
+    # From corner to corner of the simplex, along the axis of the largest fraction first; the weight
+    # of a corner is the difference of two neighbouring fractions, from 1 down to 0.
     entries, before = [], type(pairs[0][0])(1)
     for fraction, stride in pairs:
         entries.append((base, before - fraction))
@@ -244,7 +257,7 @@ def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> An
     """Return the phase function of a scene by its values.
 
     `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below
-    `CUT` is cut to zero: then lengths are those of the medium whose density is lowered by
+    `CUT` is cut to zero: lengths then belong to the medium whose density is lowered by
     `fraction_of_peak`.
     """
     edge = np.deg2rad(CUT)
@@ -258,6 +271,7 @@ def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> An
 
 def fraction_of_peak(phase: Phase, types: ArrayTypes) -> float:
     """Return the fraction of the light [1] that a phase function scatters by less than `CUT`."""
+    # (1/2) int_0^edge p sin(angle) d(angle), with Gauss nodes in the peak alone.
     nodes, weights = np.polynomial.legendre.leggauss(200)
     edge = np.deg2rad(CUT)
     angles = edge * (nodes + 1) / 2
@@ -265,5 +279,6 @@ def fraction_of_peak(phase: Phase, types: ArrayTypes) -> float:
 
 
 def _values(phase: Phase, types: ArrayTypes, angles: Array) -> Array:
+    # Kernels evaluate phase functions from sin^2 and cos^2 of half the angle.
     down, up = (types.scalar(function(angles / 2) ** 2) for function in (np.sin, np.cos))
     return np.array(phase.evaluate_half(down, up), dtype=np.float64)

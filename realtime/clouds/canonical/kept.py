@@ -2,14 +2,14 @@
 """Numbers of slabs kept on disk, whole or not at all, in the folder and under the names that
 `airlight doctor` lists.
 
-The folder is that of `reference/storage/cache.py`, which this side does not import:
-AIRLIGHT_CACHE_DIR, or `airlight` in the user's cache folder. A file that is damaged, which the
-checksums of its archive tell, or from elsewhere counts as none. With AIRLIGHT_CACHE_SIZE=0 nothing
-is kept, and nothing read.
+The folder is the one of `reference/storage/cache.py`, which this side does not import:
+AIRLIGHT_CACHE_DIR, or `airlight` in the user's cache folder. A damaged file, which the checksums of
+its archive tell, and a file from elsewhere count as none. With AIRLIGHT_CACHE_SIZE=0 nothing is
+kept, and nothing read.
 
 The name of a file tells how numbers were made, and of which medium: by the moments of its phase
-function and its albedo, to the last bit. With the numbers of a medium that is nearly the same an
-image would depend on what was rendered before.
+function and its albedo, to the last bit. If numbers of a medium that is nearly the same were taken,
+an image would depend on earlier ones.
 """
 
 import os
@@ -30,19 +30,18 @@ from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]
 
-#: those that tell phase functions apart: as many as the quadrature of `AnglePhase` resolves
-_MOMENTS = 300
-
 
 def _folder() -> Path:
-    own = os.environ.get("AIRLIGHT_CACHE_DIR")
+    named = os.environ.get("AIRLIGHT_CACHE_DIR")
     base = os.environ.get("XDG_CACHE_HOME")
-    return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "airlight"
+    return Path(named) if named else (Path(base) if base else Path.home() / ".cache") / "airlight"
 
 
 def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
     """Return the key of a medium: moments of its phase function, and its albedo."""
-    return np.append(phase.moments(_MOMENTS), albedo)
+    # As many moments as the quadrature of `AnglePhase` resolves tell phase functions apart.
+    count = 300
+    return np.append(phase.moments(count), albedo)
 
 
 def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
@@ -83,6 +82,8 @@ def keep(digest: str, medium: Array, arrays: Mapping[str, Any]) -> None:
     buffer = BytesIO()
     np.savez(buffer, **arrays)
     path = _path(digest, medium)
+    # The archive is written beside its place and then moved there, so that nobody reads half of it;
+    # two processes that compute the same numbers have files of their own until then.
     temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex}.npz")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -27,13 +27,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_GROWTH = 0.7  #: width of a panel over its distance from the boundary
-#: of a panel, in mean free paths, where the distance from the boundaries is not over _DEEP
-_WIDEST = 1.25
-_DEEP, _DEEP_GROWTH = 50.0, 0.03
-_NEGLIGIBLE = 60.0  #: exp(-60) is below the rounding of 1
-_CONVOLUTION_NODES = 48
-
 
 @dataclass(frozen=True)
 class DepthPanels:
@@ -54,7 +47,7 @@ def depth_panels(
     *,
     depths: Sequence[float] = (),
     count: int = 8,
-    widest: float = _WIDEST,
+    widest: float = 1.25,
 ) -> DepthPanels:
     """Return panels for a slab.
 
@@ -63,23 +56,28 @@ def depth_panels(
     are known there; `count`: nodes of each panel; `widest`: width of a panel at most, where the
     distance from the boundaries is not over 50 [mean free paths].
     """
+    # From the boundary inwards panels are as wide as `growth` times their distance from it, but at
+    # least `narrowest` and at most `widest`; far inside that limit grows, too.
+    growth, deep, deep_growth = 0.7, 50.0, 0.03
     half = [0.0]
     while half[-1] < tau / 2:
-        limit = max(widest, _DEEP_GROWTH * (half[-1] - _DEEP))
-        half.append(half[-1] + min(max(narrowest, _GROWTH * half[-1]), limit))
+        limit = max(widest, deep_growth * (half[-1] - deep))
+        half.append(half[-1] + min(max(narrowest, growth * half[-1]), limit))
+    # The last edge lies beyond the middle: all are drawn in, so that it meets its mirror image.
     upper = np.array(half) * (tau / 2 / half[-1])
     edges = np.unique(
         np.concatenate([upper, tau - upper, np.asarray(depths, dtype=np.float64), [0.0, tau]])
     )
-    # An edge that rounding put beside another, not a depth that was asked for, is left out.
-    keep = [0.0]
-    wanted = {0.0, float(tau), *map(float, depths)}
+    # Where rounding puts two edges side by side, the one that is not a requested depth is left out:
+    # callers look their depths up among the edges.
+    distinct = [0.0]
+    requested = {0.0, float(tau), *map(float, depths)}
     for edge in edges[1:]:
-        if edge - keep[-1] > 1e-12 * tau:
-            keep.append(float(edge))
-        elif float(edge) in wanted:
-            keep[-1] = float(edge)
-    edges = np.array(keep)
+        if edge - distinct[-1] > 1e-12 * tau:
+            distinct.append(float(edge))
+        elif float(edge) in requested:
+            distinct[-1] = float(edge)
+    edges = np.array(distinct)
     edges[0], edges[-1] = 0.0, tau
     nodes, _ = leggauss(count)
     return DepthPanels(
@@ -97,6 +95,7 @@ class Transport:
 
     def __init__(self, panels: DepthPanels, mu: Array, number: type = np.float64):
         self.panels = panels
+        # Directions by side, upward ones first, and the way back to the order of the caller.
         self._order = np.concatenate([np.flatnonzero(mu > 0), np.flatnonzero(mu < 0)])
         self._back = np.argsort(self._order)
         above = int((mu > 0).sum())
@@ -105,13 +104,16 @@ class Transport:
             if side.start == side.stop:
                 continue
             cosines = np.abs(mu[self._order[side]])
+            # Upward light meets the panels from the bottom, so that their widths come in reverse.
             weights, fade = panel_weights(
                 np.diff(panels.edges)[::-sign], cosines, panels.nodes.shape[1]
             )
-            # The weights of the sources, and in the last row those of light that
-            # enters: (P, J, K + 1, K + 1).
-            both = np.moveaxis(np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1)
-            self._sides.append((sign, side, np.ascontiguousarray(both.astype(number))))
+            # From sources at the K nodes and light that enters, in the last column, to the K nodes
+            # and the far edge, in the last row: (P, J, K + 1, K + 1).
+            weights_and_fade = np.moveaxis(
+                np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1
+            )
+            self._sides.append((sign, side, np.ascontiguousarray(weights_and_fade.astype(number))))
 
     def __call__(self, source: Array) -> tuple[Array, Array]:
         """Return the radiance of a source, at nodes and edges.
@@ -121,6 +123,8 @@ class Transport:
         """
         fields, depths, directions = source.shape
         shape = *self.panels.nodes.shape, directions, fields
+        # (F, Z, J) to (P, K, J, F): panels first, as `sweep` goes from one to the next, and fields
+        # last, as the columns of its products.
         ordered = np.ascontiguousarray(source[..., self._order].transpose(1, 2, 0)).reshape(shape)
         radiance, edges = self.sweep(ordered, range(len(self.panels.edges)), inside=True)
         nodes = radiance.reshape(depths, directions, fields)
@@ -129,44 +133,54 @@ class Transport:
     def sweep(self, source: Array, places: Sequence[int], *, inside: bool) -> tuple[Array, Array]:
         """Return the radiance of a source (P, K, J, F) at its nodes, and at edges, (D, J, F).
 
-        Directions are those that go up, and then the others. `inside` says
-        whether the nodes are wanted.
+        Upward directions come first, then the others. `places`: numbers of the edges, (D,);
+        `inside`: whether radiance at the nodes is needed.
         """
         panels, nodes, directions, count = source.shape
         radiance = np.empty_like(source) if inside else source[:0]
-        wanted = np.zeros((len(places), directions, count), source.dtype)
+        at_edges = np.zeros((len(places), directions, count), source.dtype)
+        # All directions of a side march from panel to panel, from the boundary where no light
+        # enters.
         for sign, side, weights in self._sides:
-            given = np.zeros((side.stop - side.start, nodes + 1, count), source.dtype)
-            result = np.empty_like(given)
+            # The input of a panel: its sources at K nodes, and in the last row the light that
+            # enters, 0 at the first panel.
+            inputs = np.zeros((side.stop - side.start, nodes + 1, count), source.dtype)
+            outputs = np.empty_like(inputs)
             for step in range(panels):
                 panel = panels - 1 - step if sign > 0 else step
                 # Upward light runs through the nodes backwards; the nodes of a panel are symmetric.
-                given[:, :nodes] = source[panel, ::-sign, side].transpose(1, 0, 2)
-                np.matmul(weights[step], given, out=result)
+                inputs[:, :nodes] = source[panel, ::-sign, side].transpose(1, 0, 2)
+                np.matmul(weights[step], inputs, out=outputs)
                 if inside:
-                    radiance[panel, ::-sign, side] = result[:, :nodes].transpose(1, 0, 2)
-                given[:, nodes] = result[:, nodes]
+                    radiance[panel, ::-sign, side] = outputs[:, :nodes].transpose(1, 0, 2)
+                # The light at the far edge enters the next panel.
+                inputs[:, nodes] = outputs[:, nodes]
+                # The far edge of a panel is its upper one for upward light.
                 edge = panel if sign > 0 else panel + 1
                 for number, at in enumerate(places):
                     if at == edge:
-                        wanted[number, side] = given[:, nodes]
-        return radiance, wanted
+                        at_edges[number, side] = inputs[:, nodes]
+        return radiance, at_edges
 
 
 def panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:
     """Return (P, K + 1, K, J) weights of the source, and (P, K + 1, J) exponentials, at
     the nodes and the far edge.
     """
+    # exp(-60) is below the rounding of 1.
+    negligible, convolution_nodes = 60.0, 48
+    # Panels of one width share their weights: W different widths.
     widths, index = np.unique(all_widths, return_inverse=True)
     reference, _ = leggauss(count)
     places = np.append((reference + 1) / 2, 1.0)
-    y01, y_weights = leggauss(_CONVOLUTION_NODES)
-    # (W, J, K + 1): depths over the cosine
+    y01, y_weights = leggauss(convolution_nodes)
+    # Y = s/|mu| at the nodes and the far edge, (W, J, K + 1); the integral over y ends there.
     reach = widths[:, None, None] * places / mu[:, None]
-    longest = np.minimum(reach, _NEGLIGIBLE)
+    longest = np.minimum(reach, negligible)
     y = longest[..., None] * (y01 + 1) / 2
     s = places[:, None] - y * (mu[:, None, None] / widths[:, None, None, None])  # in panel widths
     kernel = np.exp(-y) * y_weights * (longest[..., None] / 2)
+    # From values at the nodes to coefficients of Legendre polynomials.
     inverse = np.linalg.inv(np.polynomial.legendre.legvander(reference, count - 1))
     # int exp(-y) P_l(2 s - 1) dy, then from coefficients to values at the nodes
     basis = np.polynomial.legendre.legvander(2 * s - 1, count - 1)

@@ -7,7 +7,7 @@ the addition theorem gives
     P(cos Theta) = sum_m exp(i m (phi - phi')) K_m(mu, mu'),
     K_m(mu, mu') = sum_{l >= |m|} (2 l + 1) chi_l L_l^m(mu) L_l^m(mu'),    L_l^m = sqrt((l - m)!/(l + m)!) P_l^m.
 
-N cosines in each hemisphere integrate polynomials of degree 2 N - 1, so only l < 2 N can be kept.
+N cosines in each hemisphere integrate polynomials of degree 2 N - 1 and therefore resolve l < 2 N.
 The rest is close to forward and becomes an exact peak (delta-M, Wiscombe 1977): with f = chi_{2N}
 
     P = 2 f delta(1 - cos Theta) + (1 - f) P',    (1 - f) chi'_l = chi_l - f.
@@ -44,8 +44,8 @@ values keep small k to k_max times the rounding; eigenvalues k^2 (Stamnes and Sw
 keep k^2 to k_max^2 times the rounding, and thick slabs that absorb nothing would lose 1e-5 of their
 light.
 
-At albedo 1 one k is 0. The albedo is kept 1e-12 below 1, which costs a slab of
-thickness tau about 1e-12 tau.
+At albedo 1 one k is 0. The albedo is therefore 1 - 1e-12 at most, which costs a slab of thickness
+tau about 1e-12 tau.
 """
 
 import math
@@ -65,7 +65,7 @@ class Streams:
     """Cosines and weights of a double-Gauss rule."""
 
     mu: Array  #: (2 N,), first upwards (mu > 0), then downwards
-    weights: Array  #: (2 N,), those of each hemisphere sum to 1
+    weights: Array  #: (2 N,), with the sum 1 in each hemisphere
 
     @property
     def sines(self) -> Array:
@@ -104,16 +104,12 @@ def legendre_table(m: int, degrees: int, mu: Array) -> Array:
 
 
 def mode_kernel(m: int, moments: Array, to: Array, source: Array) -> Array:
-    """Return K_m between the cosines `to` and `source`, (to, source), for
-    the moments that are given.
+    """Return K_m between the cosines `to` and `source`, (to, source), of a phase function with
+    some moments.
     """
     degrees = moments.size
     strengths = (2 * np.arange(degrees) + 1) * moments
     return (legendre_table(m, degrees, to).T * strengths) @ legendre_table(m, degrees, source)
-
-
-#: The largest albedo of the direct solution.
-LARGEST_ALBEDO = 1 - 1e-12
 
 
 class Eigenmodes:
@@ -128,18 +124,24 @@ class Eigenmodes:
 
         half = streams.mu.size // 2
         mu, weights = streams.mu[:half], streams.weights[:half]
-        albedo = min(albedo, LARGEST_ALBEDO)
+        # At albedo 1 one k would be 0, and the cosine 1/k of its line infinite.
+        albedo = min(albedo, 1 - 1e-12)
+        # Scattering from all streams into the upward ones, scaled by the roots of both weights, so
+        # that it is symmetric: a, into the same hemisphere, and b, into the other, plus the peak.
         root = np.sqrt(weights)
         kernel = (
             albedo / 2 * root[:, None] * mode_kernel(m, moments, mu, streams.mu) * np.tile(root, 2)
         )
         same, other = kernel[:, :half], kernel[:, half:]
         same = same + albedo * peak * np.eye(half)
+        # L and M, with A = L L^T and B = M M^T.
         scale = 1 / np.sqrt(mu)
         lower = scale[:, None] * cholesky(np.eye(half) - same + other, lower=True)
         partner = scale[:, None] * cholesky(np.eye(half) - same - other, lower=True)
+        # M^T L = U k V^T.
         _, rates, right = np.linalg.svd(partner.T @ lower)
         self.rates: Array = rates
+        # q~ = sqrt(w/mu) q, and back p = p~/sqrt(w mu); p~ = L V P and r~ = L^{-T} V R.
         self._in = np.sqrt(weights / mu)
         self._out = 1 / np.sqrt(weights * mu)
         self._sums = lower @ right.T
@@ -155,6 +157,8 @@ class Eigenmodes:
         source of radiance, (.., 2 N).
         """
         up, down = np.split(source, 2, axis=-1)
+        # Along its line of cosine 1/k, e+ has the source g_p + g_r/k, and e- along the other g_p -
+        # g_r/k.
         g_p = ((up - down) * self._in) @ self._differences
         g_r = ((up + down) * self._in) @ self._sums
         return np.concatenate([g_r / self.rates + g_p, g_p - g_r / self.rates], axis=-1)
@@ -162,6 +166,7 @@ class Eigenmodes:
     def radiance(self, along: Array) -> Array:
         """Return the radiances of e+ and e-, both (.., 2 N)."""
         plus, minus = np.split(along, 2, axis=-1)
+        # P = (e+ - e-)/(2 k) and R = (e+ + e-)/2; then u = (p + r)/2 and d = (p - r)/2.
         p = ((plus - minus) / (2 * self.rates)) @ self._sums.T * self._out
         r = ((plus + minus) / 2) @ self._differences.T * self._out
         return np.concatenate([(p + r) / 2, (p - r) / 2], axis=-1)
@@ -170,10 +175,11 @@ class Eigenmodes:
         """Return the radiance at the nodes that a source makes with all that is scattered
         again, (F, Z, 2 N) both.
 
-        `transport` is that of the panels along the lines of `cosines`.
+        `transport`: through the panels along the lines of `cosines`.
         """
         along, edges = transport(self.decoupled(source))
         half, panels = self.rates.size, transport.panels
+        # e+ leaves at the top, e- at the bottom, as their sources alone make them.
         ends = edges[:, 0, :half], edges[:, -1, half:]
         return self.radiance(self.closed(along, panels.depths, float(panels.edges[-1]), *ends))
 
@@ -188,6 +194,8 @@ class Eigenmodes:
             ends.T[..., None, :] for ends in self._entering(tau, top.T, bottom.T)
         )
         plus, minus = np.split(along, 2, axis=-1)
+        # Without sources e+ falls like exp(-k (tau - z)) from the bottom, e- like exp(-k z) from
+        # the top.
         plus = plus + from_bottom * np.exp(-self.rates * (tau - depths[:, None]))
         return np.concatenate(
             [plus, minus + from_top * np.exp(-self.rates * depths[:, None])], axis=-1
@@ -197,8 +205,11 @@ class Eigenmodes:
         """Return e+ at the bottom and e- at the top, (N, ..), for which no
         light enters from outside.
         """
-        fade, lost = np.exp(-self.rates * tau), -np.expm1(-self.rates * tau)
+        # The conditions u = 0 at the bottom and d = 0 at the top, with p = x (e+ - e-) and r = y
+        # (e+ + e-): their difference and their sum hold the difference and the sum of both unknowns
+        # alone.
+        fade, opacity = np.exp(-self.rates * tau), -np.expm1(-self.rates * tau)
         x, y = self._sums / (2 * self.rates), self._differences / 2
-        difference = np.linalg.solve(x * (1 + fade) + y * lost, (x - y) @ (bottom - top))
-        sum_ = np.linalg.solve(x * lost + y * (1 + fade), (x - y) @ (bottom + top))
+        difference = np.linalg.solve(x * (1 + fade) + y * opacity, (x - y) @ (bottom - top))
+        sum_ = np.linalg.solve(x * opacity + y * (1 + fade), (x - y) @ (bottom + top))
         return (sum_ + difference) / 2, (sum_ - difference) / 2

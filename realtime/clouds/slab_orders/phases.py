@@ -17,9 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-#: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
-_PANEL, _PANEL_NODES = np.deg2rad(0.5), 8
-
 
 class SlabPhase(Protocol):
     """A phase function: its values and its moments."""
@@ -62,14 +59,18 @@ class AnglePhase:
         """Cosines of angles by Gauss nodes between the breaks, and weights of the
         mean of P over the sphere.
         """
-        nodes, weights = leggauss(_PANEL_NODES)
+        # A wave of P_l is 1.2 degrees long at l = 300: eight nodes in half a degree resolve it.
+        panel, panel_nodes = np.deg2rad(0.5), 8
+        nodes, weights = leggauss(panel_nodes)
+        # Equal panels between every two breaks; the last edge of all is added at the end.
         parts = [
-            np.linspace(low, high, max(2, int(np.ceil((high - low) / _PANEL)) + 1))[:-1]
+            np.linspace(low, high, max(2, int(np.ceil((high - low) / panel)) + 1))[:-1]
             for low, high in pairwise(self.breaks)
         ]
         edges = np.append(np.concatenate(parts), self.breaks[-1])
         width = np.diff(edges)[:, None]
         angles = (edges[:-1, None] + width * (nodes + 1) / 2).reshape(-1)
+        # (1/2) P sin(angle) d(angle), where the map of a panel to [-1, 1] has the factor width/2.
         fractions = np.sin(angles) * (width / 4 * weights).reshape(-1) * self.heights(angles)
         return np.cos(angles), fractions
 
@@ -81,10 +82,14 @@ class AnglePhase:
         """Return the moments by quadrature."""
         cosines, fractions = self._nodes
         moments = np.empty(count)
-        before, now = np.zeros_like(cosines), np.ones_like(cosines)
+        # P_0 = 1, and P_{-1}, which counts 0 times; (l + 1) P_{l+1} = (2 l + 1) c P_l - l P_{l-1}.
+        lower, legendre = np.zeros_like(cosines), np.ones_like(cosines)
         for degree in range(count):
-            moments[degree] = fractions @ now
-            before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
+            moments[degree] = fractions @ legendre
+            lower, legendre = (
+                legendre,
+                ((2 * degree + 1) * cosines * legendre - degree * lower) / (degree + 1),
+            )
         return moments / self._mean
 
     def values(self, cosines: ArrayLike) -> Array:
