@@ -108,10 +108,16 @@ class FrameTimes:
         "frame", "ms", "a whole frame while nothing moves: shadow maps or planes are there"
     )
     airlight: Timing | None = column(
-        "airlight", "ms", "the airlight, with the surfaces where the method knows their shadows", default=None
+        "airlight",
+        "ms",
+        "the airlight, with the surfaces where the method knows their shadows",
+        default=None,
     )
     surface: Timing | None = column(
-        "rays + surface", "ms", "camera rays, and the surfaces where shadow rays light them", default=None
+        "rays + surface",
+        "ms",
+        "camera rays, and the surfaces where shadow rays light them",
+        default=None,
     )
     light_moved: Timing | None = column(
         "light moved",

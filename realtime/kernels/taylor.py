@@ -201,10 +201,11 @@ def _integrated(geometry: RayGeometry, ends, angles, coefficients):
     """Integrate the polynomial between two angles in closed form."""
     (s0, s1), (theta0, theta1) = ends, angles
     h = geometry.height
-    # theta1 - theta0 as one arc tangent, so that short segments do not cancel. Where s0 s1
+    # theta1 - theta0 as one arc tangent, so that short segments do not cancel. Where a product
     # overflows the segment is long, and the difference of both angles serves.
-    bounded = dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h))
-    difference = dr.select(dr.isfinite(s0 * s1), bounded, theta1 - theta0)
+    across, along = h * (s1 - s0), dr.fma(s0, s1, h * h)
+    bounded = dr.isfinite(across) & dr.isfinite(along)
+    difference = dr.select(bounded, dr.atan2(across, along), theta1 - theta0)
     # theta1^(n+1) - theta0^(n+1) is the difference times the sum over k of theta1^k theta0^(n-k).
     # `powers` is that sum, and grows from one degree to the next by one product.
     total, powers, power0 = type(h)(0), type(h)(1), type(h)(1)

@@ -115,10 +115,11 @@ class Unshadowed(Method):
         if self.form != "quilez":
             return radiance
         # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel.
-        # Up to tau = 1e-4, where the divisor cancels, the quotient 1 + tau/2 is taken for 1.
+        # Up to tau = 1e-3, where the divisor cancels, the first terms of the quotient's series.
         depths = medium.optical_depth(view, 0, end)
         corrections = [
-            dr.select(tau > 1e-4, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), 1) for tau in depths
+            dr.select(tau > 1e-3, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), dr.fma(0.5, tau, 1))
+            for tau in depths
         ]
         return radiance * medium.colour(corrections)
 

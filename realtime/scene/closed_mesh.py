@@ -93,8 +93,8 @@ def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
     forward, backward = tail * count + head, head * count + tail
     _, first, met = np.unique(forward, return_index=True, return_counts=True)
     if np.any(met > 1):
-        at = first[int(np.argmax(met > 1))]
-        times = int(met.max())
+        edge = int(np.argmax(met > 1))
+        at, times = first[edge], int(met[edge])
         raise _open(mesh, tail[at], head[at], f"{times} triangles run along it the same way")
     alone = np.flatnonzero(~np.isin(forward, backward))
     if len(alone):

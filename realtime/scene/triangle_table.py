@@ -110,7 +110,7 @@ def _is_plain(shape) -> bool:
     if not shape.is_mesh() or shape.face_count() == 0:
         return False
     # A texture, a normal map or another kind of surface has parameters of other names.
-    names = [name.rsplit(("."), 2)[-2:] for name in mi.traverse(shape.bsdf()).keys()]  # noqa: SIM118 (no mapping)
+    names = [name.rsplit(".", 2)[-2:] for name in mi.traverse(shape.bsdf()).keys()]  # noqa: SIM118 (no mapping)
     return names == [["reflectance", "value"]]
 
 

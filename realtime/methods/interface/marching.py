@@ -176,9 +176,8 @@ def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) ->
     light, geometry = airlight.light, airlight.geometry
     # The part of the ray in which the medium scatters, and in it the part in the light's cone or on
     # its side; a light at infinity reaches all of it.
-    x0, x1 = airlight.medium.part(
-        airlight.rays, type(distance)(0), distance, uniform=spacing == "uniform"
-    )
+    uniform = spacing == "uniform" or not light.w
+    x0, x1 = airlight.medium.part(airlight.rays, type(distance)(0), distance, uniform=uniform)
     x0, x1 = geometry.lit_segment(x0, x1) if light.w else (x0, x1)
-    at_light = (geometry.foot, geometry.height) if spacing == "equiangular" and light.w else None
+    at_light = None if uniform else (geometry.foot, geometry.height)
     return steps_between(x0, x1, steps, at_light)

@@ -11,8 +11,10 @@ from airlight.analytic.phase import phase_from_words
 from airlight.realtime.kernels.closed_form import closed_form, scaled_e1
 from airlight.realtime.kernels.exact import exact
 from airlight.realtime.kernels.table import table, table_records
-from airlight.realtime.kernels.taylor import PRINTED_PHASES, taylor, taylor_printed
+from airlight.realtime.kernels.taylor import PRINTED_PHASES, integral_of, taylor, taylor_printed
 from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
 from airlight.validation.kernels.case_files import read_cases
 from tests.helpers.kernel_values import RAY, kernel_values, relative_error, take, true_values
 
@@ -42,6 +44,23 @@ def rays_near_the_foot():
     )
     x0 = foot + height * rng.uniform(-1.2, 0.2, 200)
     return foot, height, x0, x0 + height * rng.uniform(0.01, 1, 200), sigma_t
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_an_unbounded_ray_ends_at_a_right_angle(precision):
+    """A constant has the integral pi/2 - theta0: a product of the ends overflowed, and was taken
+    for an angle of pi/2."""
+    types = array_types(precision)
+    rays = [(2.0, 0.5), (2.0, -0.5), (0.5, 0.25), (7.0, 30.0)]
+    height, foot = (types.scalar(list(values)) for values in zip(*rays, strict=True))
+    light = Light(types.vector(0, 0, 0), types.color(1))
+    whole = integral_of(
+        RayGeometry(foot, height), types.scalar(0), types.scalar(np.inf), light, [1.0]
+    )
+    expected = [np.pi / 2 + np.arctan2(foot, height) for height, foot in rays]
+    np.testing.assert_allclose(
+        np.array(whole), expected, rtol=1e-6 if precision == "single" else 1e-14
+    )
 
 
 @pytest.mark.claim("series-by-two-routes", tolerance="1e-12 relative")

@@ -3,6 +3,8 @@
 shares no code with them.
 """
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -10,11 +12,13 @@ import pytest
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
 from airlight.validation.scenes.parts import mitsuba_mesh
-from tests.helpers.frames import render
+from tests.helpers.frames import read, render, renderer
 from tests.helpers.light_frames import camera, coloured_fog, lamp
 from tests.helpers.occluders import ALL, SOUND
 from tests.helpers.scenes import spot, tiny_scene
 
+#: Places of lights about which a torus has other numbers of wedges [m].
+NEAR, FAR = (0.4, 0.0, 0.9), (-1.0, 1.4, 6.6)
 SHIFT = np.array([0.0, 0.0, 0.9])
 
 
@@ -97,3 +101,19 @@ def test_enclosed_light_is_black(variant):
     frame = render(scene_with(SOUND["sphere"](), lamp=lamp(0.13, -0.07, 1.09)), "shadow-planes")
     assert np.all(frame.airlight == 0)
     assert np.all(frame.surface == 0)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_two_lights_are_the_sum_of_each(variant, first):
+    """The planes of a near light lie in other wedges than those of a far one, and in another
+    number of them: a recording takes no number of the first light for the second one's."""
+    scene = read(scene_with(SOUND["torus"](), lamp=lamp(*NEAR), more=lamp(*FAR)))
+    wedges = [
+        float(np.array(state[0].scale)[0])
+        for state in renderer(scene, "shadow-planes").prepare(scene)
+    ]
+    assert wedges[0] != wedges[1]
+    lights = scene.lights if first == 0 else scene.lights[::-1]
+    whole = render(replace(scene, lights=lights), "shadow-planes").airlight
+    parts = [render(replace(scene, lights=(light,)), "shadow-planes").airlight for light in lights]
+    np.testing.assert_allclose(whole, sum(parts), rtol=1e-5, atol=1e-6 * whole.max())
