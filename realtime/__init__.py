@@ -52,9 +52,43 @@ them.
 6. `rays.py` says where each ray of the view passes the light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
-8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the
-   kernel, `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and that how far a
-   panel may reach (`scene/rule_reach.py`).
+8. The medium (`scene/media/medium.py`) is asked for the integral over each interval. A homogeneous
+   one calls the kernel, `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and
+   that how far a panel may reach (`scene/rule_reach.py`); all others are integrated by
+   `scene/media/integrate.py`.
 9. The surfaces are lit where the planes say so, the renderer adds up what the lights send, and
    `frame/image.py` brings it to the host; `frame/light_on_ray.py` checks that all of it is finite.
+
+**A frame in Python**, of a built-in scene or of what Mitsuba loads:
+
+    from airlight import METHODS, frame_renderer, load_scene, read_scene, render_frame
+    from airlight import KERNELS
+
+    scene = read_scene(load_scene("hall", size=(24, 18)).scene)  # or mi.load_dict(...), "double"
+    renderer = frame_renderer(scene, METHODS["shadow-planes"], kernel=KERNELS["exact"])
+    airlight = render_frame(renderer).airlight  # dataclasses.replace(renderer, run=1): new noise
+
+**A new method** is one file in `methods/` and a line of `_CLASSES` in `methods/registry.py`; without
+that line it is a user's own, `--method FILE.py:Class`. `methods/unshadowed.py` is the model of an
+integral, `methods/equi_angular.py` of random samples. `airlight(view, light, state, kernel)` of
+`methods/interface/method.py` returns the radiance that one light scatters into every ray:
+
+- `rays = view.lit_by(light, kernel)` are the rays with the light. `rays.airlight(x0, x1)` is the
+  integral over lit segments [m], `rays.source(x)` the integrand, `rays.radiance(value)` makes
+  radiance of either.
+- `span = marched_steps(rays, view.distance, n, "equiangular")` (`methods/interface/marching.py`)
+  are n steps; the sample at `x = span.place(u)`, u from `span.begin` on, stands for
+  `span.stretch(x) * span.width` metres.
+- `view.visible(view.at(x), light)` asks a shadow ray, and `view.pattern(self.jitter, stream=k)` is
+  a random number for each ray, new in each frame and run; two streams k are independent.
+- The class says what the frame cannot see: `casts_rays = True` if it asks `visible`, `uses_kernel =
+  False` if it leaves `kernel` alone, `noisy = True` if it asks for random numbers (a parameter
+  `jitter` says it too), `by_rays = True` if no ray reads another one's values, `prepared_from` with
+  what its `prepare` looks at.
+
+**A new medium** is one file in `scene/media/`, whose page lists what it must answer. Every method
+of fog then renders it.
+
+**A new kind of light** is an optional field of `Light` in `scene/lights.py`, whose page lists who
+asks for it; `scene/read_scene.py` makes it of an emitter.
 """

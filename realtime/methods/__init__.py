@@ -2,8 +2,9 @@
 """The methods under test, each a class with its parameters, and a user's own.
 
 A method answers one question: which radiance do the lit media scatter into each camera ray?
-`unshadowed` and `ray_march` are one file each; what needs more has a folder, and none of these
-imports another.
+Each is a file, or a folder where it needs more, and none imports another. They share
+`interface/`: `method.py` is what a frame asks of a method and what a method finds in its view,
+`marching.py` the steps along rays, `media_checks.py` which media are refused.
 
 Read in this order:
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real-time methods by name.
 
-`METHODS` is the registry: add a class to it and every command and report knows it. `find_method`
-also finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog
+`METHODS` is the registry: a line of `_CLASSES`, the module and the class, and every command and
+report knows it. `find_method` also finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog
 loads neither clouds nor shaders.
 """
 

@@ -12,6 +12,20 @@ the media end (`realtime.scene.directional_extent`).
 
 A light sample stands for a part of an area light (`realtime.area_lights`). In the direction w it
 has the intensity I0 max(0, n . w), n its normal: it lights the half space before its plane.
+
+**A new kind of light** is an optional field of `Light`, and lights that have it are tables of their
+own by themselves (`realtime.scene.light_table`). `Light.kind` names it. Who asks:
+
+- `realtime.scene.read_scene` makes it of an emitter; Mitsuba refuses parameters that its plugin does
+  not have, so that a new one needs a plugin, or a word in the emitter's name;
+- an intensity that depends on the direction: set `varies`, and write `RayGeometry.falloff`,
+  `falloff_beside` and `smooth_subsegments`, the places of its kinks, and `profile`, the same for
+  points (`realtime.rays`); every method and kernel asks these;
+- an irradiance that is no intensity over r^2: `LitRays.source`, `realtime.frame.surface` and
+  `froxel_fog.injection` divide by r^2, and `integrate`, `kernels.exact` and `marching` place their
+  nodes by it; `realtime.frame.light_on_ray` refuses a point light on a ray, as it is infinite there;
+- shadow maps (`realtime.shadow_maps.projection`): into which directions it shines;
+- `methods.shader.scene_arrays`: what a user's shader is told of it.
 """
 
 import math

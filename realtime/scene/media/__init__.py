@@ -2,18 +2,22 @@
 """Media: what fills space, and what it answers. Methods find lit intervals and ask
 the medium for the rest.
 
-**A new medium** is a frozen dataclass derived from `Medium` whose fields are Dr.Jit arrays,
-`albedo` and `phase` among them. It must write
+**A new medium** is a frozen dataclass derived from `Medium` whose fields are opaque Dr.Jit arrays
+(`dr.opaque`), `albedo` and `phase` among them. A grey medium that varies derives from
+`VaryingMedium`, which writes `channels`, `vacuum` and `length_of`, and lets all suns in. A medium
+must write
 
-- `channels` and `vacuum`: one extinction or three, and whether a ray can
-  leave the medium without end;
+- `channels` and `vacuum`: one extinction or three, and whether a ray can leave the medium without
+  end; False where `part` gives every ray an end;
 - `extinction(rays, x)`: at distances along rays, by channel;
 - `optical_depth(rays, x0, x1)`: of segments, by channel, in closed form where it has
   one; x1 may be infinite;
 - `longest(rays, light, x, change)`: a length from x on in which both depths and the logarithm of
-  the extinction change by no more than a number together;
+  the extinction change by no more than a number together; an extinction that is linear between
+  bends needs no share in it, even where it begins at 0;
 - `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any;
-- `length_of(depth)`: after which length no uniform step is needed;
+- `length_of(depth)`: after which length no uniform step is needed; where it is infinite, `part`
+  too: from where to where a ray has extinction;
 - `thicker(factor)`: itself, with more extinction.
 
 With these every method of lit intervals, the marchers, soft shafts, froxels, surfaces and user
@@ -32,7 +36,8 @@ density ramp. It may write, because it knows better,
   and is left out of integrals;
 - `mean_source`, `last_depth`, `part`, `ambient`: of froxels, of steps, of a constant field.
 
-`realtime.scene.read_media` makes it from Mitsuba's medium. Point, spot and area lights have a
+`realtime.scene.read_media.read_medium` makes it from Mitsuba's medium; a medium that no file can
+say is returned by a function put in its place. Point, spot and area lights have a
 `position`; a light at infinity (`light.w == 0`) has an `axis`, its rays' direction. Its source is
 not divided by r^2.
 

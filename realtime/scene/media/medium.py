@@ -161,7 +161,8 @@ class Medium(ABC):
         """Return the part of segments [m] in which steps are worth while, 0
         and 0 where there is none.
 
-        `uniform` steps need an end; those in the angle at a light have it at infinity.
+        `uniform` steps, as those of any light at infinity, need an end; steps in the angle at a
+        light have it at infinity.
         """
         # Behind the optical reach nothing is left, and uniform steps would be wasted.
         return x0, dr.minimum(x1, x0 + self.length_of(OPTICAL_REACH)) if uniform else x1
