@@ -2,8 +2,8 @@
 """Real-time methods by name.
 
 `METHODS` is the registry: a line of `_CLASSES`, the module and the class, and every command and
-report knows it. `find_method` also finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog
-loads neither clouds nor shaders.
+report knows it. `find_method` also finds a user's own, which is not in it. A class is loaded when
+it is asked for: a frame of fog loads neither clouds nor shaders.
 """
 
 from collections.abc import Iterator, Mapping
