@@ -84,15 +84,19 @@ def work() -> None:
 
     import drjit as dr
 
-    from airlight.errors import InputError
-    from airlight.realtime.frame.image import render_frame
-    from airlight.realtime.frame.renderer import frame_renderer
-    from airlight.realtime.kernels.registry import KERNELS
-    from airlight.realtime.methods.registry import METHODS, find_method
-    from airlight.realtime.scene.read_scene import read_scene
-    from airlight.reports.machine.environment import activate
-    from airlight.validation.scenes.loading import load_scene
-    from airlight.validation.scenes.registry import SCENES
+    # by the names that a checkout exports: its files may be in other places
+    from airlight import (
+        KERNELS,
+        METHODS,
+        SCENES,
+        InputError,
+        activate,
+        find_method,
+        frame_renderer,
+        load_scene,
+        read_scene,
+        render_frame,
+    )
 
     activate()
     renderer: Any = None
