@@ -100,7 +100,7 @@ def _on_device(value: Any) -> bool:
 
 def _caller() -> str:
     for frame in reversed(traceback.extract_stack()):
-        path = Path(frame.filename)
+        path = Path(frame.filename).resolve()  # `src` holds links
         if path.is_relative_to(ROOT) and path.relative_to(ROOT).parts[0] in FOLDERS:
             return f"{path.relative_to(ROOT).as_posix()}: {frame.name}"
     return "a test"
