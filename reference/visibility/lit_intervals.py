@@ -75,6 +75,7 @@ def before_light(
         largest = max(
             1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max())
         )
+        # A triangle stays if any corner is before the plane by more than rounding.
         before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
         known = replace(known, triangles=known.triangles[before.any(axis=1)])
     return reference, known
@@ -102,9 +103,11 @@ def lit_intervals(
     of = np.arange(len(rays.foot)) if of is None else of
     low, high = _inside(rays, ends, known)
     ray, x0, x1 = lit_parts(rays, (low, high), known.near, known.shapes, of)
+    # An end of a lit interval is an edge between light and shadow unless it is an end of the range.
     inner = x0 > ends[0][ray] + _END * (1 + np.abs(x0)), x1 * (1 + _END) + _END < ends[1][ray]
     transitions = int(inner[0].sum() + inner[1].sum())
     lit = LitIntervals(ray, x0, x1, transitions)
+    # Without shapes no edge is uncertain.
     if not known.shapes.count:
         lit = replace(lit, edge=0.0)
     if not checks:
@@ -125,6 +128,7 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
     if not rays.w:
         return low, high
     for centre, radius in zip(known.shapes.centre, known.shapes.radius, strict=True):
+        # A sphere that holds no part of the light's ball holds none of its samples.
         if np.linalg.norm(centre - known.light.centre) >= radius + known.light.radius:
             continue
         within = np.linalg.norm(rays.position - centre, axis=1) < radius
@@ -136,6 +140,7 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
 
 def reaches(lit: LitIntervals, distance: Array) -> NDArray[np.bool_]:
     """Return by ray whether its last lit interval goes on to a distance, (rays,) [m]."""
+    # The end of each ray's last interval; rays without an interval stay at -inf.
     last = np.full(len(distance), -np.inf)
     np.maximum.at(last, lit.ray, lit.high)
     return last * (1 + _END) + _END >= distance
