@@ -105,6 +105,7 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
             if ours[name].name == "__init__.py":
                 yield from (ours[inside] for part in names if (inside := f"{name}.{part}") in ours)
         return
+    # A module of the user's: its own folder, and the folders of the packages around it.
     folders = [path.parent]
     while (folders[-1] / "__init__.py").exists():
         folders.append(folders[-1].parent)
@@ -113,6 +114,7 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
         if folder.name in ("site-packages", "dist-packages"):
             continue
         for place in (folder.joinpath(*name.split(".")) for name in words):
+            # A name that is mentioned may be a module, a package, or a module in a package.
             package = place / "__init__.py"
             parts = [place / f"{part}.py" for part in words] if package.is_file() else []
             yield from filter(Path.is_file, (place.with_name(f"{place.name}.py"), package, *parts))
