@@ -13,13 +13,13 @@ variance is
     sum_p s_p^2 / n_p,    for a given sum of n_p least where n_p is proportional to s_p:    (sum_p s_p)^2 / sum_p n_p
 
 (Neyman 1934; Cochran 1977, *Sampling Techniques*, eq. 5.26). In fog a few pixels hold nearly all of
-the variance, those that look at or past what is next to a light: equal numbers would spend most
-samples on the others.
+the variance: they look at the surroundings of a light, or past them. Equal numbers would spend most
+samples on the other pixels.
 
-The s_p come from a pilot run of which nothing else is used. Samples that decide where more of them
-go must not be counted themselves: pixels that came out dark by chance would get few more, and the
-mean would be too small. A quarter of the samples is shared out equally, so that a pixel whose pilot
-met nothing at all has at most four times the variance that it would have had.
+The s_p come from a pilot run, which is used for nothing else. Samples that decide how many more a
+pixel gets must not count themselves: a pixel that came out dark by chance would get few more, and
+the mean would be too small. A quarter of the samples is shared out equally, so that a pixel whose
+pilot met nothing at all has at most four times the variance that it would have had.
 """
 
 from collections.abc import Iterable

@@ -71,8 +71,8 @@ def volpath_batch(
     `airlight` is the light that was scattered by the medium alone, any number of times up to
     max_depth - 1, and `surface` all other light: what met a surface at least once. `counts`:
     samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
-    Raises InputError for a scene of which Mitsuba does not know how large it is, under a
-    directional light. Raises ValueError if `samples` or `max_depth` is out of range, or `counts`
+    Raises InputError under a directional light for a scene whose size Mitsuba does not
+    know. Raises ValueError if `samples` or `max_depth` is out of range, or `counts`
     come with another `max_depth` than 2.
 
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin
@@ -256,7 +256,7 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
 def volpath_orders_batch(
     clouds: CloudScene, seed: int, samples: int, *, sets: Sequence[tuple[str, tuple[int, float]]]
 ) -> Batches:
-    """Trace one batch of the layers `airlight`, `surface` and those of sets of orders.
+    """Trace one batch of the layers `airlight`, `surface` and the layers of sets of orders.
 
     `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
     samples a pixel, at most 256; `sets`: names of sets of orders with their first and last order,
@@ -287,6 +287,8 @@ def volpath_orders_batch(
     with black_surfaces(clouds.occluders):
         sums = {order: up_to(order) for order in sorted(ends)}
     airlight = sums[math.inf] - sums[0]
+    # Light that met a surface: all light with the surfaces' own materials less all light with black
+    # ones.
     surface = (
         up_to(math.inf) - sums[math.inf] if clouds.occluders.shapes() else np.zeros_like(airlight)
     )

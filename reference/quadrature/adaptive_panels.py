@@ -2,8 +2,8 @@
 """The sum of smooth pieces of rays for any medium: panels are halved until
 each ray meets a tolerance.
 
-Panels and their rules are those of `analytic.panels`, and so is the variable near a place; under a
-direction it is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
+Panels, their rules, and the variable near a place are as in `analytic.panels`; under a direction
+the variable is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
 albedo sigma_t int exp(-tau) dx [1] of a directional light. A medium states its integrand
 (`Integrand`); lights, tolerances and uncertain edges are known here.
 """
@@ -125,15 +125,15 @@ class _Sum:
         """Integrate panels by both rules, a block at a time so that the
         arrays stay in the cache.
         """
-        both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
+        integrals, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
         # The rule of a panel follows from its width in v. A panel in x counts as wide as its
         # optical depth divided by 2.
         size = width if self.rays.w else width * self.integrand.extinction[piece] / (10 * 0.2)
         for pair, block in blocks_by_rule(size, 8192):
-            both[:, block], noise[block] = self.evaluate_block(
+            integrals[:, block], noise[block] = self.evaluate_block(
                 pair, piece[block], start[block], width[block]
             )
-        return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
+        return Panels(piece, start, width, integrals[0], np.abs(integrals[0] - integrals[1]), noise)
 
     def evaluate_block(
         self, pair: Pair, rows: Index, start: Array, width: Array
@@ -146,10 +146,10 @@ class _Sum:
         scale = half[:, None] * self.integrand.factor[rows]
         # Nodes are summed by both rules at once, and channels with the same extinction share a
         # column.
-        both = np.moveaxis(np.tensordot(f, pair.weights, (1, 0)), 2, 0)[..., same] * scale
+        integrals = np.moveaxis(np.tensordot(f, pair.weights, (1, 0)), 2, 0)[..., same] * scale
         # The exponential of a depth tau has tau roundings; 16 are for all other operations. The
         # depth at the middle node stands for the panel.
-        return both, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(both[0])
+        return integrals, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(integrals[0])
 
     def at(self, rows: Index, v: Array) -> tuple[Array, Array]:
         """Return the integrand, times dx/r^2 or dx by dv and the profile,

@@ -7,9 +7,9 @@ With the points y on the surface of a light of radiance Le the radiance along a 
     L = albedo sigma_t Le / (4 pi)  int_A int  V p exp(-sigma_t (x + r)) cos_l / r^2  dx dA,
     cos_l = n . (o + x w - y) / r.
 
-The inner integral is that of a point light with a cosine for its profile, cut where the ray passes
-the plane of y and n. It is continuous in y where the visibility from a surface is not, so that few
-samples suffice. Surfaces at the end of a ray receive, from their own samples,
+The inner integral is the integral of a point light with a cosine for its profile, cut where the ray
+passes the plane of y and n. It is continuous in y where the visibility from a surface is not, so
+that few samples suffice. Surfaces at the end of a ray receive, from their own samples,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
@@ -385,10 +385,10 @@ class _View:
                 + (end - 1e-6 * (1 + end))[rows, None] * reference.direction[active[rows]]
             )
             eye = np.repeat(eye, each, axis=0)
-            seen = seen_samples(
+            samples = seen_samples(
                 sections, eye, around, np.repeat(active[rows], each), square[..., 1].ravel()
             )
-            yield rows, point[rows], seen, sections.weight.reshape(-1, each)
+            yield rows, point[rows], samples, sections.weight.reshape(-1, each)
 
 
 def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
@@ -408,9 +408,9 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
         square = np.stack([(np.arange(probes) + 0.5) / probes, np.full(probes, 0.5)], axis=1)
         points = RayPoints(square, np.zeros((len(active), REPLICATES, 2)), "")
         for rows, _, (row, _, weight), whole in _View(beam, points, turn, True).seen(active):
-            seen = np.bincount(row, weight, whole.size).reshape(whole.shape)
+            visible = np.bincount(row, weight, whole.size).reshape(whole.shape)
             # 1e-6 of the solid angle of a section is rounding.
-            hidden[rows] = (seen < (1 - 1e-6) * whole).any(axis=1)
+            hidden[rows] = (visible < (1 - 1e-6) * whole).any(axis=1)
     return hidden
 
 

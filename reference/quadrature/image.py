@@ -6,8 +6,8 @@ A mean over a pixel is a sum over positions in it: eight replicates of a scrambl
 is the standard error, and a pilot that says how many positions a pixel needs. Each pixel has
 positions of its own, so that errors average out over an image (`reference.quadrature.replicates`).
 Near a light the radiance grows as one over the distance to it on the film: the mean over an area is
-finite. Under area lights each replicate has samples of its own of them, and its spread is that of
-both.
+finite. Under area lights each replicate also has light samples of its own: its spread is the
+spread of positions and samples.
 """
 
 from dataclasses import replace
@@ -196,8 +196,8 @@ def _means(
     # alone: `known` is zero.
     centre = ray_values(reference, plan=_LIGHTS, shapes=shapes, **how)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)
-    known = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
-    means, counts = replicate_means(len(corner), known, chosen, sums)
+    other_light = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
+    means, counts = replicate_means(len(corner), other_light, chosen, sums)
     if progress is not None:
         progress(rounds, rounds, "positions in pixels")
     checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))

@@ -57,11 +57,11 @@ def light_airlight(
     (rays,), infinite where there is none [m]; `shadow_scale`: see
     `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
-    found = lit_rays(reference, light, distance, **how)
-    rays, lit, angle = found.rays, found.lit, np.full(len(distance), np.pi)
+    illumination = lit_rays(reference, light, distance, **how)
+    rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
     if isinstance(light, DirectionalLight):
         strength = light.irradiance
-        radiance, bound = _sun_sums(reference, light, found)
+        radiance, bound = _sun_sums(reference, light, illumination)
     else:
         strength = light.intensity
         radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)

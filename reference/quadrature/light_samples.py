@@ -119,8 +119,8 @@ class Sections:
         return np.sum(q * self.axis[row], axis=1) / np.maximum(np.linalg.norm(q, axis=1), _TINY)
 
     def drawn(self, lit: LitIntervals, uniform: Array) -> tuple[Index, Array, Array]:
-        """Return which sections are seen at all, a point of what is seen of each, and the
-        solid angle of that [sr].
+        """Return which sections are seen at all, a point in the visible part of each, and
+        the solid angle of that part [sr].
 
         `lit`: what is seen of each section, in fractions of its length; `uniform`: numbers from 0
         to 1, (n,), by which points are drawn.
@@ -275,8 +275,8 @@ def sections_for_points(
 
 
 def solid_angle(light: ReferenceAreaLight, place: Array) -> Array:
-    """Return the solid angle of a sphere, or of a rectangle by that of its corners,
-    from points before it [sr].
+    """Return the solid angle of a sphere, or of a rectangle by its corners, from points
+    before it [sr].
     """
     if light.kind == "sphere":
         return 2 * np.pi * _one_minus_cosine(light, np.linalg.norm(place - light.centre, axis=1))
@@ -620,10 +620,10 @@ def _on_sphere(
         reach = np.where(
             meets, np.arccos(np.clip(-middle / np.maximum(rho, _TINY), -1.0, 1.0)), np.pi
         )
-        seen = np.hypot(middle, axes.along[:, None])
+        to_middle = np.hypot(middle, axes.along[:, None])
         # The tangent from the beginning of the ray to the circle ends what that beginning sees.
         back = np.arctan2(-axes.along[:, None], -middle) + np.arccos(
-            np.clip(rho / np.maximum(seen, rho), 0.0, 1.0)
+            np.clip(rho / np.maximum(to_middle, rho), 0.0, 1.0)
         )
         return middle, rho, -reach, np.where(ends, np.clip(back, -reach, reach), reach)
 

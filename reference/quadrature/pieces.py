@@ -112,8 +112,8 @@ def _parts(
 
 
 def cut(parts: Pieces, kinks: Kinks) -> Pieces:
-    """Cut parts of rays, given by ray and distance, at kinks; the depths of the pieces
-    are those of their parts.
+    """Cut parts of rays, given by ray and distance, at kinks; a piece has the depth
+    of its part.
     """
     ray, x = kinks
     # The part in which each kink lies is the last one that begins before it.

@@ -51,7 +51,7 @@ class ReferenceImage:
     """Radiance of every pixel; arrays of shape (height, width[, 3])."""
 
     airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
-    #: its error without that of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
+    #: its error without the error of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
     airlight_bound: Array
     surface: Array  #: radiance of the lit surface through the medium [W/(m^2 sr)]
     #: to the visible surface at the pixel's centre, infinite where there is none [m]
@@ -121,7 +121,7 @@ def ray_values(
     hits = replace(hits, distance=exact_distance(reference, hits.interaction, cast, shapes))
     count = len(reference.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
-    transitions, found = 0, list[RandomChecks]()
+    transitions, reports = 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
     # Progress counts a step for each light and `_STEPS` for each layer of area lights and for the
@@ -135,14 +135,14 @@ def ray_values(
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
         transitions += received.lit.transitions
-        found.append(received.lit.random_checks)
+        reports.append(received.lit.random_checks)
         # A renderer with a shadow-ray epsilon (`shadow_scale` below 1) also starts its shadow rays
         # off the surface: the surface is lit where such rays say so.
-        seen = received.reached
+        lit_ends = received.reached
         if shadow_scale != 1 and not isinstance(light, DirectionalLight):
             what = {"scene": reference.occluders, "shapes": shapes}
-            seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
-        reached.append(seen)
+            lit_ends = reached_by_shadow_rays(hits.interaction, light.position, lit_ends, **what)
+        reached.append(lit_ends)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(reference, hits, reached=reached, shadow_scale=shadow_scale)
@@ -174,7 +174,7 @@ def ray_values(
             surface + mean[:, 3:],
             bound + scattered.bound,
         )
-        found.append(scattered.random_checks)
+        reports.append(scattered.random_checks)
         wide["replicates"] = replicates
     if reference.sky is not None:
         sky = sky_light(
@@ -189,7 +189,7 @@ def ray_values(
         # Replicates of the sky and of area lights are independent: their sums are replicates of
         # both.
         wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates
-    checked = RandomChecks.of_all(found)
+    checked = RandomChecks.of_all(reports)
     return RayValues(airlight, bound, surface, cast, light_angle, transitions, checked, **wide)
 
 

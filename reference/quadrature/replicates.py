@@ -16,7 +16,7 @@ with S ~ 1/N this is 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4
 A pilot therefore decides, and is not counted: eight replicates of other scramblings, with four
 times as many points each time, until they predict a small enough standard error at not more than
 four times their points. N is then independent of the points that count, and Student's distribution
-holds for every N; the total cost is 1.2 to 1.7 times that of the points that count. The pilot
+holds for every N; the total cost is 1.2 to 1.7 times the cost of the points that count. The pilot
 assumes S ~ N^-5/4, a little slower than the N^-3/2 of scrambled nets for smooth functions (Owen
 1997, Scrambled net variance for integrals of smooth functions), which fog reaches. Where this is
 too optimistic, the stated error is larger than the requested one, and right. A ray that could not
@@ -79,7 +79,7 @@ class PointPlan:
     first: int = 16  #: points of each replicate that every ray gets, a power of two
     most: int = 1024  #: points that no ray or surface point exceeds, a power of two
     seed: int = 0  #: of the scramblings
-    #: whether surfaces get the light; if not, theirs is that of other lights alone
+    #: whether surfaces get the light; if not, surfaces show other lights alone
     surfaces: bool = True
 
     @property
@@ -155,8 +155,8 @@ def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Gen
 
 
 def _lattice(count: int) -> Array:
-    """Return the points of a lattice, of which every power of two is one, (count, 2),
-    the second not modulo 1.
+    """Return the points of a lattice, (count, 2), the second coordinate not modulo 1; the
+    first 2^k of them are a lattice for every k.
     """
     # (i, 1555 i)/N of the derivation, in the order of the mirrored digits of i.
     return np.array([mirrored_digits(i) for i in range(count)])[:, None] * np.array([1.0, 1555.0])
@@ -179,7 +179,7 @@ class RayPoints:
 
     @classmethod
     def of(cls, plan: PointPlan, number: int, rays: int, kind: str, part: int = 0) -> "RayPoints":
-        """Return the points of a light for rays, of which `part` is the number of the first."""
+        """Return the points of a light for rays; `part` is the number of the first ray."""
         replicates = range(REPLICATES)
         if kind == "sphere":
             square = np.tile(_lattice(plan.most), (REPLICATES, 1))

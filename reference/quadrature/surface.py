@@ -94,7 +94,7 @@ def lit_surface(
     to_camera = optical_depth(
         reference, reference.origin, reference.direction, np.zeros(len(far)), far
     )
-    # The order of the emitters is that of `lights`: places first, then directions.
+    # The emitters are sorted like `lights`: places first, then directions.
     emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()

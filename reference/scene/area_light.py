@@ -124,9 +124,11 @@ def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     opaque = shape.bsdf().class_name() != "Null"
     if kind is None:
         return _mesh(shape, radiance, opaque)
+    # Rectangles, disks and spheres follow from their transform alone.
     matrix = matrix_of(mi.traverse(shape)["to_world"])
     frame, half = _sides(shape, kind, matrix)
     light = ReferenceAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
+    # A sphere emits outwards: a camera inside of it would see no light.
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + SAME):
         raise _refusal(
             shape,
@@ -172,8 +174,8 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
 
 
 def _neighbours(place: Array) -> NDArray[np.int64]:
-    """Return an order of points, (n, 3), where neighbours follow one another, that of
-    their bits in turn (Morton).
+    """Return an order of points, (n, 3), where neighbours follow one another: by the bits of all
+    coordinates in turn (Morton).
     """
     bits = 16  # of a coordinate, by which triangles are put in order
     low, high = place.min(axis=0), place.max(axis=0)
@@ -205,6 +207,7 @@ def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool
 
 def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
     """Return the frame and half the sides; refuse shapes without area and with different scales."""
+    # The columns of the matrix are the images of the axes; half of both sides are their lengths.
     axes = matrix[:3, :3].T
     used = axes if kind == "sphere" else axes[:2]
     length = np.linalg.norm(used, axis=1)

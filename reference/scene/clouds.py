@@ -123,6 +123,7 @@ def read_clouds(scene) -> CloudScene:
         raise InputError(
             f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
         )
+    # The light, then the shapes: opaque ones, and the boundaries of clouds.
     suns, sky = _lights(scene)
     opaque, boundaries = sorted_shapes(scene)
     if not boundaries:
@@ -222,6 +223,7 @@ def _enclosing(shapes: list[Any], point: Array) -> int:
     A ray from the point meets the surfaces that enclose it an odd number of times; the one met
     first from inside is it.
     """
+    # Only boundaries are in this scene: an opaque shape must not hide one from the rays.
     scene = scene_from(shapes)
     for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
         ray = mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction))

@@ -7,8 +7,8 @@ lies further outside any facet's plane than
 
     size (1e-6 + 4 eps largest coordinate / altitude of the facet),        eps = 2^-24:
 
-what rounding the corners of that facet can do to its plane. Slivers with an altitude below 1e-6 of
-the size have no plane worth the name; their neighbours bound the body without them.
+the most by which rounding of its corners moves the plane of a facet. Slivers with an altitude below
+1e-6 of the size have no plane worth the name; their neighbours bound the body without them.
 """
 
 from dataclasses import dataclass
@@ -173,7 +173,7 @@ def in_surface(bounds: Bounds, point: Array) -> bool:
 
 def normals_at(bounds: Bounds, points: Array) -> Array:
     """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges
-    that of one of the facets.
+    the normal of one of the facets.
     """
     if isinstance(bounds, Sphere):
         return (points - bounds.centre) / bounds.radius

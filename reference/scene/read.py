@@ -70,7 +70,7 @@ class ReferenceMedium:
 
     @property
     def largest(self) -> Array:
-        """Its largest extinction, which is that of all places, RGB [1/m]."""
+        """Its largest extinction, the same at all places, RGB [1/m]."""
         return self.sigma_t
 
 
@@ -246,7 +246,7 @@ def _rebuilt(scene, emitters: list[Any]):
 
 
 def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
-    """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
+    """Return the opaque shapes and the shapes that bound a medium; all others take no part."""
     opaque, boundaries = [], []
     for shape in scene.shapes():
         inside, outside = shape.interior_medium(), shape.exterior_medium()
@@ -373,6 +373,8 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
         holds(bounds, middle + (1 - 2 * fraction) * (corner - middle)) for corner in corners
     ):
         return None
+    # A camera in the shape must name the grid's medium. Outside of it the camera may: the grid is
+    # vacuum beyond its box.
     if camera_medium not in ((inside,) if holds(bounds, origin) else (None, inside)):
         raise InputError(
             f"the camera references another medium than that of shape '{shape.id()}', a density "

@@ -35,7 +35,7 @@ class Disks:
 class Shapes:
     """The opaque shapes of a scene."""
 
-    triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
+    triangles: Array  #: of meshes and rectangles, (triangles, 3, 3) [m]
     #: of the spheres, (spheres, 3) [m]
     centre: Array = field(default_factory=lambda: np.empty((0, 3)))
     radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]

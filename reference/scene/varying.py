@@ -85,6 +85,7 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
         for i in "12"
         if (sigma_t := float(number[f"sigma_{i}"][0])) > 0
     )
+    # Mitsuba's majorant bounds the density along all rays.
     largest = np.array(
         medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64
     ).reshape(-1)

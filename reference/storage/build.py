@@ -10,10 +10,10 @@ its commit in `src/airlight/commit.txt`: `git archive` fills it in, as `.gitattr
 `setup.py` does in wheels and source distributions, with the digest of the files then. A file that
 was changed afterwards is noticed by that digest.
 
-The digest is of bytes, comments too, unlike those of `code.py`, which decide what is computed
-again: it takes a twentieth of a second in place of two, and is the same for every version of
-Python. Nothing of ours is imported at the top, as `setup.py` runs this file where no package is
-installed, and nothing that `airlight --help` would wait for.
+The digest is of bytes, comments too. The digests of `code.py`, which decide what is computed again,
+leave comments out; this one takes a twentieth of a second in place of two, and is the same for
+every version of Python. Nothing of ours is imported at the top, as `setup.py` runs this file where
+no package is installed, and nothing that `airlight --help` would wait for.
 """
 
 import os

@@ -37,7 +37,7 @@ def code_digest(starts: Iterable[Path]) -> str:
     it is ours or the user's.
 
     From a file of the user's, which may lie anywhere, the modules beside it are followed,
-    and those of its package.
+    and the modules of its package.
     """
     # Follow imports from file to file.
     waiting, digests = [path.resolve() for path in starts], dict[Path, bytes]()
@@ -61,7 +61,7 @@ def code_digest(starts: Iterable[Path]) -> str:
 @lru_cache(maxsize=1024)
 def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
     """Return a digest of the code of a file, and the names and words in it,
-    those of modules among them.
+    names of modules among them.
     """
     names: set[str] = set()
     try:

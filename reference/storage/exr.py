@@ -330,6 +330,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     layers = {
         name or TOTAL: _float32(np.asarray(values), name) for name, values in image.layers.items()
     }
+    # All layers have the shape of the first one.
     first = next(iter(layers))
     for name, values in layers.items():
         if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
@@ -519,6 +520,7 @@ def _image(
         notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
     if any(channels[key].dtype == np.float16 for key in used):
         notes.append("half floats (relative rounding 5e-4)")
+    # Colours in integers are values for a screen; a layer of them is named, not read.
     integers = {
         k
         for k, v in channels.items()
@@ -528,6 +530,8 @@ def _image(
         notes.append(f"{_INTEGERS} left out: {', '.join(sorted(integers))}")
     if unused := sorted(channels.keys() - used - integers):
         notes.append(f"channels left out: {', '.join(unused)}")
+    # Attributes of the format itself, and an earlier note of the reader, say nothing about this
+    # image.
     attributes = {
         k: v
         for k, v in header.items()

@@ -44,7 +44,7 @@ _DESCRIPTION = "description "  # before the digest of a description in the id of
 
 
 class _UnknownError(Exception):
-    """Raised for a value of which there are no bytes that are the same in the next run."""
+    """Raised for a value without bytes that stay the same in the next run."""
 
 
 def scene_digest(scene) -> str | None:

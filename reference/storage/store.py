@@ -74,7 +74,7 @@ class Inputs:
     """
 
     kind: ClassVar[str]  #: one or more words with dashes: names of files begin with it
-    modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default that of the class
+    modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default the module of the class
 
     @cached_property
     def key(self) -> str | None:
@@ -122,6 +122,7 @@ def _encoded(value: Any) -> Any:
     if isinstance(value, Path):
         return [value.name, hashlib.sha256(value.read_bytes()).hexdigest()]
     if isinstance(value, np.generic | np.ndarray) and value.dtype.kind in "biufcSU":
+        # Type and shape count too: equal bytes may be other numbers.
         data = np.ascontiguousarray(value).tobytes()
         return [value.dtype.str, value.shape, hashlib.sha256(data).hexdigest()]
     raise TypeError(
@@ -192,11 +193,11 @@ def keep(
     """Cache the result of some inputs that was computed, here or elsewhere, and return
     it as it will be loaded.
     """
-    kept = store(inputs.key if worth(value) else None, _packed(value), spent)
+    result = store(inputs.key if worth(value) else None, _packed(value), spent)
     # The whole is cached: parts of the work are not needed any more.
     if inputs.key is not None:
         drop_parts(inputs.key)
-    return _result(kept, kind)
+    return _result(result, kind)
 
 
 def _result(kept: Kept[dict[str, Any]], kind: Any) -> Kept[Any]:
@@ -204,7 +205,7 @@ def _result(kept: Kept[dict[str, Any]], kind: Any) -> Kept[Any]:
 
 
 def _packed(value: Any) -> dict[str, Any]:
-    """Return a value as arrays, of which one is JSON."""
+    """Return a value as arrays, one of them JSON."""
     arrays: dict[str, Any] = {}
 
     def plain(each: Any) -> Any:

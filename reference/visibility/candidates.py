@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Which shapes can stand in the light of which rays: one search for all lights.
+r"""The shapes that can stand in the light of rays: one search for all lights.
 
 Shadow segments lead from a ball about the light, or from far away in its direction, to points of
 the rays, all of which begin at the camera: they lie in the convex hull of both. A shape beyond a
@@ -46,7 +46,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Near:
-    """The shapes near each ray: lists of numbers, and where that of a ray begins and ends."""
+    """The shapes near each ray: lists of numbers, and where the list of a ray begins and ends."""
 
     triangles: tuple[Index, Index, Index]  #: begin, end, (rays,) each, and numbers
     spheres: tuple[Index, Index, Index]

@@ -119,6 +119,7 @@ def exact_distance(
     for shape, part in (shapes or read_shapes(reference.occluders)).single:
         # Mitsuba tells the shape of a hit by a pointer, whose bits are its number.
         number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
+        # The rays that have met this shape.
         mine = np.flatnonzero(hit & (shape_of_hit == number))
         if not len(mine):
             continue

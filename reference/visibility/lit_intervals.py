@@ -70,15 +70,17 @@ def before_light(
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
     if len(others) < len(shapes):
         reference = replace(reference, occluders=scene_of(others, reference.scene))
-    known = read_shapes(reference.occluders)
+    occluders = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
         largest = max(
-            1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max())
+            1.0,
+            float(np.abs(occluders.triangles).max(initial=0)),
+            float(np.abs(light.centre).max()),
         )
         # A triangle stays if any corner is before the plane by more than rounding.
-        before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
-        known = replace(known, triangles=known.triangles[before.any(axis=1)])
-    return reference, known
+        before = (occluders.triangles - light.centre) @ light.normal > IN_PLANE * largest
+        occluders = replace(occluders, triangles=occluders.triangles[before.any(axis=1)])
+    return reference, occluders
 
 
 def lit_intervals(
@@ -101,6 +103,7 @@ def lit_intervals(
     Valid for opaque meshes, rectangles, spheres and disks, wherever they are.
     """
     of = np.arange(len(rays.foot)) if of is None else of
+    # A sphere around the light shows only its inside; all other shapes cast shadows.
     low, high = _inside(rays, ends, known)
     ray, x0, x1 = lit_parts(rays, (low, high), known.near, known.shapes, of)
     # An end of a lit interval is an edge between light and shadow unless it is an end of the range.

@@ -151,7 +151,7 @@ def _compiled(
             continue
         last = on_device(mi.UInt32, end)
 
-        def look(j, known, held0, held1, shadow=shadow, values=values, number=number):
+        def look(j, stored, held0, held1, shadow=shadow, values=values, number=number):
             # A shadow counts where it meets the part of the ray that is looked at. If it touches
             # the shadow that is held back both become one; else that one is stored, and the new one
             # is held back.
@@ -161,21 +161,21 @@ def _compiled(
                 held0 <= finish + merge * (1 + dr.abs(finish))
             )
             new = casts & ~touches & (held0 < held1)
-            store(known, held0, held1, new)
-            known += dr.select(new, mi.UInt32(1), mi.UInt32(0))
+            store(stored, held0, held1, new)
+            stored += dr.select(new, mi.UInt32(1), mi.UInt32(0))
             held0 = dr.select(casts, dr.select(touches, dr.minimum(held0, start), start), held0)
             held1 = dr.select(casts, dr.select(touches, dr.maximum(held1, finish), finish), held1)
-            return j + 1, known, held0, held1
+            return j + 1, stored, held0, held1
 
         _, *state = dr.while_loop(
             (on_device(mi.UInt32, begin), *state), lambda j, *others, last=last: j < last, look
         )
     # The last shadow has no next one to be joined with.
-    known, held0, held1 = state
+    stored, held0, held1 = state
     casts = held0 < held1
-    store(known, held0, held1, casts)
-    known += dr.select(casts, mi.UInt32(1), mi.UInt32(0))
-    dr.eval(known, lows, highs)
+    store(stored, held0, held1, casts)
+    stored += dr.select(casts, mi.UInt32(1), mi.UInt32(0))
+    dr.eval(stored, lows, highs)
     begins, finishes = dr.zeros(mi.Float64, count * slots), dr.zeros(mi.Float64, count * slots)
     # The lit rest: t goes from the beginning of the ray to its end, one turn through the list for
     # each step of `body`.
@@ -183,7 +183,7 @@ def _compiled(
 
     def body(t, used, back):
         def turn(j, t, after, moved):
-            number = dr.select(back, known - 1 - j, j)
+            number = dr.select(back, stored - 1 - j, j)
             start, finish = (
                 dr.gather(mi.Float64, column, number * stride + lane) for column in (lows, highs)
             )
@@ -196,7 +196,7 @@ def _compiled(
 
         _, t, after, moved = dr.while_loop(
             (mi.UInt32(0), t, mi.Float64(high), mi.Bool(False)),
-            lambda j, t, after, moved: (j < known) & (t < high),
+            lambda j, t, after, moved: (j < stored) & (t < high),
             turn,
         )
         # Only a turn that did not move t has seen all shadows from the final t: the ray is lit up

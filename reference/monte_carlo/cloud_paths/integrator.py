@@ -97,7 +97,7 @@ def cloud_paths_batch(
 
 
 def _targets(sets: Sequence[tuple[int, float]]) -> Targets:
-    """Return the layer of each order; those of no set share one."""
+    """Return the layer of each order; orders of no set share one."""
     # Orders above the last one of all sets share the last entry.
     last = max((int(first if math.isinf(end) else end) for first, end in sets), default=0) + 1
     by_order = np.full(last + 1, len(sets), dtype=np.uint32)

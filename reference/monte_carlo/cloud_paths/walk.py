@@ -61,7 +61,7 @@ class Targets:
     visible surface and from there to the eye.
     """
 
-    #: layer of each order from 0 on, UInt32; the last number is that of all further orders
+    #: layer of each order from 0 on, UInt32; the last entry stands for all further orders
     by_order: Any
     orders: int  #: how many layers of orders there are
 
@@ -134,6 +134,8 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
         left=mi.UInt32(samples),
         casts=mi.UInt32(0),
     )
+    # A lane starts with its first path: a flight of random length from the eye. The loop ends when
+    # all lanes have followed all of their paths.
     turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
     paths, _ = dr.while_loop(
         state=(paths, sampler),
@@ -261,8 +263,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             sampler.next_1d(active),
             mi.Point2f(sampler.next_1d(active), sampler.next_1d(active)),
         )
-        drawn, passed = bsdf.sample(context, si, first, second, reflects)
-        onwards = si.to_world(drawn.wo)
+        bsdf_sample, passed = bsdf.sample(context, si, first, second, reflects)
+        onwards = si.to_world(bsdf_sample.wo)
         weight = dr.select(reflects, weight * passed, weight)
         w, x = dr.select(reflects, onwards, w), dr.select(reflects, si.spawn_ray(onwards).o, x)
         cloud = dr.select(reflects, medium, cloud)

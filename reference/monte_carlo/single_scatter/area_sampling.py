@@ -78,7 +78,7 @@ class Triangles:
         return self._even(number, u, v)
 
     def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly, and half of those of a ray that meets a triangle about
+        """Sample points evenly; of a ray that meets a triangle half of the points are about
         the place where it does.
         """
         # Half of the points of a ray that meets a triangle are spread about the place where it
@@ -115,8 +115,8 @@ class Triangles:
         position = dr.select(about, near, even)
         number = dr.select(about, met, number)
 
-        # The density is that of both techniques for the point, whichever drew it. An even point in
-        # the triangle that the ray meets could have been drawn about the place, too.
+        # The density of a point is the sum over both techniques, whichever drew it. An even point
+        # in the triangle that the ray meets could have been drawn about the place, too.
         in_met = meets & (number == met)
         rho = dr.norm(position - place)
         counts = ~in_met | (rho > _TOUCHING * dr.norm(first))
@@ -315,6 +315,8 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     if light.kind == "sphere":
         return Ball(centre, light.radius)
     corners = light.triangles
+    # A mesh of our own for the ray casts, with the triangles in the order of the tables: the number
+    # of a hit is the row of its triangle.
     mesh = mi.Mesh("light", vertex_count=3 * len(corners), face_count=len(corners))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(corners.ravel())

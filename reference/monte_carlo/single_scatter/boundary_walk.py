@@ -39,7 +39,7 @@ class Segment:
     """The media at the ends of segments from a light to points."""
 
     start: Any  #: pointer to the medium at the light; what is beyond, the boundaries say
-    #: extinction at the points [1/m], that of the whole segment where nothing bounds a medium
+    #: extinction at the points [1/m]; along all of the segment where nothing bounds a medium
     end_sigma_t: Any
 
 
@@ -79,6 +79,8 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
         ray = mi.Ray3f(position + direction * done, direction, distance - done, 0.0, [])
         hit = around.scene.ray_intersect(ray, walking)
         met = walking & hit.is_valid()
+        # A surface on the way is passed; the first boundary names the medium on the side of the
+        # point.
         at_boundary = met & hit.is_medium_transition()
         medium = dr.select(at_boundary, hit.target_medium(-direction), medium)
         done = dr.select(met, done + hit.t + step_beyond(hit.p), done)

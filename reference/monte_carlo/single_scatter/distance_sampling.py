@@ -119,7 +119,7 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
     half = dr.acos(dr.minimum(ratio, 1)) + margin
     middle = dr.atan2(along, across)
     low, high = middle - half, middle + half
-    right = 0.5 * math.pi - 1e-12  # beyond, the tangent would be that of the line's other end
+    right = 0.5 * math.pi - 1e-12  # beyond, the tangent belongs to the line's other end
     low_end = dr.select(low > -right, height * dr.tan(dr.clip(low, -right, right)), -infinity)
     high_end = dr.select(high < right, height * dr.tan(dr.clip(high, -right, right)), infinity)
     outside = (ratio > 1 + margin) | (low > right) | (high < -right)

@@ -182,6 +182,8 @@ def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple
     total = dr.zeros(mi.Spectrum, dr.width(active))
     if not task.around.surfaces:
         return total, sampler
+    # Rays that meet nothing have an infinite x: their transmittance is asked at the start, and not
+    # counted.
     x = mi.Float64(dr.select(active, x, part.start))
     for source in task.sources:
         start, count = (

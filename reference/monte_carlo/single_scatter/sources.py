@@ -184,7 +184,7 @@ class AreaSource(_Near):
 
 @dataclass(frozen=True)
 class FarSource:
-    """A sun, or a uniform sky, of which each sample has its own direction, evenly from the sphere.
+    """A sun, or a uniform sky; each sample of a sky has its own direction, even over the sphere.
 
     The emitter names a place beyond everything, in vacuum: there paths begin.
     """

@@ -140,11 +140,13 @@ class _FogPart(Part):
         """Return the optical depth from heights [m] out of the fog; `rise`:
         vertical, of unit directions.
         """
-        there = self._antiderivative(z)
+        at_height = self._antiderivative(z)
         above, below = (
             self._antiderivative(mi.Float64(end)) for end in (self.fog.cap, self.fog.floor)
         )
-        return dr.select(rise > 0, above - there, there - below) / dr.maximum(dr.abs(rise), 1e-30)
+        return dr.select(rise > 0, above - at_height, at_height - below) / dr.maximum(
+            dr.abs(rise), 1e-30
+        )
 
     def _antiderivative(self, z):
         """Return G at heights [m]."""
@@ -200,17 +202,23 @@ class _GridPart(Part):
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
         begin, end = dr.maximum(near, 0), dr.minimum(far, distance)
 
-        def fly(x, kept, sampler):
+        def fly(x, transmittance, sampler):
             # The next point of the Poisson process of the density m; the product of 1 - sigma_t/m
             # over its points is the estimate.
             x = x - dr.log(1 - sampler.next_1d()) / self.majorant
             place = dr.zeros(mi.MediumInteraction3f)
             place.p = origin + direction * x
             _, _, sigma_t = self.medium.get_scattering_coefficients(place, x < end)
-            return x, dr.select(x < end, kept * (1 - sigma_t[0] / self.majorant), kept), sampler
+            return (
+                x,
+                dr.select(x < end, transmittance * (1 - sigma_t[0] / self.majorant), transmittance),
+                sampler,
+            )
 
         # Lanes that miss the box start behind their end, and take no step.
         start = dr.select(active & meets, begin, dr.inf)
         state = start, dr.full(mi.Float, 1, dr.width(start)), sampler
-        _, kept, sampler = dr.while_loop(state, lambda x, *_: x < end, fly, label="ratio tracking")
-        return kept, sampler
+        _, transmittance, sampler = dr.while_loop(
+            state, lambda x, *_: x < end, fly, label="ratio tracking"
+        )
+        return transmittance, sampler
