@@ -126,9 +126,9 @@ class _Sum:
         arrays stay in the cache.
         """
         integrals, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
-        # The rule of a panel follows from its width in v. A panel in x counts as wide as its
-        # optical depth divided by 2.
-        size = width if self.rays.w else width * self.integrand.extinction[piece] / (10 * 0.2)
+        # The rule of a panel follows from its width in v. A panel in x over an optical depth of 0.2
+        # counts as 0.1 wide, the most for the narrow rule.
+        size = width if self.rays.w else width * self.integrand.extinction[piece] / 2.0
         for pair, block in blocks_by_rule(size, 8192):
             integrals[:, block], noise[block] = self.evaluate_block(
                 pair, piece[block], start[block], width[block]

@@ -250,8 +250,8 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=1e-6)
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
-        # What shadow rays left in doubt may be lit or not: its largest airlight is added to the
-        # bound.
+        # Parts that shadow rays left in doubt may be lit or not: their largest airlight is added to
+        # the bound.
         parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
         # dA of a sample and the radiance of the light make radiance of the sums. The samples of a
         # ray are in the order of replicates, and each replicate is added up on its own.
@@ -426,8 +426,8 @@ def _reflected(
     light, reference, each = view.beam.light, view.beam.scene, len(view.points)
     total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
     for rows, point, (row, place, weight), whole in view.seen(active):
-        # Of even sections the solid angle is known in closed form; a disk's is not, and has no
-        # control variate.
+        # Even sections have a known total, the solid angle in closed form: the control variate. The
+        # solid angle of a disk has no closed form here.
         if view.even and light.kind != "disk":
             means = whole.reshape(len(rows), REPLICATES, -1).mean(axis=2)
             fraction[rows] = means / solid_angle(light, point)[:, None]

@@ -11,9 +11,9 @@ in a direction (w = 0, `reference.visibility.planes`),
 
 I the intensity or irradiance of the light, r the distance to it, enter_j and leave_j the distances
 from the point x at which the shadow segment enters and leaves body j; s is `shadow_scale`. Under a
-directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in v = asinh((x
-- foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth beside the light as far from it;
-else in x.
+directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in the variable
+v = asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth beside the light as
+far from it; else in x.
 
 Lit stretches are cut at the bounds of the media, where a shadow segment passes a corner of a body
 or touches it (`reference.quadrature.segments`), and at the kinks of tabulated phase functions. On

@@ -321,7 +321,7 @@ class _Fan:
         The end that is closer to the axis comes first.
         """
         z0, h0, z1, h1 = self._polygon(phi) if self.corners is not None else self._disk(phi)
-        # The half plane ends at the axis. Of a section that crosses the axis the part on the other
+        # The half plane ends at the axis. If a section crosses the axis, its part on the other
         # side, h < 0, belongs to the azimuth phi + pi: cut it at h = 0. A section that lies there
         # as a whole gets no length.
         swap = h0 > h1
@@ -454,7 +454,7 @@ def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
     part = square[..., 1]
     z, h = z0 + part * (z1 - z0), h0 + part * (h1 - h0)
     # dA = h dphi dl / n_in: `across` is the component of the normal along the normal of the half
-    # plane, and `within`, n_in, is what remains of a unit vector.
+    # plane, and `within`, n_in, the length of the rest of the normal.
     across = -fan.normal[:, 1:2] * np.sin(phi) + fan.normal[:, 2:] * np.cos(phi)
     within = np.sqrt(np.maximum((1 - across) * (1 + across), 0.0))
     weight = h * np.hypot(z1 - z0, h1 - h0) * per_density / np.maximum(within, _TINY)

@@ -125,7 +125,7 @@ class _Mesh:
         ends = np.cumsum(chance, axis=1)
         ends /= ends[:, -1:]
         # One search for all rows: the cumulated chances of row k are moved to between k and k + 1.
-        # What the chosen group leaves of the coordinate is spread over 0 to 1 again.
+        # The rest of the coordinate within the chosen group is spread over 0 to 1 again.
         row = np.arange(rows)[:, None]
         group = np.searchsorted(
             (ends + row).ravel(), (square[..., 0] + row).ravel(), side="right"

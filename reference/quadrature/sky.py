@@ -73,7 +73,7 @@ def sky_light(
     visible = np.flatnonzero(np.isfinite(hits.distance)) if plan.surfaces else np.empty(0, np.int64)
     point = reference.origin + hits.distance[visible, None] * reference.direction[visible]
     start = np.zeros(len(visible))
-    # What surfaces send to the camera is attenuated by the same fraction under every sun.
+    # The light from surfaces to the camera is attenuated by the same fraction under every sun.
     transmittance = np.exp(
         -optical_depth(
             reference, reference.origin, reference.direction[visible], start, hits.distance[visible]

@@ -125,8 +125,8 @@ def certified(
         expected |= same & (begin[k] <= fraction) & (fraction <= end[k])
         near = np.minimum(np.abs(fraction - begin[k]), np.abs(fraction - end[k]))
         gap = np.where(same, np.minimum(gap, near), gap)
-    # Of the angle at a light, or of coordinates: shadow rays end 2e-6 early, and are rounded to
-    # 1e-7. Closer to an edge they decide nothing.
+    # Shadow rays end 2e-6 early and are rounded to 1e-7: within 1e-5 of an edge, in the angle at a
+    # light or in coordinates, they decide nothing.
     rounding = 1e-5 * (1.0 if rays.w else coordinates(rays, shapes))
     start, target = _segments(rays, ray, x, shapes)
     # A shadow ray starts off the surface of an area light by 1e-5 of the largest coordinate, clear

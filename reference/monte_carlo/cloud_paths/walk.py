@@ -56,9 +56,9 @@ class Targets:
     """Where light goes: its layer by order of scattering, and two of surfaces.
 
     Light that met no surface goes to one of `orders` layers, or to the layer `orders` if its order
-    belongs to none of them. Two layers follow: light that met a surface and was
-    scattered too, or met several surfaces; and light that came straight from the lights to the
-    visible surface and from there to the eye.
+    belongs to none of them. Two layers follow: light that met a surface and was scattered too, or
+    met several surfaces; and light that came straight from the lights to the visible surface and
+    from there to the eye.
     """
 
     #: layer of each order from 0 on, UInt32; the last entry stands for all further orders
@@ -228,8 +228,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     )
     over = escapes & is_main
     if scene.has_sky:
-        # The sky seen directly is none of scattered light. Light of the sky that only one surface
-        # sent on is `straight`.
+        # The sky that the eye sees directly belongs to no layer. Light of the sky that only one
+        # surface sent on is `straight`.
         of_sky = over & ((order > 0) | (bounces > 0))
         place = targets.layer(order, bounces > 0, (order == 0) & (bounces == 1)) * lanes + lane
         from_sky = weight * mi.Color3f(*scene.sky)

@@ -96,7 +96,7 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
         stretch = Stretch(
             task.around, *ends, medium, dr.max(sigma_s) > 0, depth, sigma_t, rates, at_camera
         )
-        # What the lights send from this stretch; a surface at its end reflects, a boundary of a
+        # The lights send airlight from this stretch; a surface at its end reflects, a boundary of a
         # medium leads on.
         sent, sampler = _airlight(prepared, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)

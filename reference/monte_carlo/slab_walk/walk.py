@@ -79,7 +79,7 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     for weight, (x, y, z), direction in flights(slab, photons, random):
         rising = direction[2] < 0
         row = np.zeros((2 + 3 * len(slab.depths), 3))
-        # What leaves above and below: passages through the faces of the slab.
+        # Light leaves above and below: passages through the faces of the slab.
         row[0], _ = _passages(x, y, z, direction, rising, 0.0)
         row[1], _ = _passages(x, y, z, direction, ~rising, slab.tau)
         for place, depth in enumerate(slab.depths):
