@@ -13,13 +13,13 @@ variance is
     sum_p s_p^2 / n_p,    for a given sum of n_p least where n_p is proportional to s_p:    (sum_p s_p)^2 / sum_p n_p
 
 (Neyman 1934; Cochran 1977, *Sampling Techniques*, eq. 5.26). In fog a few pixels hold nearly all of
-the variance, those that look at or past what is next to a light: equal numbers would spend most
-samples on the others.
+the variance: they look at the surroundings of a light, or past them. Equal numbers would spend most
+samples on the other pixels.
 
-The s_p come from a pilot run of which nothing else is used. Samples that decide where more of them
-go must not be counted themselves: pixels that came out dark by chance would get few more, and the
-mean would be too small. A quarter of the samples is shared out equally, so that a pixel whose pilot
-met nothing at all has at most four times the variance that it would have had.
+The s_p come from a pilot run, which is used for nothing else. Samples that decide how many more a
+pixel gets must not count themselves: a pixel that came out dark by chance would get few more, and
+the mean would be too small. A quarter of the samples is shared out equally, so that a pixel whose
+pilot met nothing at all has at most four times the variance that it would have had.
 """
 
 from collections.abc import Iterable
@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 LAYERS = ("airlight", "surface")
 EQUAL = 0.25  #: fraction of allocated samples that is the same for every pixel
 LARGEST_SEED = 1 << 20  #: seeds are below this: the streams of one batch are numbered in 32 bits
-LARGEST_BATCH = 256  #: samples a pixel: float32 sums of more lose digits (DESIGN section 6.2)
 
 
 @dataclass(frozen=True)
@@ -59,10 +58,11 @@ class Batches:
 def check_samples(samples: int) -> None:
     """Check the number of samples a pixel of a batch.
 
-    Raises ValueError for none, or for more than a batch can add up, `LARGEST_BATCH`.
+    Raises ValueError for none, or for more than the 256 that a batch can add up.
     """
-    if not 1 <= samples <= LARGEST_BATCH:
-        raise ValueError(f"samples: got {samples}, expected 1 to {LARGEST_BATCH}")
+    largest = 256  # float32 sums of more lose digits (DESIGN section 6.2)
+    if not 1 <= samples <= largest:
+        raise ValueError(f"samples: got {samples}, expected 1 to {largest}")
 
 
 def single_batch(
@@ -120,6 +120,8 @@ def combined_moments(
     sr)], the squares in its square. Returns `mean`, `squares`: of all numbers, in the same shape
     and units.
     """
+    # Squared deviations within both sets, and of both means from the common one, n m/(n + m) times
+    # the square of their difference.
     (n, mean, squares), (m, other_mean, other_squares) = first, second
     difference = other_mean - mean
     return mean + difference * (m / (n + m)), squares + other_squares + difference**2 * (
@@ -168,8 +170,11 @@ def allocated(
     counts = []
     for number, layer in enumerate(LAYERS):
         variance = (pilot.standard_error[number] ** 2).sum(axis=1).reshape(shape)
+        # s_p of the derivation from the pilot, all channels together. Pixels that are not compared
+        # count as if they had none.
         spread = np.where(masks[layer], np.sqrt(_neighbourhood(variance)), 0)
         mean = spread.mean()
+        # Equal numbers where the pilot saw no spread at all.
         fraction = spread / mean if mean > 0 else np.ones(shape)
         counts.append(np.maximum(1, np.rint(samples * (EQUAL + (1 - EQUAL) * fraction))))
     return np.stack(counts).reshape(len(LAYERS), -1).astype(np.uint32)

@@ -52,7 +52,6 @@ from airlight.reference.scene.varying import GridMedium, HeightMedium
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
 
-_PATHS = 1 << 22  # paths traced at once
 # what decides the numbers among a medium's parameters
 _VALUES = ("sigma_t.value.value", "albedo.value.value")
 
@@ -72,8 +71,8 @@ def volpath_batch(
     `airlight` is the light that was scattered by the medium alone, any number of times up to
     max_depth - 1, and `surface` all other light: what met a surface at least once. `counts`:
     samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
-    Raises InputError for a scene of which Mitsuba does not know how large it is, under a
-    directional light. Raises ValueError if `samples` or `max_depth` is out of range, or `counts`
+    Raises InputError under a directional light for a scene whose size Mitsuba does not
+    know. Raises ValueError if `samples` or `max_depth` is out of range, or `counts`
     come with another `max_depth` than 2.
 
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin
@@ -92,11 +91,13 @@ def volpath_batch(
     )
     if reference.directional or reference.sky is not None:
         _check_far(reference)
+    # Light seen directly belongs to neither layer.
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
     reference = replace(reference, scene=whole_scene(reference))
     integrator = mi.load_dict(
         {"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden
     )
+    # With black surfaces all light was scattered by the medium alone.
     with black_surfaces(reference.occluders):
         airlight = trace(reference, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
@@ -123,6 +124,8 @@ def _check_far(reference: ReferenceScene) -> None:
     medium, radius = reference.medium, float(reference.scene.bbox().bounding_sphere().radius)
     needed = 0.0
     if isinstance(medium, HeightMedium):
+        # The rise of the lowest light path out of the fog; 0.5 is 60 degrees from the zenith, for a
+        # sky.
         rises = [float(-sun.direction @ medium.up) for sun in reference.directional] + [0.5] * (
             reference.sky is not None
         )
@@ -142,13 +145,13 @@ def _check_far(reference: ReferenceScene) -> None:
 def black_surfaces(scene) -> Iterator[None]:
     """Make every surface black for a while."""
     black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
-    own = [(shape, shape.bsdf()) for shape in scene.shapes()]
+    materials = [(shape, shape.bsdf()) for shape in scene.shapes()]
     try:
-        for shape, _ in own:
+        for shape, _ in materials:
             shape.set_bsdf(black)
         yield
     finally:
-        for shape, bsdf in own:
+        for shape, bsdf in materials:
             shape.set_bsdf(bsdf)
 
 
@@ -178,8 +181,8 @@ def trace(
 
 
 def _parts(counts: Counts) -> list[slice]:
-    """Cut the pixels into parts that have about `_PATHS` paths together, or are one pixel."""
-    part = (np.cumsum(counts) - 1) // _PATHS
+    """Cut the pixels into parts that have about 2^22 paths together, or are one pixel."""
+    part = (np.cumsum(counts) - 1) // (1 << 22)
     edges = [0, *(np.flatnonzero(np.diff(part)) + 1), len(counts)]
     return [slice(int(start), int(end)) for start, end in pairwise(edges)]
 
@@ -190,6 +193,7 @@ def _trace_pixels(
     # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
     direction = dr.normalize(mi.Vector3f(reference.direction[pixels].T))
     dr.eval(direction)
+    # The pixel of each path, copied into memory of Dr.Jit.
     numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     pixel = dr.empty(mi.UInt32, dr.width(numbers))
     dr.scatter(pixel, numbers, dr.arange(mi.UInt32, dr.width(numbers)))
@@ -200,6 +204,7 @@ def _trace_pixels(
     ray = mi.Ray3f(start, dr.gather(mi.Vector3f, direction, pixel))
     radiance, _, _ = integrator.sample(reference.scene, sampler, mi.RayDifferential3f(ray), medium)
     dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again
+    # The paths of a pixel follow one another: one sum for each pixel, in float64.
     first = np.cumsum(counts, dtype=np.int64) - counts
     sums = [np.add.reduceat(np.array(channel, dtype=np.float64), first) for channel in radiance]
     return np.stack(sums, axis=1) / counts[:, None]
@@ -210,22 +215,24 @@ def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> It
     """Give all media the extinction of one channel for a while; yield the medium in
     which camera rays begin.
     """
-    own: list[tuple[Any, dict[str, Any]]] = []
+    originals: list[tuple[Any, dict[str, Any]]] = []
     try:
         for medium in (reference.medium, *reference.media):
             # Shapes may share a medium.
-            if medium.plugin is not None and all(medium.plugin != plugin for plugin, _ in own):
+            if medium.plugin is not None and all(
+                medium.plugin != plugin for plugin, _ in originals
+            ):
                 parameters = mi.traverse(medium.plugin)
                 # The extinction of a grid is grey already.
-                known = (key for key in _VALUES if key in parameters)
-                own.append(
-                    (medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known})
+                keys = (key for key in _VALUES if key in parameters)
+                originals.append(
+                    (medium.plugin, {key: type(parameters[key])(parameters[key]) for key in keys})
                 )
                 sigma_t = float(medium.largest[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
         yield reference.scene.sensors()[0].get_medium()
     finally:
-        for plugin, values in own:
+        for plugin, values in originals:
             parameters = mi.traverse(plugin)
             for key, value in values.items():
                 parameters[key] = value
@@ -249,7 +256,7 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
 def volpath_orders_batch(
     clouds: CloudScene, seed: int, samples: int, *, sets: Sequence[tuple[str, tuple[int, float]]]
 ) -> Batches:
-    """Trace one batch of the layers `airlight`, `surface` and those of sets of orders.
+    """Trace one batch of the layers `airlight`, `surface` and the layers of sets of orders.
 
     `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
     samples a pixel, at most 256; `sets`: names of sets of orders with their first and last order,
@@ -274,10 +281,14 @@ def volpath_orders_batch(
         integrator = mi.load_dict({"type": "volpath", "max_depth": depth, "rr_depth": 1 << 20})
         return trace(reference, integrator, seed, counts)
 
-    wanted = {0, math.inf} | {end for _, (first, last) in sets for end in (first - 1, last)}
+    # A set of orders is the difference of two runs: up to its last order, and up to the order
+    # before its first.
+    ends = {0, math.inf} | {end for _, (first, last) in sets for end in (first - 1, last)}
     with black_surfaces(clouds.occluders):
-        sums = {order: up_to(order) for order in sorted(wanted)}
+        sums = {order: up_to(order) for order in sorted(ends)}
     airlight = sums[math.inf] - sums[0]
+    # Light that met a surface: all light with the surfaces' own materials less all light with black
+    # ones.
     surface = (
         up_to(math.inf) - sums[math.inf] if clouds.occluders.shapes() else np.zeros_like(airlight)
     )

@@ -2,8 +2,8 @@
 """The sum of smooth pieces of rays for any medium: panels are halved until
 each ray meets a tolerance.
 
-Panels and their rules are those of `analytic.panels`, and so is the variable near a place; under a
-direction it is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
+Panels, their rules, and the variable near a place are as in `analytic.panels`; under a direction
+the variable is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
 albedo sigma_t int exp(-tau) dx [1] of a directional light. A medium states its integrand
 (`Integrand`); lights, tolerances and uncertain edges are known here.
 """
@@ -23,13 +23,7 @@ from airlight.reference.visibility.planes import Rays
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-RTOL = 1e-10  #: relative tolerance of the sum of a ray and a light
 AT_LIGHT = 1e-290  #: height [m] below which a ray meets the light
-_PANEL = 2.4  # width in v of the first panels, as in `analytic.panels`
-_THICK = 0.2  # optical depth over which a panel in x is as wide as one of this width in v times ten
-# height over distance below which a light beside a piece may as well be at this height
-_NEAR_ZERO = 1e-15
-_PANELS = 8192  # panels at once
 _EPS = float(np.finfo(float).eps)
 
 
@@ -72,16 +66,18 @@ def sum_pieces(
     for lights of strength 1.
 
     `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the
-    block; `integrand`: what the medium scatters along the pieces; `block`: of rays; `terms`: with
-    `RTOL` by default. Returns the value and a bound of its error, (rays of the block, 3) each;
-    infinite where a ray meets a light in a medium that scatters.
+    block; `integrand`: what the medium scatters along the pieces; `block`: of rays; `terms`: with a
+    tolerance of 1e-10 by default. Returns the value and a bound of its error, (rays of the block,
+    3) each; infinite where a ray meets a light in a medium that scatters.
     """
     work = _Sum(rays, pieces, integrand, terms.profile)
     edge = np.broadcast_to(terms.edge, len(rays.foot))
     rounding = np.zeros(len(rays.foot)) if terms.rounding is None else terms.rounding
     owner, count = pieces.ray - block.start, len(rays.foot[block])
-    value, error = adapted(work.first_panels(), work.evaluate, owner, count, terms.rtol or RTOL)
+    # The tolerance is relative to the sum of a ray and a light.
+    value, error = adapted(work.first_panels(), work.evaluate, owner, count, terms.rtol or 1e-10)
     error = error + sums_of(owner, work.edge_error(edge, rounding), count)
+    # A ray through the light: the integral of 1/r^2 diverges, unless nothing scatters there.
     meets = sums_of(owner, work.meets_light()[:, None] * integrand.factor, count) > 0
     return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
 
@@ -106,15 +102,19 @@ class _Sum:
         self.own = self.rays[pieces.ray]
         if self.rays.w:
             s0, s1 = pieces.x0 - self.own.foot, pieces.x1 - self.own.foot
+            # Along a ray almost through the light v would grow without bound. A light beside a
+            # piece may as well be at the height of 1e-15 of its distance from the piece: float64
+            # cannot tell.
             beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
-            self.height = np.maximum(self.own.height, np.maximum(_NEAR_ZERO * beside, AT_LIGHT))
+            self.height = np.maximum(self.own.height, np.maximum(1e-15 * beside, AT_LIGHT))
             self.start = np.arcsinh(s0 / self.height)
             self.width = np.arcsinh(s1 / self.height) - self.start
         else:
             self.height, self.start, self.width = self.own.height, pieces.x0, pieces.x1 - pieces.x0
 
     def first_panels(self) -> tuple[Index, Array, Array]:
-        count = np.maximum(np.ceil(self.width / (_PANEL if self.rays.w else np.inf)), 1)
+        # First panels are 2.4 wide in v, as in `analytic.panels`; under directions a piece is one.
+        count = np.maximum(np.ceil(self.width / (2.4 if self.rays.w else np.inf)), 1)
         return equal_panels(np.arange(len(count)), self.start, self.width, count)
 
     def meets_light(self) -> NDArray[np.bool_]:
@@ -125,13 +125,15 @@ class _Sum:
         """Integrate panels by both rules, a block at a time so that the
         arrays stay in the cache.
         """
-        both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
-        size = width if self.rays.w else width * self.integrand.extinction[piece] / (10 * _THICK)
-        for pair, block in blocks_by_rule(size, _PANELS):
-            both[:, block], noise[block] = self.evaluate_block(
+        integrals, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
+        # The rule of a panel follows from its width in v. A panel in x over an optical depth of 0.2
+        # counts as 0.1 wide, the most for the narrow rule.
+        size = width if self.rays.w else width * self.integrand.extinction[piece] / 2.0
+        for pair, block in blocks_by_rule(size, 8192):
+            integrals[:, block], noise[block] = self.evaluate_block(
                 pair, piece[block], start[block], width[block]
             )
-        return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
+        return Panels(piece, start, width, integrals[0], np.abs(integrals[0] - integrals[1]), noise)
 
     def evaluate_block(
         self, pair: Pair, rows: Index, start: Array, width: Array
@@ -142,8 +144,12 @@ class _Sum:
         half, same = 0.5 * width, self.integrand.same
         f, depth = self.at(rows, start[:, None] + half[:, None] * (1 + pair.nodes))
         scale = half[:, None] * self.integrand.factor[rows]
-        both = np.moveaxis(np.tensordot(f, pair.weights, (1, 0)), 2, 0)[..., same] * scale
-        return both, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(both[0])
+        # Nodes are summed by both rules at once, and channels with the same extinction share a
+        # column.
+        integrals = np.moveaxis(np.tensordot(f, pair.weights, (1, 0)), 2, 0)[..., same] * scale
+        # The exponential of a depth tau has tau roundings; 16 are for all other operations. The
+        # depth at the middle node stands for the panel.
+        return integrals, _EPS * (16 + depth[:, len(pair.nodes) // 2, same]) * np.abs(integrals[0])
 
     def at(self, rows: Index, v: Array) -> tuple[Array, Array]:
         """Return the integrand, times dx/r^2 or dx by dv and the profile,
@@ -152,6 +158,8 @@ class _Sum:
         own, begin = self.own, self.pieces.x0[rows, None]
         if self.rays.w:
             height, foot = self.height[rows, None], own.foot[rows, None]
+            # With s = height sinh(v): cosine = 1/cosh(v), r = height cosh(v), the scattering angle
+            # has the cosine -tanh(v), and dx/r^2 = dv/(height cosh(v)). One exponential is all.
             up = np.exp(v)
             down = 1 / up
             cosine = 2 / (up + down)
@@ -160,6 +168,8 @@ class _Sum:
             x, inside = foot + s, np.maximum(s + (foot - begin), 0.0)
         else:
             x, inside, r = v, v - begin, np.full_like(v, np.inf)
+            # Under a directional light `foot` is the cosine of the scattering angle, one along the
+            # ray; rounding may put it beyond 1.
             scatter, rate = (
                 np.broadcast_to(np.clip(own.foot[rows, None], -1, 1), v.shape),
                 np.ones_like(v),
@@ -175,10 +185,15 @@ class _Sum:
         """
         pieces, every = self.pieces, np.arange(len(self.width))
         ends = np.stack([self.start, self.start + self.width], axis=1)
+        # The integrand at both ends of each piece, per unit of v (of x under directions). An
+        # uncertain end moves the sum by integrand times uncertainty, where the piece begins or ends
+        # at an edge of a shadow.
         f = self.at(every, ends)[0][..., self.integrand.same] * self.integrand.factor[:, None]
         total = np.zeros((len(every), 3))
         for end, chosen in enumerate((pieces.first, pieces.last)):
             total += (chosen * edge[pieces.ray])[:, None] * f[:, end]
+        # A kink between two pieces of one medium at an uncertain place counts only by the jump of
+        # the integrand there.
         same = (pieces.ray[1:] == pieces.ray[:-1]) & (pieces.x0[1:] == pieces.x1[:-1])
         same &= pieces.medium[1:] == pieces.medium[:-1]
         total[1:] += (16 * same * rounding[pieces.ray[1:]])[:, None] * np.abs(f[1:, 0] - f[:-1, 1])

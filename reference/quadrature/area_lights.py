@@ -7,9 +7,9 @@ With the points y on the surface of a light of radiance Le the radiance along a 
     L = albedo sigma_t Le / (4 pi)  int_A int  V p exp(-sigma_t (x + r)) cos_l / r^2  dx dA,
     cos_l = n . (o + x w - y) / r.
 
-The inner integral is that of a point light with a cosine for its profile, cut where the ray passes
-the plane of y and n. It is continuous in y where the visibility from a surface is not, so that few
-samples suffice. Surfaces at the end of a ray receive, from their own samples,
+The inner integral is the integral of a point light with a cosine for its profile, cut where the ray
+passes the plane of y and n. It is continuous in y where the visibility from a surface is not, so
+that few samples suffice. Surfaces at the end of a ray receive, from their own samples,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
@@ -70,16 +70,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Fraction = Callable[[float], None]
 
-# of the integral of one sample, whose estimate is many digits too large: far
-# below the error of a mean
-_RTOL = 1e-6
 _PAIRS = 1 << 16  # rays and samples at once
-_RAYS = 1 << 12  # rays of a part of the work that is kept
-_EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
-_BEFORE = 1e-6  # of the way to a surface: how far before it what lights it is looked at
-_PROBES = 8  # sections of a light that say whether a surface point sees it as a whole
-_WHOLE = 1e-6  # of the solid angle of a section
-_OUTSIDE = 1e-5  # of the radius of a sphere: what is closer to it touches it
 
 
 @dataclass(frozen=True)
@@ -162,14 +153,18 @@ def _by_replicate(
     """Return the sums of a layer for `replicate_means`: work(number of the light, rays,
     points of all replicates).
     """
+    # The most calls of `sums`, by pilots and by numbers of points: progress is a fraction of them.
     rounds, done = 2 * plan.rounds * lights, 0.0
+    step = 1 << 12  # rays of a part of the work, which `keep` may store
 
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
         total = np.zeros((len(active), 3, REPLICATES))
-        for number, first in itertools.product(range(lights), range(0, len(active), _RAYS)):
-            rows = slice(first, first + _RAYS)
+        for number, first in itertools.product(range(lights), range(0, len(active), step)):
+            rows = slice(first, first + step)
             points = partial(RayPoints.of, chosen, number, len(active[rows]), part=first)
+            # A part is named by layer, light, number of points and first ray: what an interrupted
+            # run stored is found again by it.
             one = partial(work, number, active[rows], points)
             got = keep(f"{layer}-{part}{number}-{chosen.most}-{first}", one)
             total[rows] += (
@@ -177,6 +172,8 @@ def _by_replicate(
                 if "fraction" in got
                 else got["radiance"]
             )
+            # Pilots only decide how many points count; their bounds and checks are not those of the
+            # result.
             if part != PILOT:
                 add(active[rows], got)
             done += len(active[rows]) / len(active)
@@ -194,11 +191,12 @@ def _controlled(found: Array, fractions: Array) -> Array:
     s) c more. c is the sum for the whole solid angle by the other replicates, which are independent
     of s: the mean does not change.
     """
+    # Leave one out: the sums and fractions of the seven other replicates.
     others = fractions.sum(axis=1, keepdims=True) - fractions
-    worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[
+    whole = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[
         :, None
     ]
-    return found + (1 - fractions)[:, None] * worth
+    return found + (1 - fractions)[:, None] * whole
 
 
 def turn_of_sections(plan: PointPlan, number: int) -> float:
@@ -221,32 +219,42 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         np.zeros((count, 3)),
         [RandomChecks()],
     )
+    # A block has as many rays as make `_PAIRS` pairs of ray and sample.
     step = max(1, _PAIRS // each)
 
     def lit_pairs() -> Iterator[tuple[slice, Rays, Array, Array, LitIntervals]]:
         for first in range(0, count, step):
             rows = slice(first, first + step)
             direction, distance = reference.direction[active[rows]], beam.distance[active[rows]]
+            # One row for each pair, ray by ray: the sample is the point light of the ray's plane.
             samples = samples_for_rays(light, reference.origin, direction, distance, points[rows])
             place, normal, weight = samples.flat()
             rays = rays_at(reference.origin, np.repeat(direction, each, axis=0), place)
+            # A sample sends light only to the side of its normal: the ray is cut at the plane of
+            # the sample, at the camera, and at the visible surface. Where nothing is left, low =
+            # high.
             low, high = before(rays, normal)
             ends = np.maximum(low, 0.0), np.minimum(high, np.repeat(distance, each))
             ends = ends[0], np.maximum(*ends)
             of = np.repeat(active[rows], each)
-            lit = lit_intervals(
-                rays, ends, beam.known(), of=of, checks=1, every=_EVERY, normal=normal
-            )
+            # A shadow ray checks every seventh pair: an odd number steps through all samples.
+            lit = lit_intervals(rays, ends, beam.known(), of=of, checks=1, every=7, normal=normal)
             yield rows, rays, normal, weight, lit
 
     def summed(
         work: tuple[slice, Rays, Array, Array, LitIntervals],
     ) -> tuple[slice, RandomChecks, Array, Array]:
         rows, rays, normal, weight, lit = work
-        terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=_RTOL)
+        # The tolerance of one sample's integral, whose estimate is many digits too large, is far
+        # below the error of a mean.
+        terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=1e-6)
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
+        # Parts that shadow rays left in doubt may be lit or not: their largest airlight is added to
+        # the bound.
         parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
+        # dA of a sample and the radiance of the light make radiance of the sums. The samples of a
+        # ray are in the order of replicates, and each replicate is added up on its own.
         value, error = (
             (part * weight[:, None]).reshape(-1, REPLICATES, each // REPLICATES, 3).sum(axis=2)
             * light.radiance
@@ -260,6 +268,7 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
 
     # NumPy, which sums, works on one processor and releases Python's lock meanwhile. Dr.Jit, which
     # finds the intervals, has threads of its own.
+    # The queue is short, so that waiting blocks do not fill the memory.
     with ThreadPoolExecutor(dr.thread_count()) as pool:
         waiting: deque[Future] = deque()
         for pairs in lit_pairs():
@@ -268,8 +277,8 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
                 add(*waiting.popleft().result())
         for future in waiting:
             add(*future.result())
-    known = RandomChecks.of_all(checks)
-    counts = known.checked, known.disagreements, known.refined, known.left, known.missed
+    report = RandomChecks.of_all(checks)
+    counts = report.checked, report.disagreements, report.refined, report.left, report.missed
     return {"radiance": radiance, "bound": bound, "checks": np.array(counts)}
 
 
@@ -295,6 +304,7 @@ def area_surface(
     rows = np.flatnonzero(np.isfinite(hits.distance))
     if not len(rows):
         return result
+    # The light that leaves a surface is attenuated on its way to the camera, whatever lit it.
     reflection = Reflection(hits.interaction)
     depth = optical_depth(
         reference,
@@ -305,6 +315,8 @@ def area_surface(
     )
 
     turns = [turn_of_sections(plan, number) for number in range(len(beams))]
+    # In a penumbra mirrored pairs have the smaller error, elsewhere samples that are even in the
+    # solid angle: each surface point uses one kind under each light.
     hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
     def work(number: int, active: Index, points: Callable[[str], RayPoints]) -> Kept:
@@ -347,14 +359,17 @@ class _View:
         end = self.beam.distance[active]
         point = reference.origin + end[:, None] * reference.direction[active]
         away = point - light.centre
+        # Only points before the emitting side have sections. A point closer to a sphere than 1e-5
+        # of the radius touches it.
         if light.kind == "sphere":
-            sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
+            sees = np.linalg.norm(away, axis=1) > light.radius * (1 + 1e-5)
         elif light.kind == "mesh":
             sees = np.ones(len(away), bool)  # the samples say it, triangle by triangle
         else:
             sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
         seeing = np.flatnonzero(sees)
-        # For its section a surface point is the light.
+        # For its section a surface point is the light: what can stand between is looked for about a
+        # ball that holds all of these points.
         middle = point.mean(axis=0) if len(point) else light.centre
         ball = Ball(middle, float(np.linalg.norm(point - middle, axis=1).max(initial=0.0)))
         around = replace(self.beam.known(), light=ball)
@@ -363,17 +378,17 @@ class _View:
             rows = seeing[first : first + step]
             square = self.points[rows]
             sections = sections_for_points(light, point[rows], square, self.turn, self.even)
-            # Looked at from a little before the surface, where the camera sees it: what
-            # hides there is not its own.
+            # Sections are looked at from a little before the surface, 1e-6 of the way: the surface
+            # must not hide the light from itself.
             eye = (
                 reference.origin
-                + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
+                + (end - 1e-6 * (1 + end))[rows, None] * reference.direction[active[rows]]
             )
             eye = np.repeat(eye, each, axis=0)
-            seen = seen_samples(
+            samples = seen_samples(
                 sections, eye, around, np.repeat(active[rows], each), square[..., 1].ravel()
             )
-            yield rows, point[rows], seen, sections.weight.reshape(-1, each)
+            yield rows, point[rows], samples, sections.weight.reshape(-1, each)
 
 
 def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
@@ -387,11 +402,15 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
         light.kind == "sphere" and distance_to(beam.known().shapes, light.centre) >= light.radius
     )
     if light.kind in ("rectangle", "disk") or whole_sphere:
-        square = np.stack([(np.arange(_PROBES) + 0.5) / _PROBES, np.full(_PROBES, 0.5)], axis=1)
+        # Eight sections at even azimuths, the same for all points, say whether a surface point sees
+        # the light as a whole; the place drawn in a section does not matter.
+        probes = 8
+        square = np.stack([(np.arange(probes) + 0.5) / probes, np.full(probes, 0.5)], axis=1)
         points = RayPoints(square, np.zeros((len(active), REPLICATES, 2)), "")
         for rows, _, (row, _, weight), whole in _View(beam, points, turn, True).seen(active):
-            seen = np.bincount(row, weight, whole.size).reshape(whole.shape)
-            hidden[rows] = (seen < (1 - _WHOLE) * whole).any(axis=1)
+            visible = np.bincount(row, weight, whole.size).reshape(whole.shape)
+            # 1e-6 of the solid angle of a section is rounding.
+            hidden[rows] = (visible < (1 - 1e-6) * whole).any(axis=1)
     return hidden
 
 
@@ -407,22 +426,27 @@ def _reflected(
     light, reference, each = view.beam.light, view.beam.scene, len(view.points)
     total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
     for rows, point, (row, place, weight), whole in view.seen(active):
+        # Even sections have a known total, the solid angle in closed form: the control variate. The
+        # solid angle of a disk has no closed form here.
         if view.even and light.kind != "disk":
             means = whole.reshape(len(rows), REPLICATES, -1).mean(axis=2)
             fraction[rows] = means / solid_angle(light, point)[:, None]
+        # `row` numbers sections, point by point; `of` numbers the rays of this call.
         of = rows[row // each]
         point = point[row // each]
         way = place - point
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
+        # The place is on the disk that the tangents touch: the way through the medium ends at the
+        # sphere.
         if light.kind == "sphere":
             r = to_sphere(light, point - light.centre, towards)
         value = reflection(active[of], towards)
         shadow = optical_depth(reference, point, towards, np.zeros(len(of)), shadow_scale * r)
         radiance = value * np.exp(-shadow) * weight[:, None] * light.radiance
         # The sections of a point are in the order of replicates.
-        found = sums_of(row * REPLICATES // each, radiance, len(rows) * REPLICATES)
-        total[rows] = np.moveaxis(found.reshape(len(rows), REPLICATES, 3), 1, 2)
+        sums = sums_of(row * REPLICATES // each, radiance, len(rows) * REPLICATES)
+        total[rows] = np.moveaxis(sums.reshape(len(rows), REPLICATES, 3), 1, 2)
     return total, fraction
 
 
@@ -441,5 +465,6 @@ def seen_samples(
         sections.start, sections.way / np.maximum(length, np.finfo(float).tiny)[:, None], eye
     )
     lit = lit_intervals(rays, (0 * length, length), known, of=of, checks=0)
+    # Sections count in fractions of their length, intervals in metres.
     of_length = length[lit.ray]
     return sections.drawn(replace(lit, low=lit.low / of_length, high=lit.high / of_length), uniform)

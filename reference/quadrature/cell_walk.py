@@ -25,8 +25,6 @@ import numpy as np
 from airlight.reference.scene.device import on_device
 from airlight.reference.scene.varying import GridMedium
 
-_GAUSS = 12.0**-0.5  # half of the distance of the two nodes over the width
-
 
 @dataclass(frozen=True)
 class CellWalk:
@@ -51,12 +49,19 @@ class CellWalk:
 
     def within(self, origin, direction, x0, x1) -> Any:
         """Return the integral of the extinction between two distances in one cell."""
-        middle, half = dr.fma(direction, 0.5 * (x0 + x1), origin), direction * (_GAUSS * (x1 - x0))
+        # d = (b - a)/(2 sqrt 3): both nodes are this far from the middle. The cell is found by the
+        # middle alone: rounding at a face must not take a node to the next cell.
+        middle, half = (
+            dr.fma(direction, 0.5 * (x0 + x1), origin),
+            direction * (12.0**-0.5 * (x1 - x0)),
+        )
         cell = self._in_cell(middle)
         return 0.5 * (x1 - x0) * (cell(middle - half) + cell(middle + half))
 
     def depth(self, origin, direction, x0, x1) -> Any:
         """Return the integral of the extinction between two distances in the box."""
+        # The next plane of each axis in the direction of the walk. A start on a plane goes to the
+        # plane after it.
         start, inverse = origin + direction * x0, dr.rcp(direction)
         signs = [dr.select(part > 0, mi.Float64(1), -1) for part in direction]
         planes = [dr.floor(at * sign) * sign + sign for at, sign in zip(start, signs, strict=True)]
@@ -69,11 +74,15 @@ class CellWalk:
                 )
                 for axis in range(3)
             ]
+            # The nearest plane ends the step; all axes whose plane is there go on to their next
+            # one. A line parallel to an axis never meets a plane of it.
             end = dr.minimum(dr.minimum(ends[0], ends[1]), dr.minimum(ends[2], x1))
             moved = [
                 dr.select(ends[axis] <= end, planes[axis] + signs[axis], planes[axis])
                 for axis in range(3)
             ]
+            # Rounding may put a plane before the place that is already reached: the step then has
+            # no length.
             end = dr.maximum(x, end)
             return end, *moved, total + self.within(origin, direction, x, end)
 
@@ -88,6 +97,8 @@ class CellWalk:
         it is around one of them.
         """
         nx, ny, nz = self.counts
+        # Beyond the centres of the outermost voxels the extinction is constant: u, v, w are clipped
+        # there.
         cell = [
             dr.clip(dr.floor(at), 0, max(count - 2, 0))
             for at, count in zip(place, self.counts, strict=True)
@@ -95,6 +106,8 @@ class CellWalk:
         i, j, k = (mi.Int32(each) for each in cell)
         voxel = mi.UInt32((k * ny + j) * nx + i)
         near = dr.gather(mi.Vector4d, self.table, voxel)
+        # The table has the neighbours in x and y beside each voxel: two gathers are all eight
+        # corners. A grid of one layer has no next one in z.
         rise = dr.gather(mi.Vector4d, self.table, voxel + (nx * ny if nz > 1 else 0)) - near
 
         def extinction(place):
@@ -108,6 +121,7 @@ class CellWalk:
 def cell_walk(medium: GridMedium) -> CellWalk:
     """Put a grid on the device."""
     values = medium.values
+    # The last voxel of a row is its own neighbour, which only a grid of one voxel in a row reads.
     beside = np.concatenate([values[:, :, 1:], values[:, :, -1:]], axis=2)
     behind, both = (
         np.concatenate([each[:, 1:], each[:, -1:]], axis=1) for each in (values, beside)

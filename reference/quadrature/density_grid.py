@@ -28,9 +28,6 @@ from airlight.reference.visibility.planes import Rays
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-RTOL = 1e-6  #: of the sum of a ray and a light
-_RAYS = 2048  # summed at once
-
 
 @dataclass(frozen=True)
 class GridField:
@@ -63,6 +60,7 @@ class GridField:
         rows = np.flatnonzero(ends[1] > ends[0])
         depth = np.zeros(len(direction))
         if len(rows):
+            # The walk counts in voxels: places and directions are scaled, distances stay in metres.
             start, way = (
                 self.medium.voxels(origin[rows]),
                 direction[rows] * self.medium.voxels_per_metre,
@@ -71,6 +69,7 @@ class GridField:
             depth[rows] = np.array(
                 self.walk.depth(vectors(mi.Vector3d, start), vectors(mi.Vector3d, way), x0, x1)
             )
+        # Density grids have one extinction for all channels.
         return np.repeat(depth[:, None], 3, axis=1)
 
     def leave(self, origin: Array, direction: Array) -> Array:
@@ -86,12 +85,15 @@ class GridField:
         near, far = self.medium.crossed(
             np.broadcast_to(rays.origin, rays.direction.shape), rays.direction
         )
+        # Nothing scatters outside of the box of the grid.
         ray, low, high = stretches
         low, high = np.maximum(low, near[ray]), np.minimum(high, far[ray])
-        terms = replace(terms, rtol=terms.rtol or RTOL)
+        # The relative tolerance of the sum of a ray and a light, and the rays summed at once.
+        terms = replace(terms, rtol=terms.rtol or 1e-6)
+        step = 2048
         value, error = np.zeros((2, len(rays.foot), 3))
-        for first in range(0, len(rays.foot), _RAYS):
-            block = slice(first, min(first + _RAYS, len(rays.foot)))
+        for first in range(0, len(rays.foot), step):
+            block = slice(first, min(first + step, len(rays.foot)))
             chosen = (ray >= block.start) & (ray < block.stop) & (high > low)
             if chosen.any():
                 pieces = cut(
@@ -105,9 +107,11 @@ class GridField:
 
     def _faces(self, rays: Rays, ray: Index, near: Array, far: Array) -> Kinks:
         """Return where rays cross the faces of cells."""
+        # Along each axis cells end at whole numbers of voxels: a ray crosses the planes between its
+        # places at both ends of the box, `first` the lowest of them and `many` their number.
         ray = np.unique(ray)
         origin = np.broadcast_to(self.medium.voxels(rays.origin), rays.direction.shape)[ray]
-        found = []
+        crossings = []
         for axis, count in enumerate(self.medium.values.shape[::-1]):
             rate = rays.direction[ray, axis] * self.medium.voxels_per_metre[axis]
             ends = np.sort(origin[:, axis] + np.stack([near[ray], far[ray]]) * rate, axis=0)
@@ -116,10 +120,12 @@ class GridField:
                 np.clip(np.floor(ends[1]), -1, count - 1).astype(np.int64) - first + 1, 0
             )
             many[rate == 0] = 0
-            own = np.repeat(np.arange(len(ray)), many)
-            plane = first[own] + np.arange(len(own)) - np.repeat(np.cumsum(many) - many, many)
-            found.append((ray[own], (plane - origin[own, axis]) / rate[own]))
-        rays_of, places = (np.concatenate(column) for column in zip(*found, strict=True))
+            # One row for each crossing: the ray, and which of its planes it is, counted from
+            # `first`.
+            owner = np.repeat(np.arange(len(ray)), many)
+            plane = first[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)
+            crossings.append((ray[owner], (plane - origin[owner, axis]) / rate[owner]))
+        rays_of, places = (np.concatenate(column) for column in zip(*crossings, strict=True))
         return rays_of, places
 
     def _integrand(self, rays: Rays, pieces: Pieces, terms: Terms) -> "_Integrand":
@@ -151,6 +157,8 @@ class _Integrand:
         self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
     ) -> tuple[Array, Array]:
         rays, medium, walk, ray = self.rays, self.grid.medium, self.grid.walk, self.pieces.ray[rows]
+        # One lane for each node; `row` is the piece of the lane. The number of nodes is opaque, so
+        # that all rules share one kernel.
         row = dr.arange(mi.UInt32, x.size) // dr.opaque(mi.UInt32, x.shape[1])
 
         def by_row(numbers: Array) -> Any:
@@ -164,6 +172,7 @@ class _Integrand:
         )
         at, begin = on_device(mi.Float64, x.ravel()), by_row(self.pieces.x0[rows])
         place = dr.fma(way, at, start)
+        # tau_camera: up to the piece, and from its beginning on within its one cell.
         depth = by_row(self.before[rows]) + walk.within(start, way, begin, at)
         if rays.w:  # the path to the light in parts of its length
             path = target - place

@@ -18,10 +18,6 @@ from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
 
-_OWN = 1e-4  # relative: a surface this close to a light is the light's own, or touches it
-_PAST = 1e-5  # of a distance, and [m]: how far beyond a crossing of a mesh the next is looked for
-_FAR = 1e30  # beyond all bounds of media [m]
-
 
 def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
     """Return the radiance of area lights before the visible surface, and of the
@@ -43,7 +39,9 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
             else [_distance(light, reference)]
         )
         for at in places:
-            rows = np.flatnonzero(at <= distance * (1 + _OWN))
+            # A surface as close to a light as 1e-4 of its distance is the light's own, or touches
+            # it. NaN, where the ray misses the light, compares as false.
+            rows = np.flatnonzero(at <= distance * (1 + 1e-4))
             depth = optical_depth(
                 reference,
                 reference.origin,
@@ -54,12 +52,13 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
             total[rows] += light.radiance * np.exp(-depth)
     if reference.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
+        # The background is seen through all media: 1e30 m is beyond their bounds.
         depth = optical_depth(
             reference,
             reference.origin,
             reference.direction[rows],
             np.zeros(len(rows)),
-            np.full(len(rows), _FAR),
+            np.full(len(rows), 1e30),
         )
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
         interaction.wi = vectors(mi.Vector3f, -reference.direction[rows])
@@ -80,9 +79,13 @@ def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Ite
         )
         at = start + np.array(hit.t, dtype=np.float64)
         walking &= np.isfinite(at)
+        # A black mesh hides what is behind its first crossing; through one of material `null` the
+        # ray goes on, and may meet the emitting side again.
         yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
         walking &= not light.opaque
-        start = np.where(walking, at * (1 + _PAST) + _PAST, start)
+        # The next crossing is looked for 1e-5 of the distance and 1e-5 m beyond this one, which
+        # float32 rays would otherwise meet again.
+        start = np.where(walking, at * (1 + 1e-5) + 1e-5, start)
 
 
 def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:

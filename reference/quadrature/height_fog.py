@@ -29,9 +29,6 @@ from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 
-RTOL = 1e-10  #: of the integral of each stretch
-_ROUNDING = 64 * np.finfo(np.float64).eps  # of a sum of optical depths, for one of 1
-
 
 def fog_of(medium: HeightMedium) -> HeightFog:
     """Return the density of height fog."""
@@ -73,6 +70,7 @@ class HeightField:
         start, rise = origin @ self.medium.up, direction @ self.medium.up
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack([(z - start) / rise for z in (self.medium.floor, self.medium.cap)])
+        # A level ray stays in the fog for ever, or is never in it.
         level = np.where((start >= self.medium.floor) & (start <= self.medium.cap), np.inf, 0.0)
         return np.where(rise == 0, level, np.maximum(ends.max(axis=0), 0.0))
 
@@ -102,6 +100,8 @@ def _of_places(
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     of_light = np.broadcast_to(rays.position, rays.direction.shape)[ray] @ medium.up
+    # Fog depends on the height alone: the closed form needs the heights of origin and light, the
+    # rise of the ray, and the place of the light about the ray.
     heights = HeightRays(
         np.broadcast_to(rays.origin @ medium.up, len(ray)),
         rays.direction[ray] @ medium.up,
@@ -111,12 +111,14 @@ def _of_places(
     )
     profile = terms.profile
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
-    how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or RTOL}
+    # The relative tolerance of the integral of each stretch.
+    how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or 1e-10}
     ends = x0, np.maximum(x0, x1)
     value, error = height_fog_segments(
         fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how
     )
-    # a relative uncertainty of the distance from the light adds r times the integrand
+    # The uncertainty of an end is relative to its distance r from the light: the strip there is r
+    # edge long, and r times the integrand, which has 1/r^2, gives 1/r.
     for x in (x0, x1):
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
         r = np.maximum(np.hypot(rays.height[ray], s), np.finfo(np.float64).tiny)
@@ -138,6 +140,7 @@ def _of_suns(
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     origin, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up
+    # The rise of the way to the sun, one for all rays.
     mu = (
         float(np.broadcast_to(rays.position, rays.direction.shape)[0] @ medium.up)
         if len(rays.direction)
@@ -147,14 +150,18 @@ def _of_suns(
     value = height_fog_sun(fog, origin, rise, x0, x1, sun=mu, phase=phase)
     error = np.zeros_like(value)
     for x in (x0, x1):
+        # The strip at an end that is uncertain by `edge` [m]; at infinity there is no light.
         at = np.where(np.isfinite(x), x, 0.0)
         z = origin + rise * at
         depth = fog.optical_depth(origin, z, at) + fog.unbounded(z, mu)
         with np.errstate(over="ignore"):
             f = np.exp(fog.log_density(z) - depth) * phase
         error += edge[ray] * np.where(np.isfinite(x), f, 0.0)
-        # The exponent carries the rounding of its own size and of heights in scale heights.
+        # The exponent carries the rounding of its own size and of heights in scale heights: 64
+        # roundings of a sum of optical depths, for a depth of 1. Beyond a depth of 745 the light
+        # is zero in float64.
+        rounding = 64 * np.finfo(np.float64).eps
         error += (
-            _ROUNDING * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
+            rounding * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
         )
     return value, error

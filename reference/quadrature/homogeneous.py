@@ -9,11 +9,11 @@ in a direction (w = 0, `reference.visibility.planes`),
     tau_camera = tau_0 + sigma_m (x - x_0),
     tau_shadow = sigma_0 s r + sum_j (sigma_j - sigma_0) |[enter_j, leave_j] and [0, s r]|,
 
-I its intensity or irradiance, r the distance to it, enter_j and leave_j the distances from the
-point x at which the shadow segment enters and leaves body j; s is `shadow_scale`. Under a
-directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in v =
-asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth beside the light as far
-from it; else in x.
+I the intensity or irradiance of the light, r the distance to it, enter_j and leave_j the distances
+from the point x at which the shadow segment enters and leaves body j; s is `shadow_scale`. Under a
+directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in the variable
+v = asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth beside the light as
+far from it; else in x.
 
 Lit stretches are cut at the bounds of the media, where a shadow segment passes a corner of a body
 or touches it (`reference.quadrature.segments`), and at the kinks of tabulated phase functions. On
@@ -22,10 +22,10 @@ the distance
 
     r (d - n . x) / (n . P - w n . x),      P the light, x the point, r = |P - w x|.
 
-These are looked up once between two kinks of the segment, so that a node costs as much as its
-bodies, not their facets. The pieces are integrated by Gauss and Kronrod's pairs on panels that are
-halved until a ray meets the tolerance (see `analytic.panels`), once for channels whose extinction
-is the same in all media.
+The two facets are looked up once between two kinks of the segment, so that the cost of a node
+grows with the number of bodies, not of facets. The pieces are integrated by Gauss and Kronrod's
+pairs on panels that are halved until a ray meets the tolerance (see `analytic.panels`), once for
+channels whose extinction is the same in all media.
 """
 
 from dataclasses import dataclass, field, replace
@@ -49,8 +49,6 @@ from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-_RAYS = 4096  # rays at once
 
 
 @dataclass(frozen=True)
@@ -85,9 +83,11 @@ class HomogeneousField:
 
     def leave(self, origin: Array, direction: Array) -> Array:
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
+        # A medium without bounds that scatters goes on for ever.
         if strongest(homogeneous_around(self.reference)).any():
             return np.full(len(direction), np.inf)
         spans = [crossings(medium.bounds, origin, direction) for medium in self.reference.media]
+        # A body that the ray misses, or that is behind its beginning, ends at 0.
         ends = [np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans]
         return np.max([np.zeros(len(direction)), *ends], axis=0)
 
@@ -103,17 +103,21 @@ class HomogeneousField:
         if not self.strongest.any():
             return total, bound
         ray, x0, x1 = stretches
-        for first in range(0, count, _RAYS):
-            chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
+        step = 4096  # rays at once
+        for first in range(0, count, step):
+            # Cutting needs intervals of a positive length.
+            chosen = (ray >= first) & (ray < first + step) & (x1 > x0)
             pieces, kinks = smooth_pieces(
                 self.reference, rays, segments, (ray[chosen], x0[chosen], x1[chosen])
             )
             if len(pieces.ray):
-                block = slice(first, first + _RAYS)
+                block = slice(first, first + step)
                 integrand = _Integrand(
                     self.reference, pieces, rays[pieces.ray], kinks, terms.shadow_scale
                 )
                 total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, terms)
+        # The pieces carry phase functions of mean 1; 1/(4 pi) makes a density over the sphere of
+        # them.
         return total / (4 * np.pi), bound / (4 * np.pi)
 
 
@@ -126,15 +130,16 @@ def smooth_pieces(
     Returns the pieces, and rays and distances of the kinks of the shadow segments through
     each of the bounded media.
     """
-    used = np.unique(stretches[0])
-    found: list[Kinks] = []
+    used = np.unique(stretches[0])  # rays that have a lit stretch
+    body_kinks: list[Kinks] = []
     for medium in reference.media:
         row, x = shadow_kinks(medium.bounds, rays[used])
-        found.append((used[row], x))
+        body_kinks.append((used[row], x))
+    # Along a ray a directional light has one scattering angle, and no kink of a phase function.
     phases = _kinks_of_phases(reference, rays, used) if rays.w else []
     none = np.empty(0, np.int64), np.empty(0)
-    ray, x = (np.concatenate(column) for column in zip(none, *found, *phases, strict=True))
-    return cut_pieces(reference, rays, segments, stretches, (ray, x)), found
+    ray, x = (np.concatenate(column) for column in zip(none, *body_kinks, *phases, strict=True))
+    return cut_pieces(reference, rays, segments, stretches, (ray, x)), body_kinks
 
 
 def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
@@ -143,6 +148,8 @@ def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list
     for phase in {
         id(medium.phase): medium.phase for medium in (reference.medium, *reference.media)
     }.values():
+        # The scattering angle has the cosine c where x - foot = -height c / sqrt(1 - c^2). Phase
+        # functions that media share are asked once.
         offset = np.outer(rays.height[used], -phase.kinks / np.sqrt(1 - phase.kinks**2))
         every.append((np.repeat(used, len(phase.kinks)), (rays.foot[used, None] + offset).ravel()))
     return every
@@ -173,6 +180,8 @@ class _Integrand:
             sigma_t * by_medium(reference, "albedo", pieces.medium),
             sigma_t.max(axis=1),
         )
+        # Channels whose extinction is the same in all media have the same integrals: each set is
+        # integrated once, and `same` gives it to its channels.
         every = np.stack([medium.sigma_t for medium in (reference.medium, *reference.media)])
         _, self.different, self.same = np.unique(
             every, axis=1, return_index=True, return_inverse=True
@@ -192,6 +201,9 @@ class _Integrand:
             + inside[:, :, None] * self.sigma_t[rows, None]
         )
         around = reference.medium.sigma_t[self.different]
+        # `tau_shadow` of the derivation: the medium around over all of the segment, and what bodies
+        # differ from it over what lies in them. A directional light's segment is unbounded and only
+        # bodies attenuate it; around * inf would be no number where around is 0.
         limit = self.scale * r if self.own.w else r
         if np.any(around > 0):
             depth += limit[:, :, None] * around
@@ -204,11 +216,12 @@ class _Integrand:
     def phase(self, rows: Index, scatter: Array) -> Array:
         """Return the phase function of each piece's medium."""
         numbers = self.pieces.medium[rows]
-        known = np.unique(numbers)
-        if len(known) == 1:
-            return medium_of(self.reference, int(known[0])).phase(scatter)
+        media = np.unique(numbers)
+        # Most blocks lie in one medium; then its phase function is asked for the whole array.
+        if len(media) == 1:
+            return medium_of(self.reference, int(media[0])).phase(scatter)
         result = np.empty(scatter.shape)
-        for number in known:
+        for number in media:
             chosen = numbers == number
             result[chosen] = medium_of(self.reference, int(number)).phase(scatter[chosen])
         return result
@@ -229,6 +242,8 @@ class _Body:
     def of(own: Rays, pieces: Pieces, bounds: Bounds, kinks: Kinks) -> "_Body":
         if isinstance(bounds, Sphere):
             return _Body(own, bounds, np.empty(0, np.int64), ())
+        # Within a run the segment enters and leaves through the same two facets: the middle of the
+        # run finds them for all of its nodes.
         run, first, last = _runs(pieces, kinks)
         lines = own[first]
         middle = 0.5 * (pieces.x0[first] + pieces.x1[last])
@@ -247,6 +262,9 @@ class _Body:
             (enter, missed | (low <= 0), False),
             (leave, missed, high >= r),
         ):
+            # Where the segment misses the body, or begins inside of it, it enters at 0; where it
+            # ends inside of it, it leaves at infinity, and `length` cuts it at the light. Slope 0
+            # and rise 1 make the quotient of `length` these numbers.
             given = at_zero | unbounded
             room = bounds.offset[facet] - bounds.normal[facet] @ own.origin
             slope = np.sum(bounds.normal[facet] * lines.direction, axis=1)
@@ -268,6 +286,7 @@ class _Body:
             enter, leave = self._sphere(rows, x, r)
         else:
             run, w = self.run[rows], self.own.w
+            # The distance r (d - n . x) / (n . P - w n . x) to the planes of both facets.
             way = r if w else 1.0
             with np.errstate(divide="ignore", invalid="ignore"):
                 enter, leave = (
@@ -299,6 +318,8 @@ def _runs(pieces: Pieces, kinks: Kinks) -> tuple[Index, Index, Index]:
     # Kinks come before the pieces that begin at them.
     ray, x = np.concatenate([kinks[0], pieces.ray]), np.concatenate([kinks[1], pieces.x0])
     everything = np.lexsort((np.arange(len(ray)), x, ray))
+    # All kinks and beginnings of pieces in the order of rays and distances: the kinks before a
+    # piece are a running count. A run begins with a part of a stretch, or where this count changes.
     is_piece = everything >= len(kinks[0])
     kinks_before = np.empty(len(pieces.ray), np.int64)
     kinks_before[everything[is_piece] - len(kinks[0])] = np.cumsum(~is_piece)[is_piece]

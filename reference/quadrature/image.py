@@ -6,8 +6,8 @@ A mean over a pixel is a sum over positions in it: eight replicates of a scrambl
 is the standard error, and a pilot that says how many positions a pixel needs. Each pixel has
 positions of its own, so that errors average out over an image (`reference.quadrature.replicates`).
 Near a light the radiance grows as one over the distance to it on the film: the mean over an area is
-finite. Under area lights each replicate has samples of its own of them, and its spread is that of
-both.
+finite. Under area lights each replicate also has light samples of its own: its spread is the
+spread of positions and samples.
 """
 
 from dataclasses import replace
@@ -39,7 +39,6 @@ Index = NDArray[np.int64]
 
 _POSITIONS = PointPlan(first=4, most=128)  # of each replicate in a pixel
 _LIGHTS = PointPlan(error=0.0, first=4, most=4)  # of each replicate of a position
-_CHUNK = 1 << 17  # rays at once
 
 
 def rays_of_pixel(pixel: str) -> tuple[int, int]:
@@ -93,6 +92,7 @@ def quadrature_image(
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; expected 'centre' or 'area'")
     values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
+    # Airlight and surface have three columns each; emitted light three, or none.
     layers = np.concatenate(
         [values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1
     )
@@ -115,6 +115,7 @@ def _image(
     """
     shape, checked = (reference.height, reference.width), centre.random_checks
     extra: dict[str, Any] = {"bound_kind": kind}
+    # Nine columns mean that area lights or a background are seen.
     extra |= {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
     if replicates is not None:
         errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
@@ -145,11 +146,12 @@ def _means(
 ) -> ReferenceImage:
     """Return the means over the areas of all pixels."""
     size, shapes = (reference.width, reference.height), read_shapes(reference.occluders)
-    corner = pixel_centres(size) - 0.5
+    corner = pixel_centres(size) - 0.5  # of each pixel on the film, in pixels
     sensor = reference.scene.sensors()[0]
     seed = plan.seed if plan is not None else 0
     bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
-    # Replicates are looked at together, but under area lights each has samples of them of its own.
+    # All replicates of positions share a call of `ray_values`; under area lights each replicate is
+    # a call with light samples of its own, so that its spread is that of positions and samples.
     groups = (
         [[replicate] for replicate in range(REPLICATES)]
         if reference.is_sampled
@@ -160,14 +162,17 @@ def _means(
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
         points = RayPoints.of(chosen, 0, len(corner), "pixel")
-        step = max(1, _CHUNK // (len(groups[0]) * chosen.most))
+        step = max(1, (1 << 17) // (len(groups[0]) * chosen.most))  # pixels of 2^17 rays at once
         total = []
         for group in groups:
             parts = []
             for first in range(0, len(active), step):
                 pixels = active[first : first + step]
+                # Positions of the replicates of this group in each pixel.
                 square = points[pixels].reshape(len(pixels), REPLICATES, chosen.most, 2)[:, group]
                 positions = (corner[pixels, None, None] + square).reshape(-1, 2)
+                # A seed of the light samples for each number of positions, group and block: errors
+                # of pixels are independent.
                 seeds = np.random.default_rng((chosen.seed, chosen.most, group[0], first))
                 of_lights = replace(_LIGHTS, seed=int(seeds.integers(1 << 62)))
                 direction = film_directions(sensor, positions, size)
@@ -177,6 +182,7 @@ def _means(
                 emitted = ray.emitted.reshape(len(direction), -1)
                 values = np.concatenate([ray.airlight, ray.surface, emitted], axis=1)
                 parts.append(values.reshape(*square.shape[:3], -1).sum(axis=2))
+                # A pilot decides and is not counted, so its bounds are none of the result's.
                 if part != PILOT:
                     bounds[pixels] += ray.bound.reshape(len(pixels), -1, 3).sum(axis=1)
                     checks.append(ray.random_checks)
@@ -186,10 +192,12 @@ def _means(
                 progress(done, rounds, "positions in pixels")
         return np.moveaxis(np.concatenate(total, axis=1), 1, 2)
 
+    # Distance and light angle of a pixel are those of its centre. Errors are relative to the means
+    # alone: `known` is zero.
     centre = ray_values(reference, plan=_LIGHTS, shapes=shapes, **how)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)
-    known = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
-    means, counts = replicate_means(len(corner), known, chosen, sums)
+    other_light = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
+    means, counts = replicate_means(len(corner), other_light, chosen, sums)
     if progress is not None:
         progress(rounds, rounds, "positions in pixels")
     checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))

@@ -19,10 +19,6 @@ from airlight.reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
 
-_LEAST_SINE = 1e-4  # between a ray and a sun: along closer ones it is looked no further for shadows
-# relative: an interval that ends this close to where a ray was looked at goes on to there
-_END = 1e-6
-
 
 @dataclass(frozen=True)
 class LightAirlight:
@@ -61,14 +57,16 @@ def light_airlight(
     (rays,), infinite where there is none [m]; `shadow_scale`: see
     `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
-    found = lit_rays(reference, light, distance, **how)
-    rays, lit, angle = found.rays, found.lit, np.full(len(distance), np.pi)
+    illumination = lit_rays(reference, light, distance, **how)
+    rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
     if isinstance(light, DirectionalLight):
         strength = light.irradiance
-        radiance, bound = _sun_sums(reference, light, found)
+        radiance, bound = _sun_sums(reference, light, illumination)
     else:
         strength = light.intensity
         radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)
+        # The angle at the camera between ray and light counts where the foot of the light is before
+        # the surface.
         in_front = (rays.foot > 0) & (rays.foot < distance)
         angle = np.where(in_front, np.arctan2(rays.height, rays.foot), angle)
     bound = bound + worth_of_doubt(reference, rays, lit) * strength
@@ -128,8 +126,10 @@ def lit_rays(
             Ball(-light.direction, w=0),
         )
         shapes = read_shapes(reference.occluders) if shapes is None else shapes
-        # No shadow falls on a ray where it has left the light's cylinder about all shapes.
-        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
+        # No shadow falls on a ray where it has left the light's cylinder about all shapes. `height`
+        # is the sine between ray and sun. Along rays with a sine below 1e-4 shadows are looked for
+        # as far as at a sine of 1e-4.
+        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / 1e-4)
         last = np.minimum(field_of(reference).leave(reference.origin, reference.direction), clear)
         far = np.where(np.isfinite(distance), distance, last)
         ends = np.zeros_like(far), far
@@ -139,10 +139,13 @@ def lit_rays(
             Ball(light.position),
             distance,
         )
+        # Only the part of a ray in the cone of a spot is lit; a ray that misses the cone gets an
+        # empty interval.
         cone = cone_interval(rays, light, light.cutoff)
         none = cone[0] > cone[1]
         ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
         ends = np.where(none, 0.0, ends[0]), np.where(none, 0.0, ends[1])
+        # A sample of an area light sends light to one side of its plane.
         if light.cosine and light.axis is not None:
             normal = np.broadcast_to(light.axis, reference.direction.shape)
     known = obstacles(reference, ball, far, shapes) if known is None else known
@@ -155,10 +158,11 @@ def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
     its ray leaves the media.
     """
     lit = found.lit
-    # Behind all that could stand in the light, a ray is lit or not as at the
-    # end of what was looked at.
+    # Behind all that could stand in the light, a ray is lit or not, as it is at the end of the part
+    # that was looked at. It then goes on to where it leaves the media.
     goes_on = (reaches(lit, found.end) & np.isinf(found.distance))[lit.ray]
-    last = lit.high * (1 + _END) >= found.end[lit.ray]
+    # An interval that ends within 1e-6 of where its ray was looked at ends there.
+    last = lit.high * (1 + 1e-6) >= found.end[lit.ray]
     leaves = np.where(
         goes_on & last,
         field_of(reference).leave(reference.origin, reference.direction)[lit.ray],

@@ -20,33 +20,33 @@ sphere that the line of the ray misses are those of the quadratic form
 
     e^T M e <= 0,     M = c c^T - R^2 (1 - n n^T)     (a sphere: n = 0),
 
-e the unit normal of the half plane, c the way from the ray to the centre. With its eigenvalues
--a <= 0 < b and the angle delta from the middle, half the chord is proportional to sqrt(S^2 -
+e the unit normal of the half plane, c the way from the ray to the centre. Its eigenvalues are
+-a <= 0 < b. With the angle delta from the middle, half the chord is proportional to sqrt(S^2 -
 sin^2(delta)), S^2 = a/(a + b); with sin(delta) = S sin(g) that is a smooth function of g and
-periodic, as what follows from it, and samples are even in g. A line that meets the light has all
-azimuths, and samples that are even in phi. For a polygon phi follows the length of the section,
-which is tabulated: the density is linear between nodes, at corners of the light and between them,
-and the density itself weights a sample, so that the table costs no accuracy.
+periodic, and so is all that is computed from it; samples are even in g. A line that meets the light
+has all azimuths, and samples that are even in phi. For a polygon phi follows the length of the
+section, which is tabulated: the density is linear between nodes, at corners of the light and
+between them, and the density itself weights a sample, so that the table costs no accuracy.
 
-**From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). In the
-same half planes, about an axis across the way to the light, the section of a flat light has a range
-of cosines. The visible part of the section is exact, by the same intervals as on a ray under a
-light: the section is the ray, the point the light. A sample is drawn evenly in the cosine from the
-visible part, and stands for all of it. The sum is therefore over a function of phi and of a place
-in the visible part, which is continuous where the visibility of points is not.
+**From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). The
+half planes are now about an axis across the way to the light, and the section of a flat light has a
+range of cosines. The visible part of the section is exact, by the same intervals as on a ray under
+a light: the section is the ray, the point is the light. A sample is drawn evenly in the cosine from
+the visible part, and stands for all of it. The sum is therefore over a function of phi and of a
+place in the visible part. That function is continuous where the visibility of points is not.
 
 Where the light is seen as a whole, phi is drawn by the length of the range: evenly in the solid
 angle (for rectangles Urena, Fajardo, King 2013, An area-preserving parametrization for spherical
 rectangles, has this in closed form). In a penumbra the function has kinks, at corners of the light
-and where an edge of a shadow meets its outline, and is smooth between: of that mirrored pairs
-(`reference.quadrature.replicates`) leave N^-2. Drawn by length, phi would go as the root of the
-number at both ends, where sections begin at a corner, and pairs would leave N^-3/2. In a penumbra
-the azimuths of a rectangle are therefore even, and its whole solid angle, which is known, is a
-control variate. Behind half a plane before a rectangle, 64 points in each of eight replicates leave
-4.9e-3 of a penumbra, 64 sections by length 1.3e-3, even pairs of them 2.2e-4; 256 sections leave
-2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections across an edge of the shadow would
-leave next to nothing, but sections along it are visible as a whole or not at all and leave 1/N:
-hence the axes are turned.
+and where an edge of a shadow meets its outline, and is smooth between: mirrored pairs
+(`reference.quadrature.replicates`) have an error of N^-2 there. Sections begin at corners, so phi
+drawn by length would behave like the root of the random number at both ends, and pairs would have
+an error of N^-3/2. In a penumbra the azimuths of a rectangle are therefore even, and its whole
+solid angle, which is known, is a control variate. Behind half a plane before a rectangle, 64 points
+in each of eight replicates have an error of 4.9e-3 of a penumbra, 64 sections by length 1.3e-3,
+even pairs of them 2.2e-4; 256 sections have 2.4e-4 and 2.4e-5, as root mean squares over seeds.
+Sections across an edge of the shadow would have next to no error, but sections along it are visible
+as a whole or not at all and have an error of 1/N: hence the axes are turned.
 
 **A sphere** is seen from a point at the distance d from its centre as the disk that its tangents
 touch. The disk faces the point at a distance of d - R^2/d and has the radius R sqrt(1 - R^2/d^2).
@@ -79,8 +79,6 @@ from airlight.reference.visibility.lit_intervals import IN_PLANE
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_CELLS = 8  # of the table between two corners of a light
-_CELLS_OF_MANY = 2  # of one that a single sample of a mesh asks
 _ASIDE = 1e-6  # of a cell: how far from its ends its density is looked up
 _TINY = 1e-300
 _SHORT = 1e-6  # of the radius of a sphere: the length of its short sections
@@ -121,18 +119,22 @@ class Sections:
         return np.sum(q * self.axis[row], axis=1) / np.maximum(np.linalg.norm(q, axis=1), _TINY)
 
     def drawn(self, lit: LitIntervals, uniform: Array) -> tuple[Index, Array, Array]:
-        """Return which sections are seen at all, a point of what is seen of each, and the
-        solid angle of that [sr].
+        """Return which sections are seen at all, a point in the visible part of each, and
+        the solid angle of that part [sr].
 
         `lit`: what is seen of each section, in fractions of its length; `uniform`: numbers from 0
         to 1, (n,), by which points are drawn.
         """
         every, count = np.arange(len(self.weight)), len(self.weight)
         first, last = (self._cosine(every, np.full(count, end)) for end in (0.0, 1.0))
+        # Each visible interval of a section is a range of cosines: its solid angle about the axis.
         low, high = self._cosine(lit.ray, lit.low), self._cosine(lit.ray, lit.high)
         wide = np.abs(high - low)
         below = np.cumsum(wide) - wide
         total = np.bincount(lit.ray, wide, count)
+        # A section draws one point, evenly in the cosine over all of its visible intervals. `below`
+        # is the sum of the widths before an interval, counted on through all sections: one search
+        # finds the interval of every section. The clip keeps it among the section's intervals.
         row = np.flatnonzero(total > 0)
         begin = np.searchsorted(lit.ray, row)
         wanted = below[begin] + uniform[row] * total[row]
@@ -157,6 +159,8 @@ class Sections:
         )
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.nan_to_num((h * cosine - z * sine) / (dz * sine - dh * cosine))
+        # Rounding must not move the point into the shadow beside its interval. The weight is the
+        # visible fraction of the whole section, and all of the visible part shares one sample.
         part = np.clip(part, lit.low[chosen], lit.high[chosen])
         fraction = total[row] / np.maximum(np.abs(last - first)[row], _TINY)
         return row, self.start[row] + part[:, None] * way, fraction * self.weight[row]
@@ -197,8 +201,11 @@ def _axes(origin: Array, axis: Array, centre: Array) -> _Axes:
     away = way - along[:, None] * axis
     height = np.linalg.norm(away, axis=1)
     helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
+    # A centre on the axis, to rounding, has no direction from it: any direction across the axis
+    # then serves as the azimuth 0, and the height is 0.
     far = height > 1e-12 * np.linalg.norm(way, axis=1)
     up = np.where(far[:, None], away, helper)
+    # Rounding leaves a part along the axis, which is large beside a centre close to the axis.
     up -= np.sum(up * axis, axis=1)[:, None] * axis
     up /= np.linalg.norm(up, axis=1)[:, None]
     return _Axes(origin, axis, up, np.cross(axis, up), along, np.where(far, height, 0.0))
@@ -250,6 +257,8 @@ def sections_for_points(
     side = sides[np.argmin(np.abs(way @ sides.T), axis=1)]
     axis = side - (np.sum(side * way, axis=1) / np.sum(way * way, axis=1))[:, None] * way
     axis /= np.linalg.norm(axis, axis=1)[:, None]
+    # Turned about the way to the light, the axis stays across it. Sections that follow an edge of a
+    # shadow would be seen as a whole or not at all.
     beside = np.cross(way / np.linalg.norm(way, axis=1)[:, None], axis)
     axis = np.cos(turn) * axis + np.sin(turn) * beside
     fan = _fan(light, _axes(place, axis, light.centre))
@@ -257,6 +266,8 @@ def sections_for_points(
     def span(z0: Array, h0: Array, z1: Array, h1: Array) -> Array:
         return np.abs(_cosine(z1, h1) - _cosine(z0, h0))
 
+    # Where a part of the light is hidden the azimuths are even, for mirrored pairs; else they
+    # follow the range of cosines, so that samples are even in the solid angle.
     phi, per_density = fan.even(square[..., 0]) if even else fan.drawn(square[..., 0], span)
     z0, h0, z1, h1 = fan.section(phi)
     start, end = fan.axes.point(z0, h0, phi), fan.axes.point(z1, h1, phi)
@@ -264,13 +275,15 @@ def sections_for_points(
 
 
 def solid_angle(light: ReferenceAreaLight, place: Array) -> Array:
-    """Return the solid angle of a sphere, or of a rectangle by that of its corners,
-    from points before it [sr].
+    """Return the solid angle of a sphere, or of a rectangle by its corners, from points
+    before it [sr].
     """
     if light.kind == "sphere":
         return 2 * np.pi * _one_minus_cosine(light, np.linalg.norm(place - light.centre, axis=1))
     x, y, z = ((place - light.centre) @ light.frame.T).T
     total = np.zeros(len(place))
+    # The solid angle of a rectangle is a sum over its corners, with alternating signs, of the solid
+    # angle of the rectangle between a corner and the foot of the point.
     for sign, a, b in ((1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)):
         across, up = a * light.half[0] - x, b * light.half[1] - y
         total += sign * np.arctan2(across * up, z * np.sqrt(across**2 + up**2 + z**2))
@@ -299,7 +312,7 @@ class _Fan:
     corners: Array | None  # of a polygon, along axis, up and side, (rows, k, 3); None for a disk
     normal: Array  # of the light, along the same, (rows, 3)
     radius: Array  # of a disk, (rows,) [m]
-    cells: int = _CELLS  # of the table of sections between two corners
+    cells: int = 8  # of the table of sections between two corners
 
     def section(self, phi: Array) -> tuple[Array, Array, Array, Array]:
         """Return z and h of both ends of the sections at azimuths, (rows, k) each; without
@@ -308,6 +321,9 @@ class _Fan:
         The end that is closer to the axis comes first.
         """
         z0, h0, z1, h1 = self._polygon(phi) if self.corners is not None else self._disk(phi)
+        # The half plane ends at the axis. If a section crosses the axis, its part on the other
+        # side, h < 0, belongs to the azimuth phi + pi: cut it at h = 0. A section that lies there
+        # as a whole gets no length.
         swap = h0 > h1
         z0, z1, h0, h1 = (
             np.where(swap, z1, z0),
@@ -327,8 +343,12 @@ class _Fan:
         sine, cosine = np.sin(phi)[..., None], np.cos(phi)[..., None]
         z = np.broadcast_to(self.corners[:, None, :, 0], (*phi.shape, self.corners.shape[1]))
         a, b = self.corners[:, None, :, 1], self.corners[:, None, :, 2]
+        # Turn the corners into the half plane: `h` is in it, `beside` across it.
         beside, h = b * cosine - a * sine, a * cosine + b * sine
         after = [np.roll(part, -1, axis=-1) for part in (beside, h, z)]
+        # The outline crosses the plane where two corners in a row lie on different sides. A convex
+        # polygon has two such sides or none; without one both ends are the same point, and the
+        # section has no length.
         cut = (beside >= 0) != (after[0] >= 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             fraction = np.where(cut, beside / (beside - after[0]), 0.0)
@@ -346,10 +366,14 @@ class _Fan:
     def _disk(self, phi: Array) -> tuple[Array, Array, Array, Array]:
         n_w, n_u, n_v = (self.normal[:, k, None] for k in range(3))
         sine, cosine = np.sin(phi), np.cos(phi)
+        # The normal of the disk in the half plane, `n_w` and `n_d`, and across it, `n_e`.
         n_d, n_e = n_u * cosine + n_v * sine, n_v * cosine - n_u * sine
         within = np.maximum(1 - n_e**2, _TINY)
         height = self.axes.height[:, None]
         beside = -height * sine  # of the centre from the half plane
+        # The line in which both planes meet is beside / sqrt(within) from the centre; Pythagoras
+        # gives half the chord. The line has the direction (-n_d, n_w) / sqrt(within), and `half`
+        # contains the division by that root.
         half = np.sqrt(np.maximum(self.radius[:, None] ** 2 - beside**2 / within, 0.0) / within)
         z = self.axes.along[:, None] + beside * n_e * n_w / within
         h = height * cosine + beside * n_e * n_d / within
@@ -386,8 +410,12 @@ class _Fan:
         """
         assert self.corners is not None
         a, b = self.corners[..., 1], self.corners[..., 2]
+        # The polygon surrounds the axis if all corners follow each other in one sense: azimuths
+        # then go around. Else they go from the first corner to the last one.
         turn = a * np.roll(b, -1, axis=1) - b * np.roll(a, -1, axis=1)
         around = (turn > 0).all(axis=1) | (turn < 0).all(axis=1)
+        # Seen from the centre's azimuth, 0, a polygon beside the axis lies within half a turn to
+        # either side, so that the sorted azimuths of its corners need no unwrapping.
         azimuth = np.sort(np.arctan2(b, a), axis=1)
         last = np.where(around, azimuth[:, 0] + 2 * np.pi, azimuth[:, -1])
         breaks = np.concatenate([azimuth, last[:, None]], axis=1)
@@ -425,6 +453,8 @@ def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
     z0, h0, z1, h1 = fan.section(phi)
     part = square[..., 1]
     z, h = z0 + part * (z1 - z0), h0 + part * (h1 - h0)
+    # dA = h dphi dl / n_in: `across` is the component of the normal along the normal of the half
+    # plane, and `within`, n_in, the length of the rest of the normal.
     across = -fan.normal[:, 1:2] * np.sin(phi) + fan.normal[:, 2:] * np.cos(phi)
     within = np.sqrt(np.maximum((1 - across) * (1 + across), 0.0))
     weight = h * np.hypot(z1 - z0, h1 - h0) * per_density / np.maximum(within, _TINY)
@@ -439,20 +469,22 @@ def _on_triangles(chosen: Choice, origin: Array, direction: Array) -> LightSampl
     light, of others evenly.
     """
     rows = len(direction)
+    # Far triangles: a point anywhere stands for the area.
     place, weight = places_in(chosen.corners, chosen.square), chosen.area.copy()
     near = np.flatnonzero(chosen.near)
     if len(near):
         corners = chosen.corners[near]
+        # Near ones: each sample is a row with its own axis along its ray and its own fan of
+        # sections.
         axes = _axes(
             origin, np.repeat(direction, len(weight) // rows, axis=0)[near], corners.mean(axis=1)
         )
         normal = axes.components(chosen.normal[near, None])[:, 0]
         radius = np.zeros(len(near))
-        fan = _Fan(
-            axes, axes.components(corners - axes.origin[:, None]), normal, radius, _CELLS_OF_MANY
-        )
-        found = _on_flat(fan, chosen.square[near, None])
-        place[near], weight[near] = (part[:, 0] for part in found)
+        # A table that serves a single sample has two cells between corners.
+        fan = _Fan(axes, axes.components(corners - axes.origin[:, None]), normal, radius, cells=2)
+        samples = _on_flat(fan, chosen.square[near, None])
+        place[near], weight[near] = (part[:, 0] for part in samples)
     shape = rows, -1, 3
     return LightSamples(
         place.reshape(shape),
@@ -468,6 +500,8 @@ def _before_triangles(chosen: Choice, eye: Array, length: float) -> Sections:
     start = places_in(chosen.corners, chosen.square)
     way = eye - start
     above = np.sum(way * chosen.normal, axis=1)
+    # A point in the plane of a triangle, to rounding, sees nothing of it, and would find a section
+    # of any visibility.
     sees = above > IN_PLANE * np.maximum(1.0, np.abs(start).max(axis=1, initial=0.0))
     weight = np.where(
         sees, chosen.area * above / np.linalg.norm(way, axis=1) ** 3 / chosen.chance, 0.0
@@ -475,6 +509,8 @@ def _before_triangles(chosen: Choice, eye: Array, length: float) -> Sections:
     across = np.cross(chosen.normal, way)
     size = np.linalg.norm(across, axis=1)[:, None]
     side = chosen.corners[:, 1] - chosen.corners[:, 0]
+    # Before the middle of its triangle a point looks along the normal, and no direction is across
+    # both: a side of the triangle serves.
     along = size > _ASIDE * np.linalg.norm(way, axis=1)[:, None]
     across = np.where(
         along, across / np.maximum(size, _TINY), side / np.linalg.norm(side, axis=1)[:, None]
@@ -492,6 +528,7 @@ class _Spread:
     def azimuth(self, t: Array) -> tuple[Array, Array]:
         """Return azimuths, (rows, k), and dphi/dt."""
         sine, middle = self.sine[:, None], self.middle[:, None]
+        # sin(delta) = S sin(g), g even. Where S > 1 stands for all azimuths, phi itself is even.
         angle = np.pi * (t - 0.5)
         s = np.minimum(sine, 1.0) * np.sin(angle)
         phi = np.where(sine > 1, 2 * np.pi * t, np.arcsin(s))
@@ -505,10 +542,15 @@ def _spread(height: Array, radius: Array | float, normal: Array) -> _Spread:
     sphere, whose normals are zero.
     """
     n_u, n_v = normal.T
+    # The quadratic form e^T M e of the derivation, M = [[first, mixed], [mixed, second]]. `middle`
+    # is the direction of the eigenvector with the larger eigenvalue: half planes are across their
+    # normals e, whose range is about the other eigenvector.
     first = height**2 - radius**2 * (1 - n_u**2)
     second, mixed = -(radius**2) * (1 - n_v**2), radius**2 * n_u * n_v
     middle = 0.5 * np.arctan2(2 * mixed, first - second)
     root = np.hypot(0.5 * (first - second), mixed)
+    # The eigenvalues are `above` and -`below`. `above` <= 0 means that all half planes cut the
+    # light: S = 2 says so.
     above, below = 0.5 * (first + second) + root, root - 0.5 * (first + second)
     sine = np.sqrt(np.maximum(below, 0.0) / np.maximum(above + below, _TINY))
     return _Spread(middle, np.where(above > 0, np.minimum(sine, 1.0), 2.0))
@@ -523,11 +565,14 @@ def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
     # sides of a node differs.
     left, right = density(nodes[:, :-1] + _ASIDE * width), density(nodes[:, 1:] - _ASIDE * width)
     mass = 0.5 * width * (left + right)
+    # A light seen edge-on has sections without length at all azimuths: draw evenly, the weights are
+    # zero anyway.
     none = mass.sum(axis=1, keepdims=True) <= 0
     left, right, mass = left + none, right + none, np.where(none, width, mass)
     total = mass.sum(axis=1, keepdims=True)
     below = np.cumsum(mass, axis=1)
     wanted = np.broadcast_to(uniform, (len(nodes), uniform.shape[-1])) * total
+    # The cell in which the cumulated mass passes the wanted one.
     cell = np.minimum((below[:, None, :-1] <= wanted[..., None]).sum(axis=2), mass.shape[1] - 1)
     first, left, right, wide = (
         np.take_along_axis(part, cell, axis=1) for part in (nodes[:, :-1], left, right, width)
@@ -535,6 +580,9 @@ def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
     rest = wanted - np.take_along_axis(below - mass, cell, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(wide > 0, np.maximum(rest, 0.0) / wide, 0.0)
+    # Within a cell the mass is a quadratic in the place: left t + (right - left) t^2/2 = rest. This
+    # form of its root does not cancel where the density is level, and at 0/0 gives the beginning of
+    # the cell.
     root = np.sqrt(np.maximum(left * left + 2 * (right - left) * rest, 0.0))
     part = np.clip(2 * rest / np.maximum(left + root, _TINY), 0.0, 1.0)
     return first + part * wide, np.maximum(left + part * (right - left), _TINY) / total
@@ -554,6 +602,8 @@ def _on_sphere(
     point of the sphere.
     """
     radius, rows = light.radius, len(axes.along)
+    # A half plane cuts the sphere in a circle of radius rho; dA = R h dphi db with the angle b on
+    # the circle.
     spread = _spread(axes.height, radius, np.zeros((rows, 2)))
     meets = axes.height < radius
     front = axes.along - np.sqrt(np.maximum(radius**2 - axes.height**2, 0.0))
@@ -565,12 +615,15 @@ def _on_sphere(
         beside = axes.height[:, None] * np.sin(phi)
         rho = np.sqrt(np.maximum((radius - beside) * (radius + beside), 0.0))
         middle = axes.height[:, None] * np.cos(phi)
+        # Where the line meets the sphere the circle is cut by the axis, h = 0; angles go from one
+        # cut to the other. Else they go all around.
         reach = np.where(
             meets, np.arccos(np.clip(-middle / np.maximum(rho, _TINY), -1.0, 1.0)), np.pi
         )
-        seen = np.hypot(middle, axes.along[:, None])
+        to_middle = np.hypot(middle, axes.along[:, None])
+        # The tangent from the beginning of the ray to the circle ends what that beginning sees.
         back = np.arctan2(-axes.along[:, None], -middle) + np.arccos(
-            np.clip(rho / np.maximum(seen, rho), 0.0, 1.0)
+            np.clip(rho / np.maximum(to_middle, rho), 0.0, 1.0)
         )
         return middle, rho, -reach, np.where(ends, np.clip(back, -reach, reach), reach)
 
@@ -580,6 +633,7 @@ def _on_sphere(
     phi, rate = spread.azimuth(np.where(meets, periodic, folded))
     middle, rho, low, high = circle(phi)
     angle = low + np.where(meets, folded, periodic) * (high - low)
+    # Rounding at the cut with the axis must not give a negative height.
     h = np.maximum(middle + rho * np.cos(angle), 0.0)
     place = axes.point(axes.along[:, None] + rho * np.sin(angle), h, phi)
     return LightSamples(place, (place - light.centre) / radius, radius * h * (high - low) * rate)
@@ -594,6 +648,8 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
     axis = way / d
     helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
     helper /= np.linalg.norm(helper, axis=1)[:, None]
+    # Even in the solid angle: even in the cosine to the axis, from the rim of the cone to 1. The
+    # numbers are kept as one minus the cosine, which has digits for a far sphere.
     span = _one_minus_cosine(light, d)
     down = square[..., 0] * span
     cosine, sine = 1 - down, np.sqrt(down * (2 - down))
@@ -602,12 +658,14 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
     direction = cosine[..., None] * axis[:, None] + sine[..., None] * (
         np.cos(turn)[..., None] * helper + np.sin(turn)[..., None] * other
     )
+    # The nearer of the two crossings of the direction with the sphere; at the rim the chord is
+    # zero.
     half = np.sqrt(np.maximum((light.radius - d * sine) * (light.radius + d * sine), 0.0))
-    found = place[:, None] + (d * cosine - half)[..., None] * direction
+    start = place[:, None] + (d * cosine - half)[..., None] * direction
     around = (
         np.cos(turn)[..., None] * other - np.sin(turn)[..., None] * helper
     )  # along the sphere, across the direction
-    return _sections(place, around, found, _SHORT * light.radius * around, 2 * np.pi * span)
+    return _sections(place, around, start, _SHORT * light.radius * around, 2 * np.pi * span)
 
 
 def _one_minus_cosine(light: ReferenceAreaLight, d: Array) -> Array:
@@ -615,6 +673,7 @@ def _one_minus_cosine(light: ReferenceAreaLight, d: Array) -> Array:
     the distance to its centre.
     """
     ratio = np.minimum(light.radius / d, 1.0)
+    # 1 - cos = sin^2 / (1 + cos): no digits cancel for a far sphere.
     return ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))
 
 

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kinks = tuple[Index, Array]  # rays, and distances along them [m]
 
-_UNDERFLOW = 745.0  # optical depth after which nothing is left
-
 
 def medium_of(reference: ReferenceScene, number: int) -> ReferenceMedium:
     """Return the medium of this number."""
@@ -64,6 +62,8 @@ def cut_pieces(
     parts = _parts(reference, rays, segments, *lit)
     if not len(parts.ray):  # of a batch of rays none is lit within the media
         return parts
+    # tau_camera grows linearly on a part, which lies in one medium: from the camera to the part
+    # once, then by sigma_t times the distance into it.
     before = depth_through_media(
         reference, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
     )
@@ -91,6 +91,7 @@ def _parts(
     parts = []
     for start, end, medium in zip(segments.start, segments.end, segments.medium):
         low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])
+        # One slot of all rays at a time: the part of each stretch that lies in this slot's medium.
         keep = high > low
         rows, low, high = ray[keep], low[keep], high[keep]
         parts.append(
@@ -98,10 +99,11 @@ def _parts(
         )
     ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
     if np.any(np.isinf(high)):
-        # Only what surrounds the bodies is unbounded, and only if its extinction is
-        # not zero does it scatter.
+        # Only the medium around the bodies is unbounded, and it has a piece only where it scatters.
+        # It is cut where exp underflows: an optical depth of 745 behind its beginning or the
+        # light's foot.
         sigma_t = reference.medium.sigma_t
-        reach = np.maximum(low, rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
+        reach = np.maximum(low, rays.foot[ray]) + 745.0 / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))
     return Pieces(
@@ -110,8 +112,8 @@ def _parts(
 
 
 def cut(parts: Pieces, kinks: Kinks) -> Pieces:
-    """Cut parts of rays, given by ray and distance, at kinks; the depths of the pieces
-    are those of their parts.
+    """Cut parts of rays, given by ray and distance, at kinks; a piece has the depth
+    of its part.
     """
     ray, x = kinks
     # The part in which each kink lies is the last one that begins before it.
@@ -126,15 +128,19 @@ def cut(parts: Pieces, kinks: Kinks) -> Pieces:
         & (x[kink] < parts.x1[part])
     )
     part, x = part[inside], x[kink[inside]]
+    # A part without kinks is one piece; each kink begins a further piece, which ends where the next
+    # piece of the same part begins, or with the part.
     owner = np.concatenate([np.arange(len(parts.ray)), part])
     start = np.concatenate([parts.x0, x])
     order = np.lexsort((start, owner))
     owner, start = owner[order], start[order]
     ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
     end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
+    # Only the outer ends of a part can be edges between light and shadow.
     begin = np.append(True, ends[:-1])[: len(owner)]
     first, last = parts.first[owner] & begin, parts.last[owner] & ends
     pieces = Pieces(
         parts.ray[owner], parts.medium[owner], start, end, first, last, parts.depth[owner], owner
     )
+    # Two kinks at one place leave a piece without length.
     return pieces[end > start]

@@ -51,7 +51,7 @@ class ReferenceImage:
     """Radiance of every pixel; arrays of shape (height, width[, 3])."""
 
     airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
-    #: its error without that of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
+    #: its error without the error of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
     airlight_bound: Array
     surface: Array  #: radiance of the lit surface through the medium [W/(m^2 sr)]
     #: to the visible surface at the pixel's centre, infinite where there is none [m]
@@ -114,14 +114,18 @@ def ray_values(
     were checked.
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
+    # The cast distance, in float32, is what the caller gets: all methods share that surface. The
+    # integrals end at the float64 distance to the same surface.
     hits = surface_hits(reference)
     cast = hits.distance
     hits = replace(hits, distance=exact_distance(reference, hits.interaction, cast, shapes))
     count = len(reference.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
-    transitions, found = 0, list[RandomChecks]()
+    transitions, reports = 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
+    # Progress counts a step for each light and `_STEPS` for each layer of area lights and for the
+    # sky.
     wide_parts = 2 * bool(reference.area) + (reference.sky is not None)
     total = len(reference.lights) + len(reference.directional) + _STEPS * wide_parts
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
@@ -131,12 +135,14 @@ def ray_values(
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
         transitions += received.lit.transitions
-        found.append(received.lit.random_checks)
-        seen = received.reached
+        reports.append(received.lit.random_checks)
+        # A renderer with a shadow-ray epsilon (`shadow_scale` below 1) also starts its shadow rays
+        # off the surface: the surface is lit where such rays say so.
+        lit_ends = received.reached
         if shadow_scale != 1 and not isinstance(light, DirectionalLight):
             what = {"scene": reference.occluders, "shapes": shapes}
-            seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
-        reached.append(seen)
+            lit_ends = reached_by_shadow_rays(hits.interaction, light.position, lit_ends, **what)
+        reached.append(lit_ends)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(reference, hits, reached=reached, shadow_scale=shadow_scale)
@@ -147,6 +153,8 @@ def ray_values(
     if reference.area:
         done = total - _STEPS * wide_parts
         tell = partial(_tell, progress, total)
+        # Area lights: their samples need the airlight and the surface of all other lights, to which
+        # errors are relative.
         how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | (
             {"keep": keep} if keep else {}
         )
@@ -159,13 +167,14 @@ def ray_values(
             )
         tell(done + 2 * _STEPS, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
+        # Columns 0 to 2 are the airlight, 3 to 5 the surface.
         mean = replicates.mean(axis=2)
         airlight, surface, bound = (
             airlight + mean[:, :3],
             surface + mean[:, 3:],
             bound + scattered.bound,
         )
-        found.append(scattered.random_checks)
+        reports.append(scattered.random_checks)
         wide["replicates"] = replicates
     if reference.sky is not None:
         sky = sky_light(
@@ -177,8 +186,10 @@ def ray_values(
         )
         mean = sky.replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
+        # Replicates of the sky and of area lights are independent: their sums are replicates of
+        # both.
         wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates
-    checked = RandomChecks.of_all(found)
+    checked = RandomChecks.of_all(reports)
     return RayValues(airlight, bound, surface, cast, light_angle, transitions, checked, **wide)
 
 

@@ -4,8 +4,8 @@ r"""How many points of an area light a ray needs, and replicates of their sums w
 Eight independent scramblings of N points each give a mean; their spread S gives the standard error
 S/sqrt(8). If the means are normal, (mean - value)/(S/sqrt(8)) has Student's distribution with 7
 degrees of freedom, and 2.365 standard errors to either side hold the value in 95 % of all runs.
-That is so for an N that is fixed beforehand. If points are doubled until S *of the same points* is
-small, N is a stopping time, and S, given that it stopped the doubling, is too small. With n_k = 2^k
+That holds for an N that is fixed beforehand. If points are doubled until S *of the same points* is
+small, N is a stopping time: the S that stopped the doubling is too small on average. With n_k = 2^k
 n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi^2_7/7 the intervals hold the value with
 
     sum_k  P(S_0, ..., S_{k-1} > e)  P(S_k <= e, |mean - value| < 2.365 S_k/sqrt(8)),
@@ -16,7 +16,7 @@ with S ~ 1/N this is 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4
 A pilot therefore decides, and is not counted: eight replicates of other scramblings, with four
 times as many points each time, until they predict a small enough standard error at not more than
 four times their points. N is then independent of the points that count, and Student's distribution
-holds for every N; the total cost is 1.2 to 1.7 times that of the points that count. The pilot
+holds for every N; the total cost is 1.2 to 1.7 times the cost of the points that count. The pilot
 assumes S ~ N^-5/4, a little slower than the N^-3/2 of scrambled nets for smooth functions (Owen
 1997, Scrambled net variance for integrals of smooth functions), which fog reaches. Where this is
 too optimistic, the stated error is larger than the requested one, and right. A ray that could not
@@ -65,16 +65,9 @@ Index = NDArray[np.int64]
 Kept = Mapping[str, Array]
 Keep = Callable[[str, Callable[[], Kept]], Kept]
 
-#: of the mean over rays: below this a ray's error need not be small relative to its value
-FLOOR = 0.05
 PILOT = "pilot-"  #: the name of the part of the work that decides
-_PILOT_SEED = 1 << 30  # apart from the seeds of points that count
 REPLICATES = 8  #: independent scramblings
-_LATTICE = np.array([1.0, 1555.0])
-_DIGITS = float(1 << 52)  # that coordinates are moved by: all that a number from 0.5 to 1 has
-_MOVES = 1  # tells their generator from that of the points
 _AHEAD = 4  # times the points of a pilot: the most that it foresees
-_RATE = 1.25  # the power of 1/N by which a standard error is foreseen to fall
 
 
 @dataclass(frozen=True)
@@ -86,7 +79,7 @@ class PointPlan:
     first: int = 16  #: points of each replicate that every ray gets, a power of two
     most: int = 1024  #: points that no ray or surface point exceeds, a power of two
     seed: int = 0  #: of the scramblings
-    #: whether surfaces get the light; if not, theirs is that of other lights alone
+    #: whether surfaces get the light; if not, surfaces show other lights alone
     surfaces: bool = True
 
     @property
@@ -111,6 +104,9 @@ class PointPlan:
     @property
     def pilots(self) -> list[int]:
         """The points of each replicate that pilots take, one after the other."""
+        # The first pilot takes half of the first points, each further one `_AHEAD` times as many;
+        # none takes half of the most points or more, since that would cost as much as to count
+        # them.
         counts, count = list[int](), max(1, self.first // 2)
         while 2 * count < self.most:
             counts.append(count)
@@ -126,9 +122,12 @@ def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Ar
     """
     generator = np.random.default_rng((plan.seed, number, replicate))
     if kind == "pairs" and plan.most > 1:
+        # Half as many points are one in each stratum of width 1/half. Each is moved to the lower
+        # half of its stratum, and its pair is mirrored at the middle of the stratum: u' = (2 k +
+        # 1)/half - u, v' = 1 - v.
         half = plan.most // 2
         u, v = square_points(replace(plan, most=half), number, replicate, "").T
-        stratum = np.floor(half * u)  # one point in each, moved to its lower half
+        stratum = np.floor(half * u)
         u = 0.5 * (stratum / half + u)
         return np.stack(
             [np.concatenate([u, (2 * stratum + 1) / half - u]), np.concatenate([v, 1 - v])], axis=1
@@ -148,16 +147,19 @@ def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Gen
     """
     flips = np.zeros_like(numbers)
     for digit in range(digits):
+        # One coin for each value of the digits before this one (Owen 1995).
         before, place = numbers >> (digits - digit), digits - digit - 1
         flips |= generator.integers(0, 2, 1 << digit)[before] << place
+    # The digits behind the scrambled ones are uniform, so that a point is anywhere in its cell.
     return ((numbers ^ flips) + generator.random(len(numbers))) / (1 << digits)
 
 
 def _lattice(count: int) -> Array:
-    """Return the points of a lattice, of which every power of two is one, (count, 2),
-    the second not modulo 1.
+    """Return the points of a lattice, (count, 2), the second coordinate not modulo 1; the
+    first 2^k of them are a lattice for every k.
     """
-    return np.array([mirrored_digits(i) for i in range(count)])[:, None] * _LATTICE
+    # (i, 1555 i)/N of the derivation, in the order of the mirrored digits of i.
+    return np.array([mirrored_digits(i) for i in range(count)])[:, None] * np.array([1.0, 1555.0])
 
 
 def _folded(lattice: Array) -> Array:
@@ -177,7 +179,7 @@ class RayPoints:
 
     @classmethod
     def of(cls, plan: PointPlan, number: int, rays: int, kind: str, part: int = 0) -> "RayPoints":
-        """Return the points of a light for rays, of which `part` is the number of the first."""
+        """Return the points of a light for rays; `part` is the number of the first ray."""
         replicates = range(REPLICATES)
         if kind == "sphere":
             square = np.tile(_lattice(plan.most), (REPLICATES, 1))
@@ -185,7 +187,8 @@ class RayPoints:
             square = np.concatenate(
                 [square_points(plan, number, replicate, kind) for replicate in replicates]
             )
-        generator = np.random.default_rng((plan.seed, number, plan.most, part, _MOVES))
+        # The last 1 keeps this generator apart from those of the points.
+        generator = np.random.default_rng((plan.seed, number, plan.most, part, 1))
         return cls(square, generator.random((rays, REPLICATES, 2)), kind)
 
     def __len__(self) -> int:
@@ -196,8 +199,11 @@ class RayPoints:
         moves = np.repeat(self.moves[rays], len(self.square) // REPLICATES, axis=1)
         if self.kind == "sphere":
             return _folded(self.square + moves)
-        digits = ((part * _DIGITS).astype(np.int64) for part in (self.square, moves))
-        return (np.bitwise_xor(*digits) + 0.5) / _DIGITS
+        # The exclusive or of 52 digits, which are all that a number from 0.5 to 1 has. The half
+        # puts each point in the middle of its cell, so that no coordinate is 0 or 1.
+        scale = float(1 << 52)
+        digits = ((part * scale).astype(np.int64) for part in (self.square, moves))
+        return (np.bitwise_xor(*digits) + 0.5) / scale
 
 
 def mirrored_digits(number: int) -> float:
@@ -237,16 +243,22 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
     for count in plan.pilots:
         if not len(active):
             break
-        pilot = replace(plan, seed=plan.seed + _PILOT_SEED, most=count)
+        # Another seed: N must be independent of the points that count.
+        pilot = replace(plan, seed=plan.seed + (1 << 30), most=count)
         mean = sums(PILOT, pilot, active) / count
         value = mean.mean(axis=-1) + known[active]
+        # The error of a ray below a twentieth of the mean over rays need not be small relative to
+        # its value. The first pilot, of all rays, gives this floor.
         if floor is None:
-            floor = FLOOR * value.mean(axis=0)
-        # The largest of the channels: standard error over the one that is allowed.
+            floor = 0.05 * value.mean(axis=0)
+        # Standard error over the allowed one, in the channel where that is largest.
         excess = (
             standard_error(mean) / (plan.error * np.maximum(value, floor) + np.finfo(float).tiny)
         ).max(axis=1)
-        needed = np.clip(count * excess ** (1 / _RATE) / plan.first, 1.0, plan.most / plan.first)
+        # S ~ N^-5/4: the number of points at which the error is the allowed one, over the first.
+        needed = np.clip(count * excess ** (1 / 1.25) / plan.first, 1.0, plan.most / plan.first)
+        # A pilot is believed up to `_AHEAD` times its points. Other rays go to the next pilot,
+        # unless they need all points anyway: then they keep `plan.most`.
         near = needed * plan.first <= _AHEAD * count
         foreseen = plan.first << np.ceil(np.log2(needed)).astype(int)
         counts[active[near]] = np.maximum(foreseen[near], count)

@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 AMBIENT = -1  #: number of the medium without bounds among the media of a scene
-_BLOCK = 1 << 21  # numbers in one block of rays and edges
 
 
 @dataclass(frozen=True)
@@ -56,11 +55,15 @@ def depth_through_media(
 
     Valid for any points, inside or outside of the media.
     """
+    # tau of the derivation: the medium around over all of the part, then what each body differs
+    # from it over what lies in the body.
     total = np.maximum(high - low, 0.0)[:, None] * reference.medium.sigma_t
     for medium in reference.media:
         enter, leave = crossings(medium.bounds, origin, direction)
         inside = np.maximum(np.minimum(leave, high) - np.maximum(enter, low), 0.0)
         total += inside[:, None] * (medium.sigma_t - reference.medium.sigma_t)
+    # A body thinner than the medium around it leaves a difference, which rounding may turn
+    # negative.
     return np.maximum(total, 0.0)
 
 
@@ -87,8 +90,11 @@ def camera_segments(reference: ReferenceScene, distance: Array) -> Segments:
         np.take_along_axis(enter, order, axis=0),
         np.take_along_axis(leave, order, axis=0),
     )
+    # In vacuum, or in a medium that only absorbs, nothing between the bodies scatters.
     if not np.any(reference.medium.sigma_t * reference.medium.albedo > 0):
         return Segments(enter, leave, order)
+    # The medium around fills the gaps: from the camera to the first body, and from where each body
+    # is left to where the next is entered, or to the end of the ray.
     start = np.concatenate([np.zeros((1, len(distance))), leave, enter])
     end = np.concatenate([enter, distance[None], leave])
     between = np.full((len(order) + 1, len(distance)), AMBIENT)
@@ -112,15 +118,18 @@ def shadow_kinks(bounds: Bounds, rays: Rays) -> tuple[Index, Array]:
     `bounds`: the body; `rays`: the rays in their planes with lights. Returns `ray`, `x`: number of
     the ray and distance of each kink [m], in no particular order.
     """
+    block = 1 << 21  # numbers at once: of rays, or of rays times edges
     if isinstance(bounds, Sphere):
-        find, step = partial(_tangents, bounds), _BLOCK
+        find, step = partial(_tangents, bounds), block
     else:
-        find, step = partial(_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
+        find, step = partial(_corners, bounds), max(1, block // max(1, len(bounds.edge)))
     numbers, distances = [np.empty(0, np.int64)], [np.empty(0)]
     for first in range(0, len(rays.foot), step):
         part = rays[first : first + step]
         ray, z, y = find(part)
         foot, height = part.foot[ray], part.height[ray]
+        # The map of the plane takes the point (z, y) to the x whose shadow segment passes it. The
+        # point counts only between ray and light, 0 < y < height; a directional light is above all.
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             x = (z * height - y * foot) / (height - part.w * y)
         between = (y > 0) & (part.w * y < height) & np.isfinite(x)
@@ -136,8 +145,12 @@ def _corners(body: Polyhedron, rays: Rays) -> tuple[Index, Array, Array]:
     ends = body.edge - rays.origin
     across = -rays.normal
     normal = np.cross(rays.direction, across)
+    # Which side of the plane of ray and light the ends of each edge lie on; an edge in the plane,
+    # with both at 0, is left to the edges that meet it at its ends.
     at_start, at_end = normal @ ends[:, 0].T, normal @ ends[:, 1].T
     ray, edge = np.nonzero((at_start * at_end <= 0) & (at_start != at_end))
+    # Where the edge meets the plane, in the coordinates of the plane: z along the ray, y across it
+    # towards the light.
     fraction = (at_start[ray, edge] / (at_start[ray, edge] - at_end[ray, edge]))[:, None]
     point = ends[edge, 0] + fraction * (ends[edge, 1] - ends[edge, 0])
     return ray, np.sum(point * rays.direction[ray], axis=1), np.sum(point * across[ray], axis=1)
@@ -150,11 +163,18 @@ def _tangents(sphere: Sphere, rays: Rays) -> tuple[Index, Array, Array]:
     centre, across = sphere.centre - rays.origin, -rays.normal
     beside = np.cross(rays.direction, across) @ centre
     c_z, c_y = rays.direction @ centre, across @ centre
+    # The plane cuts the sphere in a disk of this radius about (c_z, c_y), `beside` being the
+    # distance of the centre from the plane.
     disk = half_chord(sphere.radius, np.abs(beside))
+    # The way from the light to the centre of the disk, or the direction of the light if it is
+    # directional. A tangent exists only if the light is outside of the disk.
     e_z, e_y = rays.w * c_z - rays.foot, rays.w * c_y - rays.height
     far = np.maximum(np.hypot(e_z, e_y), 1e-290)
     ray = np.flatnonzero((np.abs(beside) < sphere.radius) & ((disk < far) | (rays.w == 0)))
     e_z, e_y, c_z, c_y, disk = (e_z / far)[ray], (e_y / far)[ray], c_z[ray], c_y[ray], disk[ray]
+    # Half the angle under which the light sees the disk: its tangents touch at disk * (-sine e -+
+    # level e_across) from the centre. Under a directional light the sine is 0, and the points are
+    # across the direction.
     sine = rays.w * disk / far[ray]
     level = np.sqrt((1 - sine) * (1 + sine))
     z = [c_z + disk * (-sine * e_z - sign * level * e_y) for sign in (-1, 1)]

@@ -29,6 +29,7 @@ def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[Referen
     intensity radiance times the whole area [W/sr].
     """
     if light.kind == "sphere":
+        # Archimedes: even in height and azimuth is even on the sphere.
         height, azimuth = 1 - 2 * square[:, 0], 2 * np.pi * square[:, 1]
         across = np.sqrt(np.maximum(1 - height**2, 0.0))
         normals = (
@@ -37,6 +38,7 @@ def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[Referen
         )
         places = light.centre + light.radius * normals
     elif light.kind == "mesh":
+        # A mesh: triangles by area, then evenly within each.
         chosen = choose_by_area(light, square)
         places, normals = places_in(chosen.corners, chosen.square), chosen.normal
     else:
@@ -44,6 +46,7 @@ def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[Referen
         sides = _concentric(sides) if light.kind == "disk" else sides
         places = light.centre + (light.half * sides) @ light.frame[:2]
         normals = np.broadcast_to(light.normal, places.shape)
+    # Le cos_l dA: the cosine is the profile of the light, within the half space of its normal.
     intensity, quarter = light.radiance * light.area, 0.5 * np.pi
     return [
         ReferenceLight(place, intensity, normal, cutoff=quarter, beam=quarter, cosine=True)
@@ -54,6 +57,7 @@ def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[Referen
 def _concentric(sides: Array) -> Array:
     """Map [-1, 1]^2 to the unit disk, squares about the middle to circles."""
     a, b = sides.T
+    # The larger coordinate is the radius, the smaller one over it the angle in its quarter.
     wide = np.abs(a) > np.abs(b)
     radius, other = np.where(wide, a, b), np.where(wide, b, a)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -15,11 +15,11 @@ whose spread is its standard error (`reference.quadrature.replicates`). K is smo
 nothing stands in the light and bounds have no edges; an edge costs digits, and no pixel is without
 an error.
 
-It follows at once:
+Two cases follow:
 
-- In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite,
-  and nothing of it arrives: the scattered light is 0, as is the sky seen through it. Such a scene
-  has no sky (`ReferenceScene.sky`).
+- In an unbounded medium of extinction above 0 the sky is infinitely far and tau(x, w') is infinite.
+  No light of the sky arrives: the scattered light is 0, and so is the sky seen through the medium.
+  Such a scene has no sky (`ReferenceScene.sky`).
 - In height fog the paths from directions at and below the horizon end at the floor of the fog.
   Without a floor they would be infinitely deep. Under an isotropic phase function the light
   scattered at a height z, with the column C above and B below it, is Ls (E_2(C) + E_2(B))/2, E_2
@@ -42,9 +42,6 @@ from airlight.reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
 Fraction = Callable[[float], None]
-
-_MOST = 64  # directions of a replicate
-_NUMBER = 1 << 20  # of the sky among lights: its lattices are not those of others
 
 
 @dataclass(frozen=True)
@@ -70,31 +67,40 @@ def sky_light(
     light; `tell`: called with the fraction of the work that is done.
     """
     assert reference.sky is not None
-    count, most = len(hits.distance), min(plan.most, _MOST)
+    # A replicate has at most 64 directions, each a sun for all rays.
+    count, most = len(hits.distance), min(plan.most, 64)
     replicates, bound = np.zeros((count, 6, REPLICATES)), np.zeros((count, 3))
     visible = np.flatnonzero(np.isfinite(hits.distance)) if plan.surfaces else np.empty(0, np.int64)
     point = reference.origin + hits.distance[visible, None] * reference.direction[visible]
     start = np.zeros(len(visible))
-    left = np.exp(
+    # The light from surfaces to the camera is attenuated by the same fraction under every sun.
+    transmittance = np.exp(
         -optical_depth(
             reference, reference.origin, reference.direction[visible], start, hits.distance[visible]
         )
     )
     reflection = Reflection(hits.interaction)
     for replicate in range(REPLICATES):
-        square = square_points(PointPlan(most=most, seed=plan.seed), _NUMBER, replicate, "sphere")
+        # The sky counts as light 2^20: its lattices are not the lattices of other lights.
+        square = square_points(PointPlan(most=most, seed=plan.seed), 1 << 20, replicate, "sphere")
         for number, direction in enumerate(_directions(square)):
+            # A sun stands for the solid angle 4 pi / most of the sky: its irradiance is Ls times
+            # that.
             sun = DirectionalLight(direction, reference.sky * 4 * np.pi / most, None)
             received = light_airlight(reference, sun, hits.distance, shapes=shapes, checks=0)
             replicates[:, :3, replicate] += received.radiance
+            # Bounds of the suns of a replicate add up; the bound of the mean is their mean over
+            # replicates.
             bound += received.bound / REPLICATES
+            # Surfaces that this sun reaches: f cos, attenuated to the sun and to the camera.
             lit = received.reached[visible]
             row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
             if len(row):
                 through = optical_depth(
                     reference, point[lit], towards, start[lit], np.full(len(row), UNBOUNDED)
                 )
-                radiance = reflection(row, towards) * np.exp(-through) * left[lit] * sun.irradiance
+                reflected = reflection(row, towards) * np.exp(-through)
+                radiance = reflected * transmittance[lit] * sun.irradiance
                 replicates[row, 3:, replicate] += radiance
             tell((replicate + (number + 1) / most) / REPLICATES)
     return SkyLight(replicates, bound)

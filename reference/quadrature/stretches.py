@@ -18,8 +18,8 @@ Index = NDArray[np.int64]
 Stretches = tuple[Index, Array, Array]  # rays, and distances of both ends [m]
 # distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
 Profile = Callable[[Array, Index], Array]
-#: An error that is an upper bound, derived, or one that follows from what it is of: by
-#: two rules, or two steps.
+#: An error that is a derived upper bound, or an estimate from two values of the same
+#: quantity: by two rules, or two steps.
 BoundKind = Literal["proven", "estimated"]
 
 
@@ -68,6 +68,7 @@ def cosine_profile(rays: Rays, normal: Array) -> Profile:
     """Return the cosine at samples of a light with unit normals, (rays, 3), along rays in
     their planes with these.
     """
+    # n . (o + x w - y) of the derivation is linear in x.
     start = np.sum(normal * (rays.origin - rays.position), axis=1)
     rise = np.sum(normal * rays.direction, axis=1)
 
@@ -98,5 +99,6 @@ def lit_stretches(light: ReferenceLight, rays: Rays, lit: LitIntervals) -> Stret
     ends = np.where(misses, middle, inner0), np.where(misses, middle, inner1)
     cuts = np.clip(np.stack([rays.distance(end, ray) for end in ends]), low, high)
     low, high = np.concatenate([low, *cuts]), np.concatenate([*cuts, high])
+    # Each interval falls into three parts: before, in and behind the beam; most have one.
     keep = high > low
     return np.tile(ray, 3)[keep], low[keep], high[keep]

@@ -4,9 +4,9 @@
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment
-(see `reference.quadrature.ray_values`). Through bounded media the optical depth is that of both
-ways piece by piece. A directional light has its irradiance in the place of I / r^2, and an
-unbounded shadow segment: only bodies dim it.
+(see `reference.quadrature.ray_values`). Through bounded media the optical depth is the sum over
+both ways, piece by piece. A directional light has its irradiance in the place of I / r^2, and an
+unbounded shadow segment: only bodies attenuate it.
 """
 
 from collections.abc import Sequence
@@ -94,11 +94,14 @@ def lit_surface(
     to_camera = optical_depth(
         reference, reference.origin, reference.direction, np.zeros(len(far)), far
     )
+    # The emitters are sorted like `lights`: places first, then directions.
     emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
+        # I / r^2 of this emitter, or its irradiance, without visibility: the lit intervals say
+        # that.
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         reflected = interaction.bsdf().eval(
             mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing
@@ -110,6 +113,8 @@ def lit_surface(
             way = light.position - point
             r = np.linalg.norm(way, axis=1)
             way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
+        # A directional light's segment goes to the end of all floats: only bounded media can be on
+        # it.
         depth = to_camera + optical_depth(reference, point, way, np.zeros(len(point)), r)
         lit = np.array(facing, dtype=bool) & reaches
         total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)

@@ -22,12 +22,6 @@ from airlight.reference.scene.transforms import SAME, matrix_of, outwards
 Array = NDArray[np.float64]
 
 _KINDS = {"Rectangle": "rectangle", "Disk": "disk", "Sphere": "sphere"}
-# of a mesh's size and place: how far before its triangles its light starts, so
-# that they do not hide it
-_LIFT = 1e-9
-_CONVEX = 1e-6  # of the same: corners this far before a triangle are in its plane; float32
-_PAIRS = 1e9  # triangles times corners that are looked at to see whether a mesh is convex
-_BITS = 16  # of a coordinate by which triangles are put in order
 
 
 @dataclass(frozen=True)
@@ -130,9 +124,11 @@ def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     opaque = shape.bsdf().class_name() != "Null"
     if kind is None:
         return _mesh(shape, radiance, opaque)
+    # Rectangles, disks and spheres follow from their transform alone.
     matrix = matrix_of(mi.traverse(shape)["to_world"])
     frame, half = _sides(shape, kind, matrix)
     light = ReferenceAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
+    # A sphere emits outwards: a camera inside of it would see no light.
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + SAME):
         raise _refusal(
             shape,
@@ -147,10 +143,13 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
     normal = triangle_normals(corners[faces])
-    used = np.linalg.norm(normal, axis=1) > 0
-    if not np.isfinite(corners).all() or not used.any():
+    sound = np.linalg.norm(normal, axis=1) > 0
+    if not np.isfinite(corners).all() or not sound.any():
         raise _refusal(shape, "has no area", "a mesh with triangles that have one")
-    faces, normal = faces[used], normal[used]
+    # Triangles without area have no normal and emit nothing.
+    faces, normal = faces[sound], normal[sound]
+    # Corners are ordered counter-clockwise from the side that emits: the side of the normals at
+    # vertices, where there are any, and the other one if normals are flipped.
     back = np.full(len(faces), shape.has_flipped_normals())
     smooth = np.array(parameters.get("vertex_normals", ()), dtype=np.float64)
     if smooth.size:
@@ -158,12 +157,14 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     faces = np.where(back[:, None], faces[:, ::-1], faces)
     normal = triangle_normals(corners[faces])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    known = corners[np.unique(faces)]
-    centre = 0.5 * (known.min(axis=0) + known.max(axis=0))
-    radius = float(np.linalg.norm(known - centre, axis=1).max())
+    points = corners[np.unique(faces)]
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    radius = float(np.linalg.norm(points - centre, axis=1).max())
     size = radius + float(np.abs(centre).max())
-    triangles = corners[faces] + _LIFT * size * normal[:, None]
-    hides = opaque and not _is_convex(corners[faces][:, 0], normal, known, _CONVEX * size)
+    # Light starts before the triangles by 1e-9 of the mesh's size and place, so that they do not
+    # hide it. Corners up to 1e-6 of the same before a triangle are in its plane: float32.
+    triangles = corners[faces] + 1e-9 * size * normal[:, None]
+    hides = opaque and not _is_convex(corners[faces][:, 0], normal, points, 1e-6 * size)
     light = ReferenceAreaLight(
         "mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape
     )
@@ -173,15 +174,16 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
 
 
 def _neighbours(place: Array) -> NDArray[np.int64]:
-    """Return an order of points, (n, 3), where neighbours follow one another, that of
-    their bits in turn (Morton).
+    """Return an order of points, (n, 3), where neighbours follow one another: by the bits of all
+    coordinates in turn (Morton).
     """
+    bits = 16  # of a coordinate, by which triangles are put in order
     low, high = place.min(axis=0), place.max(axis=0)
     cell = (
-        (place - low) / max(float((high - low).max()), np.finfo(float).tiny) * ((1 << _BITS) - 1)
+        (place - low) / max(float((high - low).max()), np.finfo(float).tiny) * ((1 << bits) - 1)
     ).astype(np.int64)
     code = np.zeros(len(place), np.int64)
-    for bit in range(_BITS):
+    for bit in range(bits):
         for axis in range(3):
             code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
     return np.argsort(code, kind="stable")
@@ -191,8 +193,10 @@ def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool
     """Return whether no point of a mesh is before one of its triangles; no
     for one too large to look.
     """
-    if float(len(corner)) * len(known) > _PAIRS:
+    # To look at more than 1e9 pairs of a triangle and a corner takes too long.
+    if float(len(corner)) * len(known) > 1e9:
         return False
+    # All corners lie behind or in the plane of each triangle, a block of triangles at a time.
     step = max(1, (1 << 22) // len(known))
     blocks = (slice(first, first + step) for first in range(0, len(corner), step))
     level = np.sum(corner * normal, axis=1)
@@ -203,11 +207,13 @@ def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool
 
 def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
     """Return the frame and half the sides; refuse shapes without area and with different scales."""
+    # The columns of the matrix are the images of the axes; half of both sides are their lengths.
     axes = matrix[:3, :3].T
     used = axes if kind == "sphere" else axes[:2]
     length = np.linalg.norm(used, axis=1)
     if not np.all(np.isfinite(matrix)) or length.min() <= SAME**2 * max(1.0, length.max()):
         raise _refusal(shape, "has no area", "scales above zero")
+    # A float32 transform is at right angles, and has one scale, up to `SAME`.
     unit = used / length[:, None]
     if np.abs(unit @ unit.T - np.eye(len(unit))).max() > SAME:
         raise _refusal(shape, "is sheared", "axes at right angles to each other")

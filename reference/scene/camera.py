@@ -49,6 +49,7 @@ def _pinhole(sensor, size: tuple[int, int]) -> tuple[float, Array]:
     before it looks through it.
     """
     parameters = mi.traverse(sensor)
+    # The width of a pixel at a distance of 1: the field of view is across the width of the film.
     pixel = 2 * np.tan(0.5 * np.deg2rad(float(parameters["x_fov"][0]))) / size[0]
     offset = [float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"]
     return float(1 / pixel), (0.5 - np.array(offset)) * size

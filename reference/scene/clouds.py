@@ -35,9 +35,6 @@ from airlight.reference.scene.varying import grid_values
 
 Array = NDArray[np.float64]
 
-_FRACTION = 0.125  # of a voxel, between the places at which a density is summed up along a ray
-_BEYOND = 1e-4  # how far a shape may reach beyond its grid, as a fraction of that
-
 
 @dataclass(frozen=True)
 class CloudDensity:
@@ -64,7 +61,8 @@ class CloudDensity:
         """
         if not len(way):
             return np.zeros(0)
-        count = np.maximum(np.ceil(length / (_FRACTION * self.voxel)), 1.0)
+        # Each stretch has its own number of steps; the loop ends for it when they are done.
+        count = np.maximum(np.ceil(length / (0.125 * self.voxel)), 1.0)
         start = origin + way * begin[:, None]
         first, step = mi.Point3f(start.T), mi.Vector3f((way * (length / count)[:, None]).T)
         steps = mi.UInt32(count.astype(np.uint32))
@@ -125,6 +123,7 @@ def read_clouds(scene) -> CloudScene:
         raise InputError(
             f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
         )
+    # The light, then the shapes: opaque ones, and the boundaries of clouds.
     suns, sky = _lights(scene)
     opaque, boundaries = sorted_shapes(scene)
     if not boundaries:
@@ -132,6 +131,7 @@ def read_clouds(scene) -> CloudScene:
             "the scene has no cloud; expected a closed shape of material 'null' with an interior "
             "medium"
         )
+    # Paths find a sun by the material's value for its direction, which a mirror does not have.
     for shape in opaque:
         if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta):
             raise InputError(
@@ -139,6 +139,7 @@ def read_clouds(scene) -> CloudScene:
                 "cannot find the sun "
                 "in it; expected a rough one"
             )
+    # The walk takes whatever is not in a cloud for vacuum.
     for shape in boundaries:
         if shape.exterior_medium() is not None:
             raise InputError(
@@ -168,6 +169,7 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
         if is_directional(emitter):
             suns.append(read_directional(emitter))
         elif emitter.class_name() == "ConstantBackgroundEmitter":
+            # A sky has one number or three.
             given = np.array(mi.traverse(emitter)["radiance.value"], dtype=np.float64).reshape(-1)
             skies.append(np.broadcast_to(given, 3))
         else:
@@ -190,6 +192,7 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
 def _read_cloud(shape) -> Cloud:
     medium, name = shape.interior_medium(), f"the medium of shape '{shape.id()}'"
     if not medium.is_homogeneous():
+        # The largest extinction stands for the cloud, and the density is relative to it.
         density = _read_density(shape, name)
         sigma_t = np.full(3, density.largest)
         return Cloud(sigma_t, *read_scattering(medium), medium, shape=shape, density=density)
@@ -200,12 +203,12 @@ def _read_cloud(shape) -> Cloud:
 def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
     """Return in which cloud the camera is, and check that it says so itself."""
     number = _enclosing(boundaries, origin)
-    own = sensor.get_medium()
-    if number < 0 and own is not None:
+    camera_medium = sensor.get_medium()
+    if number < 0 and camera_medium is not None:
         raise InputError(
             "the camera references a medium and is in no cloud; remove the medium from the sensor"
         )
-    if number >= 0 and own != boundaries[number].interior_medium():
+    if number >= 0 and camera_medium != boundaries[number].interior_medium():
         raise InputError(
             f"the camera is inside of shape '{boundaries[number].id()}', but references another "
             "medium or none; "
@@ -220,14 +223,18 @@ def _enclosing(shapes: list[Any], point: Array) -> int:
     A ray from the point meets the surfaces that enclose it an odd number of times; the one met
     first from inside is it.
     """
+    # Only boundaries are in this scene: an opaque shape must not hide one from the rays.
     scene = scene_from(shapes)
     for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
         ray = mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction))
         dr.make_opaque(ray)
         si = scene.ray_intersect(ray)
         dr.eval(si)
+        # One direction could meet an edge; the point is outside if either ray leaves the shapes or
+        # meets the first face from outside.
         if not bool(si.is_valid()[0]) or float(dr.dot(si.n, mi.Vector3f(*direction))[0]) <= 0:
             return -1
+    # The second ray tells which surface it is.
     hit = si.shape
     return next(
         number for number, shape in enumerate(shapes) if bool((hit == mi.ShapePtr(shape))[0])
@@ -252,7 +259,8 @@ def _read_density(shape: Any, name: str) -> CloudDensity:
             )
     values, low, high = grid_values(medium, name)
     box = shape.bbox()
-    margin = _BEYOND * (high - low)
+    # A shape may reach beyond its grid by 1e-4 of it, for rounding.
+    margin = 1e-4 * (high - low)
     if np.any(np.array(box.min).ravel() < low - margin) or np.any(
         np.array(box.max).ravel() > high + margin
     ):
@@ -261,6 +269,7 @@ def _read_density(shape: Any, name: str) -> CloudDensity:
             f"{_words(high)}; "
             "expected a to_world of the volume whose unit cube holds the shape"
         )
+    # The table has the order z, y, x, the box x, y, z.
     voxel = float(((high - low) / values.shape[2::-1]).min())
     return CloudDensity(medium, float(values.max()), voxel)
 

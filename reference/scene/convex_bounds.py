@@ -7,8 +7,8 @@ lies further outside any facet's plane than
 
     size (1e-6 + 4 eps largest coordinate / altitude of the facet),        eps = 2^-24:
 
-what rounding the corners of that facet can do to its plane. Slivers with an altitude below 1e-6 of
-the size have no plane worth the name; their neighbours bound the body without them.
+the most by which rounding of its corners moves the plane of a facet. Slivers with an altitude below
+1e-6 of the size have no plane worth the name; their neighbours bound the body without them.
 """
 
 from dataclasses import dataclass
@@ -23,9 +23,6 @@ from airlight.reference.scene.transforms import SAME, matrix_of, outwards
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-LARGEST_MESH = 20_000  # triangles: the test of convexity looks at every vertex and every facet
-_FLAT = 1e-6  # relative to the size of the body
 
 
 @dataclass(frozen=True)
@@ -63,10 +60,10 @@ def read_bounds(shape: Any) -> Bounds:
         )
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
-    if len(faces) > LARGEST_MESH:
-        raise _refusal(
-            shape, f"has {len(faces)} triangles", f"at most {LARGEST_MESH}: simplify the mesh"
-        )
+    # The test of convexity looks at every vertex and every facet.
+    most = 20_000
+    if len(faces) > most:
+        raise _refusal(shape, f"has {len(faces)} triangles", f"at most {most}: simplify the mesh")
     return _read_polyhedron(shape, vertices, faces)
 
 
@@ -91,9 +88,12 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
     twice_area = np.linalg.norm(area, axis=1)
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     altitude = twice_area / np.maximum(longest, np.finfo(float).tiny)
-    sound = altitude > _FLAT * size
+    # Slivers, with an altitude below 1e-6 of the size, have no plane worth the name.
+    flat = 1e-6
+    sound = altitude > flat * size
     edges, sides = _edges(shape, faces)
     normal = area / np.maximum(twice_area, np.finfo(float).tiny)[:, None]
+    # The sum over all facets is six times the volume, above zero if normals point outwards.
     if np.sum(corner[:, 0] * area) * (-1 if shape.has_flipped_normals() else 1) < 0:
         raise _refusal(
             shape,
@@ -104,9 +104,9 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
     if shape.has_flipped_normals():
         normal = -normal
     offset = np.mean(np.sum(corner * normal[:, None], axis=2), axis=1)
-    allowed = size * (
-        _FLAT + 2.0**-22 * np.abs(vertices).max() / np.maximum(altitude, _FLAT * size)
-    )
+    # How far rounding of its corners may turn the plane of a facet, at the distance of the furthest
+    # vertex: the formula of the module; 2^-22 is 4 eps.
+    allowed = size * (flat + 2.0**-22 * np.abs(vertices).max() / np.maximum(altitude, flat * size))
     for first in range(0, len(faces), 256):
         block = slice(first, first + 256)
         outside = np.max(vertices @ normal[block].T, axis=0) - offset[block]
@@ -119,7 +119,9 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
             )
     if not np.any(sound):
         raise _refusal(shape, "has no volume", "a closed convex mesh")
-    bends = np.linalg.norm(normal[sides[:, 0]] - normal[sides[:, 1]], axis=1) > 10 * _FLAT
+    # Edges within a flat facet of several triangles are none of the body's; edges of slivers may
+    # be.
+    bends = np.linalg.norm(normal[sides[:, 0]] - normal[sides[:, 1]], axis=1) > 10 * flat
     bends |= ~sound[sides].all(axis=1)
     return Polyhedron(normal[sound], offset[sound], vertices[edges[bends]])
 
@@ -171,7 +173,7 @@ def in_surface(bounds: Bounds, point: Array) -> bool:
 
 def normals_at(bounds: Bounds, points: Array) -> Array:
     """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges
-    that of one of the facets.
+    the normal of one of the facets.
     """
     if isinstance(bounds, Sphere):
         return (points - bounds.centre) / bounds.radius

@@ -9,8 +9,6 @@ import drjit as dr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
-
 
 def on_device(kind: Any, numbers: ArrayLike) -> Any:
     """Return numbers, (n,), as an array of a kind such as `mi.Float64`.
@@ -21,8 +19,10 @@ def on_device(kind: Any, numbers: ArrayLike) -> Any:
     """
     given = np.asarray(numbers)
     dtype = np.dtype({"Float32": "f4", "Float64": "f8", "UInt32": "u4"}[dr.type_v(kind).name])
-    memory = np.empty(given.size * dtype.itemsize + _ALIGNMENT, np.uint8)
-    first = -memory.ctypes.data % _ALIGNMENT
+    # A block with room to begin at a multiple of 64 bytes, as memory that Dr.Jit allocates does.
+    alignment = 64
+    memory = np.empty(given.size * dtype.itemsize + alignment, np.uint8)
+    first = -memory.ctypes.data % alignment
     aligned = memory[first : first + given.size * dtype.itemsize].view(dtype)
     aligned[:] = given
     return kind(aligned)

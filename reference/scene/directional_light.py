@@ -38,6 +38,7 @@ def read_directional(emitter) -> DirectionalLight:
 
     Raises InputError for a transform that scales the direction.
     """
+    # Mitsuba's light travels along the image of the axis z.
     axis = matrix_of(emitter.world_transform())[:3, 2]
     length = float(np.linalg.norm(axis))
     if abs(length - 1) > SAME:

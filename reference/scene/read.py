@@ -39,8 +39,6 @@ from airlight.reference.scene.varying import (
 
 Array = NDArray[np.float64]
 
-_SHAPE_MARGIN = 1e-5  # of the side of a grid, by which a shape around it may be rounded
-_LARGEST_ALBEDO = 1 + 1e-6  # rounding
 _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 
@@ -72,7 +70,7 @@ class ReferenceMedium:
 
     @property
     def largest(self) -> Array:
-        """Its largest extinction, which is that of all places, RGB [1/m]."""
+        """Its largest extinction, the same at all places, RGB [1/m]."""
         return self.sigma_t
 
 
@@ -125,6 +123,7 @@ def read_reference(scene) -> ReferenceScene:
         raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
+    # Emitters by how they shine: around the scene, from a direction, from an area, from a place.
     background = _background(scene)
     emitters = [emitter for emitter in scene.emitters() if emitter != background]
     far = tuple(emitter for emitter in emitters if is_directional(emitter))
@@ -140,11 +139,15 @@ def read_reference(scene) -> ReferenceScene:
     lights = tuple(_read_light(emitter) for emitter in near)
     origin = camera_matrix(sensor)[:3, 3]
     area = tuple(read_area_light(emitter, origin) for emitter in wide)
+    # Shapes that stop light, and shapes that bound media. A density grid in a shape around its box
+    # counts as the medium around the camera, and the shape bounds nothing.
     opaque, boundaries = sorted_shapes(scene)
     grid = _grid_in_a_shape(sensor, boundaries, origin)
     media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
     medium = grid or _read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in far)
+    # Light from infinity never arrives through an unbounded medium, nor along paths in height fog
+    # that do not rise.
     for emitter, sun in zip(far, suns, strict=True):
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(
@@ -198,6 +201,7 @@ def _background(scene):
     """Return the emitter around a scene, a sky or the background of lights
     in it; None without one.
     """
+    # An environment map lights nothing here: it is only seen behind other lights.
     around = [emitter for emitter in scene.emitters() if emitter.class_name() in _AROUND]
     lights = {emitter.class_name() for emitter in scene.emitters()} - set(_AROUND)
     return around[0] if around and (lights or around[0].class_name() == _AROUND[0]) else None
@@ -208,6 +212,8 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
     if background is None or background.class_name() != _AROUND[0]:
         return None
     if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
+        # Through an unbounded medium no light of a sky arrives; in a channel without extinction all
+        # of it would, from infinitely far along each ray.
         if not np.all(medium.sigma_t > 0):
             raise InputError(
                 "a sky shines through a medium without bounds in some channels; expected bounds"
@@ -230,6 +236,7 @@ def _rebuilt(scene, emitters: list[Any]):
     """Return a scene with these emitters; all parts keep their names."""
     parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
     names = [part.id() for part in parts]
+    # Mitsuba names the parts of a dictionary by their keys: the old names are given back.
     built = mi.load_dict(
         {"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)}
     )
@@ -239,10 +246,12 @@ def _rebuilt(scene, emitters: list[Any]):
 
 
 def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
-    """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
+    """Return the opaque shapes and the shapes that bound a medium; all others take no part."""
     opaque, boundaries = [], []
     for shape in scene.shapes():
         inside, outside = shape.interior_medium(), shape.exterior_medium()
+        # A surface stops light; a shape of material `null` is the boundary of a medium or nothing.
+        # Between both there is nothing that the estimators know.
         null = shape.bsdf().class_name() == "Null"
         if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
             raise InputError(
@@ -290,8 +299,10 @@ def _read_ambient(
     sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]
 ) -> ReferenceMedium | VaryingMedium:
     """Return the medium around the camera; refuse a camera or a boundary that says otherwise."""
-    own = sensor.get_medium()
-    ambient = own
+    camera_medium = sensor.get_medium()
+    # The camera may be in one of the bounded media: the medium around is then the exterior of that
+    # shape.
+    ambient = camera_medium
     for medium, shape in zip(media, boundaries, strict=True):
         if in_surface(medium.bounds, origin):
             raise InputError(
@@ -299,13 +310,14 @@ def _read_ambient(
                 "outside"
             )
         if holds(medium.bounds, origin):
-            if own != medium.plugin:
+            if camera_medium != medium.plugin:
                 raise InputError(
                     f"the camera is inside of shape '{medium.name}', but references another medium "
                     "or none; "
                     "reference that shape's interior medium in the sensor"
                 )
             ambient = shape.exterior_medium()
+    # All bounded media lie in one and the same medium.
     for medium, shape in zip(media, boundaries, strict=True):
         if shape.exterior_medium() != ambient:
             raise InputError(
@@ -316,6 +328,7 @@ def _read_ambient(
             )
     if is_height_fog(ambient) or is_grid(ambient):
         kind = "height fog" if is_height_fog(ambient) else "a density grid"
+        # Height fog and grids are alone: bodies in them would need integrals of both.
         if media:
             raise InputError(
                 f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove "
@@ -342,22 +355,27 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
     shape = boundaries[0] if len(boundaries) == 1 else None
     if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
         return None
-    own, inside = sensor.get_medium(), shape.interior_medium()
+    camera_medium, inside = sensor.get_medium(), shape.interior_medium()
     grid = read_grid(inside, *read_scattering(inside))
     low, high = (
         np.array(corner, dtype=np.float64).ravel()
         for corner in (shape.bbox().min, shape.bbox().max)
     )
-    margin = _SHAPE_MARGIN * (grid.high - grid.low)
+    # The shape may be smaller than the box by 1e-5 of a side: its numbers are rounded. The box test
+    # is quick; the shape itself must then hold all eight corners, drawn in by twice as much.
+    fraction = 1e-5
+    margin = fraction * (grid.high - grid.low)
     if np.any(low > grid.low + margin) or np.any(high < grid.high - margin):
         return None
     bounds, middle = read_bounds(shape), 0.5 * (grid.low + grid.high)
     corners = np.array(np.meshgrid(*zip(grid.low, grid.high, strict=True))).reshape(3, 8).T
     if not all(
-        holds(bounds, middle + (1 - 2 * _SHAPE_MARGIN) * (corner - middle)) for corner in corners
+        holds(bounds, middle + (1 - 2 * fraction) * (corner - middle)) for corner in corners
     ):
         return None
-    if own not in ((inside,) if holds(bounds, origin) else (None, inside)):
+    # A camera in the shape must name the grid's medium. Outside of it the camera may: the grid is
+    # vacuum beyond its box.
+    if camera_medium not in ((inside,) if holds(bounds, origin) else (None, inside)):
         raise InputError(
             f"the camera references another medium than that of shape '{shape.id()}', a density "
             "grid, or is in the "
@@ -410,7 +428,7 @@ def read_scattering(medium) -> tuple[Array, PhaseFunction]:
     albedo = colour(
         parameters["albedo.value.value"],
         f"medium '{medium.id()}': its albedo",
-        largest=_LARGEST_ALBEDO,
+        largest=1 + 1e-6,  # rounding
     )
     return albedo, _read_phase(medium.phase_function())
 
@@ -461,6 +479,8 @@ def _read_light(emitter) -> ReferenceLight:
             "length: take the scale "
             "away, in a modelling program before the export"
         )
+    # A spot stands at the origin of its frame and shines along its axis z; a point light has a
+    # position of its own, and any axis will do.
     position = (
         matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
     )
@@ -470,6 +490,7 @@ def _read_light(emitter) -> ReferenceLight:
     interaction = dr.zeros(mi.Interaction3f)
     interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
     dr.make_opaque(interaction)  # one kernel for all lights of a kind
+    # Irradiance times the squared distance is the intensity.
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
     intensity = _as_given(
         emitter, colour(arriving, f"light '{emitter.id()}': its intensity") * distance**2
@@ -477,6 +498,7 @@ def _read_light(emitter) -> ReferenceLight:
     if not spot:
         return ReferenceLight(position, intensity)
     degrees = float(parameters["cutoff_angle"][0])
+    # The interval of a cone on a ray (`reference.visibility.planes`) holds below a half space.
     if not 0 < degrees < 90:
         raise InputError(
             f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than "

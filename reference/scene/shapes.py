@@ -35,7 +35,7 @@ class Disks:
 class Shapes:
     """The opaque shapes of a scene."""
 
-    triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
+    triangles: Array  #: of meshes and rectangles, (triangles, 3, 3) [m]
     #: of the spheres, (spheres, 3) [m]
     centre: Array = field(default_factory=lambda: np.empty((0, 3)))
     radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]
@@ -91,6 +91,7 @@ def _read(shape) -> Array | Sphere | Disks:
         or abs(matrix[:3, 0] @ matrix[:3, 1]) > SAME * length[0] ** 2
     ):
         raise InputError(f"shape '{shape.id()}' is an oval disk; expected a round one, or a mesh")
+    # Transforms may shear the third axis: the normal is across the first two.
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
 
@@ -100,6 +101,7 @@ def distance_to(shapes: Shapes, point: Array) -> float:
     spheres = np.abs(np.linalg.norm(shapes.centre - point, axis=1) - shapes.radius)
     away = point - shapes.disks.centre
     above = np.sum(away * shapes.disks.normal, axis=1)
+    # The nearest place of a disk is below the point, or on the rim.
     beside = np.linalg.norm(away - above[:, None] * shapes.disks.normal, axis=1)
     disks = np.hypot(above, np.maximum(beside - shapes.disks.radius, 0.0))
     return min(
@@ -111,6 +113,8 @@ def distance_to_triangles(triangles: Array, point: Array) -> float:
     """Return the distance from a point, (3,) [m], to triangles, (n, 3, 3) [m]: to their
     planes, or to their sides.
     """
+    # The foot of the point on a plane is in the triangle if it is on the inner side of all three
+    # sides: then the distance to the plane counts, else the nearest side.
     corners = triangles - point
     sides = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(sides[:, 0], sides[:, 1])
@@ -137,6 +141,7 @@ def is_rectangle(shape) -> bool:
 def triangles_of(shape) -> Array:
     """Return the triangles of a mesh or rectangle, (triangles, 3, 3) [m]."""
     if is_rectangle(shape):
+        # Mitsuba's rectangle is [-1, 1]^2 in its own frame, here two triangles.
         corners = np.array([[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
         return (corners @ _matrix(shape).T)[:, :3][np.array([[0, 1, 2], [0, 2, 3]])]
     parameters = mi.traverse(shape)

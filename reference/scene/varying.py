@@ -35,8 +35,6 @@ NO_EXTINCTION = (
     "expected a medium of "
     "type 'homogeneous'"
 )
-_PLACES = 512  # at which extinctions are compared
-_DIFFERENCE = 2e-3  # of the largest value: Mitsuba's places are rounded in float32
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +74,7 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
     """Read height fog; its albedo, RGB, and its phase function were read."""
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
+    # The numbers of the volume plugin by their last names. A layer without density is left out.
     number = {
         key.rpartition(".")[2]: np.array(value, dtype=np.float64).ravel()
         for key, value in parameters
@@ -86,6 +85,7 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
         for i in "12"
         if (sigma_t := float(number[f"sigma_{i}"][0])) > 0
     )
+    # Mitsuba's majorant bounds the density along all rays.
     largest = np.array(
         medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64
     ).reshape(-1)
@@ -125,6 +125,7 @@ class GridMedium(VaryingMedium):
         far = np.where(direction == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(
             axis=-1
         )
+        # A box behind the ray's beginning is missed, too.
         meets = (far > near) & (far > 0)
         return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
 
@@ -169,20 +170,20 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
         largest=largest,
         plugin=medium,
     )
-    # Mitsuba's extinctions at random places in the box.
-    fraction = np.random.default_rng(1).random((_PLACES, 3))
-    interaction = dr.zeros(mi.MediumInteraction3f, _PLACES)
+    # Mitsuba's extinctions at 512 random places in the box.
+    fraction = np.random.default_rng(1).random((512, 3))
+    interaction = dr.zeros(mi.MediumInteraction3f, len(fraction))
     interaction.p = mi.Point3f((low + fraction * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]
-    # The grid as it lies in the box: the first way that agrees; of ways that agree all
-    # give the same extinctions.
+    # The grid as it lies in the box: the first way that agrees, since all ways that agree give the
+    # same extinctions. 2e-3 of the largest value is for Mitsuba's places, rounded in float32.
     worst = np.inf
     for turned in _turned(values):
         difference = (
             np.abs(theirs - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max()
             / values.max()
         )
-        if difference <= _DIFFERENCE:
+        if difference <= 2e-3:
             return replace(grid, values=turned)
         worst = min(worst, float(difference))
     raise InputError(
@@ -216,6 +217,7 @@ def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
             f"{name} has a grid of {values.shape[3]} channels; expected a grid of one: grey "
             "extinction"
         )
+    # The medium's scale multiplies its volume.
     values = values.reshape(values.shape[:3]) * float(np.array(parameters["scale"]).ravel()[0])
     if not np.isfinite(values).all() or values.min() < 0:
         raise InputError(
@@ -232,6 +234,8 @@ def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
 
 def _trilinear(values: Array, place: Array) -> Array:
     """Return the values of a grid (z, y, x) at places in voxels, (n, 3)."""
+    # Beyond the outermost centres values are those of the centres; the last cell begins one voxel
+    # before the end.
     most = np.array(values.shape[::-1]) - 1
     place = np.clip(place, 0, most)
     cell = np.minimum(place.astype(np.int64), np.maximum(most - 1, 0))

@@ -5,15 +5,15 @@ A version names what was released, and all commits between two releases have one
 printed or written names the commit and the digest beside it: they tell two commits apart, and a
 changed file from the commit.
 
-A checkout asks git, once in a process and not before somebody wants to know. A copy without git has
+A checkout asks git once in a process, when the answer is first needed. A copy without git has
 its commit in `src/airlight/commit.txt`: `git archive` fills it in, as `.gitattributes` says, and
 `setup.py` does in wheels and source distributions, with the digest of the files then. A file that
 was changed afterwards is noticed by that digest.
 
-The digest is of bytes, comments too, unlike those of `code.py`, which decide what is computed
-again: it takes a twentieth of a second in place of two, and is the same for every version of
-Python. Nothing of ours is imported at the top, as `setup.py` runs this file where no package is
-installed, and nothing that `airlight --help` would wait for.
+The digest is of bytes, comments too. The digests of `code.py`, which decide what is computed again,
+leave comments out; this one takes a twentieth of a second in place of two, and is the same for
+every version of Python. Nothing of ours is imported at the top, as `setup.py` runs this file where
+no package is installed, and nothing that `airlight --help` would wait for.
 """
 
 import os
@@ -23,8 +23,6 @@ from pathlib import Path
 
 UNKNOWN = "unknown"
 COMMIT = "commit.txt"  #: in the package
-_DIGITS = 12  # of a commit or a digest that is printed
-_PATIENCE = 30.0  # until git has answered; a file system may be far away [s]
 # that git sets for hooks of any project
 _ELSEWHERE = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
 
@@ -43,7 +41,8 @@ class Build:
     def words(self) -> str:
         """The version, the commit and the digest, as they are printed."""
         changes = " with changes" if self.changed else ""
-        return f"{self.airlight}, commit {self.commit[:_DIGITS]}{changes}, files {self.digest[:_DIGITS]}"
+        # Twelve digits of a commit or a digest are printed.
+        return f"{self.airlight}, commit {self.commit[:12]}{changes}, files {self.digest[:12]}"
 
 
 @cache  # the code that this process runs stays what it was when it was imported
@@ -86,6 +85,7 @@ def package_digest(package: Path) -> str:
         for name in names
         if not (name.startswith(".") or name.endswith((".pyc", ".pyo")))
     ]
+    # Line ends of Windows count as line feeds, so that a checkout has one digest everywhere.
     digest = hashlib.sha256()
     for name, path in sorted((path.relative_to(package).as_posix(), path) for path in paths):
         if name != COMMIT:
@@ -112,15 +112,16 @@ def _asked(package: Path) -> tuple[str, bool] | None:
     import subprocess
 
     root = package.parents[1].resolve()
-    # a file in worktrees; the repository around an installed copy is not ours
+    # `.git` is a file in worktrees. The repository around an installed copy is not ours.
     if not (root / ".git").exists():
         return None
+    # Only folders of the package count: a changed test or page does not change what is computed.
     folders = {
         str(each.resolve().relative_to(root))
         for each in (package, *package.iterdir())
         if each.is_dir()
     }
-    asked = [
+    command = [
         "git",
         "--no-optional-locks",
         "status",
@@ -132,17 +133,19 @@ def _asked(package: Path) -> tuple[str, bool] | None:
     world = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
     try:
         ran = subprocess.run(
-            asked,
+            command,
             cwd=root,
             env=world,
             capture_output=True,
             text=True,
-            timeout=_PATIENCE,
+            timeout=30.0,  # [s]; a file system may be far away
             check=True,
         )
     except (OSError, subprocess.SubprocessError):
         return None
     lines = ran.stdout.splitlines()
+    # A repository without a commit has the word (initial) in its place; lines without # name
+    # changed files.
     commit = next(
         (line.split()[2] for line in lines if line.startswith("# branch.oid ")), "(initial)"
     )

@@ -34,8 +34,6 @@ DEFAULT_LIMIT = 4 * 2**30  #: bytes
 _DIGEST = "digest"  # the name of the digest among the arrays
 _KIND = re.compile(r"([a-z]+(?:-[a-z]+)*)-[0-9a-f]{32}")
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(i?)b?", flags=re.IGNORECASE)
-# how often the size of the cache is looked at, on average, while a whole limit is written
-_LOOK = 100
 
 
 @dataclass(frozen=True)
@@ -133,7 +131,9 @@ def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
             raise
         _note_unwritable(cache_folder())
         return
-    if random.random() < _LOOK * len(buffer.getvalue()) / limit:
+    # To look at all files takes time: it is done 100 times, on average, while a whole limit is
+    # written.
+    if random.random() < 100 * len(buffer.getvalue()) / limit:
         remove_oldest(limit)
 
 
@@ -182,6 +182,7 @@ def cache_entries() -> list[Entry]:
     root, entries = cache_folder(), []
     folders = [root, *(path for path in _listed(root) if path.is_dir())]
     for path in (each for folder in folders for each in _listed(folder) if each.match("[!.]*.npz")):
+        # A part lies in the folder of its result, whose name then says the kind.
         owner = path.parent if path.parent != root else path
         kind = _KIND.fullmatch(owner.name.removesuffix(".npz"))
         if kind is None or owner.is_symlink():

@@ -37,7 +37,7 @@ def code_digest(starts: Iterable[Path]) -> str:
     it is ours or the user's.
 
     From a file of the user's, which may lie anywhere, the modules beside it are followed,
-    and those of its package.
+    and the modules of its package.
     """
     # Follow imports from file to file.
     waiting, digests = [path.resolve() for path in starts], dict[Path, bytes]()
@@ -61,7 +61,7 @@ def code_digest(starts: Iterable[Path]) -> str:
 @lru_cache(maxsize=1024)
 def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
     """Return a digest of the code of a file, and the names and words in it,
-    those of modules among them.
+    names of modules among them.
     """
     names: set[str] = set()
     try:
@@ -105,6 +105,7 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
             if ours[name].name == "__init__.py":
                 yield from (ours[inside] for part in names if (inside := f"{name}.{part}") in ours)
         return
+    # A module of the user's: its own folder, and the folders of the packages around it.
     folders = [path.parent]
     while (folders[-1] / "__init__.py").exists():
         folders.append(folders[-1].parent)
@@ -113,6 +114,7 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
         if folder.name in ("site-packages", "dist-packages"):
             continue
         for place in (folder.joinpath(*name.split(".")) for name in words):
+            # A name that is mentioned may be a module, a package, or a module in a package.
             package = place / "__init__.py"
             parts = [place / f"{part}.py" for part in words] if package.is_file() else []
             yield from filter(Path.is_file, (place.with_name(f"{place.name}.py"), package, *parts))

@@ -45,13 +45,10 @@ _STANDARD = frozenset((
 ))
 # fmt: on
 _ONE_LEVEL = str(OpenEXR.ONE_LEVEL)
-# x and y of red, green, blue and white, the default
-_SRGB = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)
 _INTEGERS = "colours in unsigned integers"
 # as other programs name channels
 _COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}
 _WHOLE = frozenset((*_COLOURS, "y"))
-_MAGIC = 20000630
 _ENCODED = "its values are encoded for a screen: save linear radiance as EXR"
 _CONVERTED = "convert it, for example by oiiotool FILE -o FILE.exr"
 #: How files of other kinds begin, what they are, and what to do.
@@ -68,7 +65,6 @@ _OTHERS = (
     ),
     (b"", "", "expected linear radiance as EXR: save it again"),
 )
-_DEEP = 0x800  # the bit of the second word of a file
 _PLAIN = frozenset(("", "rgb", "rgba"))  # names of a part whose channels are the image itself
 
 
@@ -79,8 +75,8 @@ class Image:
     Attributes
     ----------
     layers
-        Arrays (height, width, 3) by name: `airlight`, `surface`, their standard errors `airlight_se`, `surface_se`
-        [W/(m^2 sr)], and `total`.
+        Arrays (height, width, 3) by name: `airlight`, `surface`, their standard errors
+        `airlight_se`, `surface_se` [W/(m^2 sr)], and `total`.
     depth
         Distance along the ray to the visible surface [m], (height, width); infinite
         where the ray hits nothing.
@@ -101,6 +97,7 @@ class Image:
         if self.window is None or not self.layers:
             return mask
         inside = np.zeros(next(iter(self.layers.values())).shape[:2], dtype=bool)
+        # Pixels outside of the window are 0, and no data.
         left, top, right, bottom = self.window
         inside[top:bottom, left:right] = True
         return (
@@ -156,6 +153,7 @@ def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True
     channels = _channels(image)
     if finite:
         _check_finite(image)
+    # The binding changes the header that it is given: a new one for each file.
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
         header[key] = _attribute(key, value)
@@ -182,6 +180,7 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     _check_kind(path)
     try:
         with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
+            # Headers alone, to know how many parts and levels there are before pixels are read.
             declared = len(file.parts)
             levels = any(
                 str(getattr(part.header.get("tiles"), "mode", _ONE_LEVEL)) != _ONE_LEVEL
@@ -209,7 +208,9 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
     channels, window, notes = _channels_of(parts, path)
-    if not np.allclose(parts[0].header.get("chromaticities", _SRGB), _SRGB, atol=0.002):
+    # x and y of red, green, blue and white: the default of the format.
+    srgb = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)
+    if not np.allclose(parts[0].header.get("chromaticities", srgb), srgb, atol=0.002):
         notes.append("colours of other primaries than sRGB's, read as they are")
     return _image(channels, parts[0].header, window, notes)
 
@@ -240,6 +241,7 @@ def _channels_of(
     have data; what was changed.
     """
     channels: dict[str, NDArray[Any]] = {}
+    # The display window of the first part is the frame: channels of all parts are brought into it.
     frame, windows, notes = _window(parts[0].header["displayWindow"]), list[Window](), list[str]()
     for part in parts:
         if any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
@@ -248,6 +250,7 @@ def _channels_of(
                 "channels"
             )
         data = _window(part.header["dataWindow"])
+        # The data that lie in the frame.
         inside = (
             max(data[0], frame[0]),
             max(data[1], frame[1]),
@@ -261,8 +264,9 @@ def _channels_of(
         if inside != data and _CUT not in notes:
             notes.append(_CUT)
         windows.append(inside)
+        # A channel without a layer belongs to the layer with the name of its part. A part that
+        # holds a single colour gives the channel its own name.
         prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
-        # a part for each channel
         named = len(part.planes) == 1 and part.name.rpartition(".")[2].lower() in _COLOURS
         for key, (pixels, across, down) in part.planes.items():
             name = part.name if named else key if "." in key else prefix + key
@@ -272,10 +276,12 @@ def _channels_of(
                 )
             if across * down != 1:
                 notes.append(f"'{name}' has a value for {across} x {down} pixels")
+                # The last repeated value may reach beyond the data window.
                 rows, columns = data[3] - data[1], data[2] - data[0]
                 pixels = np.repeat(np.repeat(pixels, down, axis=0), across, axis=1)[:rows, :columns]
             channels[name] = _framed(pixels, data, inside, frame)
     firsts_x, firsts_y, ends_x, ends_y = zip(*windows, strict=True)
+    # Only pixels that every part has count as data.
     common = max(firsts_x), max(firsts_y), min(ends_x), min(ends_y)
     if common == frame:
         return channels, None, notes
@@ -303,6 +309,7 @@ def _framed(pixels: NDArray[Any], data: Window, inside: Window, frame: Window) -
     """Return the pixels of a frame from those of a data window, 0 where it has none."""
     if data == frame:
         return pixels
+    # Rows and columns of the overlap, in the frame and in the data window.
     whole = np.zeros((frame[3] - frame[1], frame[2] - frame[0]), pixels.dtype)
     rows, columns = (
         slice(inside[1] - frame[1], inside[3] - frame[1]),
@@ -323,6 +330,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     layers = {
         name or TOTAL: _float32(np.asarray(values), name) for name, values in image.layers.items()
     }
+    # All layers have the shape of the first one.
     first = next(iter(layers))
     for name, values in layers.items():
         if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
@@ -345,6 +353,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
                 "layer 'total' is not airlight + surface; leave it out and it is written for you"
             )
         layers[TOTAL] = total
+    # The binding writes an array with strides as if it were contiguous: each channel is a copy.
     channels = {}
     for name, values in layers.items():
         prefix = "" if name == TOTAL else f"{name}."
@@ -382,6 +391,7 @@ def _check_finite(image: Image) -> None:
         if image.depth is None
         else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
     )
+    # Depths are infinite where a ray hits nothing; only NaN is wrong there.
     for name, values in (dict(image.layers) | depth).items():
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
@@ -403,6 +413,8 @@ def _attribute(key: str, value: Any) -> Attribute:
     if isinstance(value, str):
         return value
     if isinstance(value, int | np.integer):
+        # The format keeps 32 bits of an integer, and about 7 digits of a float; what it would cut
+        # becomes text.
         return int(value) if -(2**31) <= value < 2**31 else str(int(value))
     if isinstance(value, float | np.floating):
         number = float(value)
@@ -426,11 +438,11 @@ def _check_kind(path: str | os.PathLike[str]) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot read {path}: {reason}; give an EXR file that exists") from error
-    if len(start) < 8 or struct.unpack("<I", start[:4])[0] != _MAGIC:
+    if len(start) < 8 or struct.unpack("<I", start[:4])[0] != 20000630:  # OpenEXR's magic number
         what, way = next((what, way) for first, what, way in _OTHERS if start.startswith(first))
         raise InputError(f"{Path(path)} is not an EXR file{what}; {way}")
     flags = struct.unpack("<I", start[4:])[0]
-    if flags & _DEEP:
+    if flags & 0x800:  # the bit of deep data
         raise InputError(f"{path} is a deep EXR file; save it flat")
 
 
@@ -456,6 +468,7 @@ def _quiet() -> Iterator[None]:
         contextlib.redirect_stdout(sink),
         contextlib.redirect_stderr(sink),
     ):
+        # The C code writes to the file descriptor, past Python's streams.
         saved = os.dup(2)
         try:
             os.dup2(sink.fileno(), 2)
@@ -475,6 +488,7 @@ def _image(
     floats = {
         k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"
     }
+    # Channels by layer: `groups[layer][suffix]` is the name of the channel.
     groups: dict[str, dict[str, str]] = {}
     for key in floats:
         name, _, suffix = key.rpartition(".")
@@ -489,6 +503,7 @@ def _image(
         } | group
         if {"R", "G", "B"} <= colours.keys():
             keys = [colours[suffix] for suffix in "RGB"]
+        # A lone Y is grey; beside other channels it is no colour.
         elif (grey_key := group.get("Y", group.get("y"))) and group.keys() <= {"Y", "y", "A", "Z"}:
             keys = [grey_key] * 3
             grey.append(name or TOTAL)
@@ -505,6 +520,7 @@ def _image(
         notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
     if any(channels[key].dtype == np.float16 for key in used):
         notes.append("half floats (relative rounding 5e-4)")
+    # Colours in integers are values for a screen; a layer of them is named, not read.
     integers = {
         k
         for k, v in channels.items()
@@ -512,9 +528,11 @@ def _image(
     }
     if integers:
         notes.append(f"{_INTEGERS} left out: {', '.join(sorted(integers))}")
-    if left := sorted(channels.keys() - used - integers):
-        notes.append(f"channels left out: {', '.join(left)}")
-    kept = {
+    if unused := sorted(channels.keys() - used - integers):
+        notes.append(f"channels left out: {', '.join(unused)}")
+    # Attributes of the format itself, and an earlier note of the reader, say nothing about this
+    # image.
+    attributes = {
         k: v
         for k, v in header.items()
         if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE
@@ -522,6 +540,6 @@ def _image(
     return Image(
         layers,
         floats.get(depth_key or ""),
-        {**kept, NOTE: "; ".join(notes)} if notes else kept,
+        {**attributes, NOTE: "; ".join(notes)} if notes else attributes,
         window,
     )

@@ -137,9 +137,9 @@ def temporary_folder() -> Iterator[Path]:
     """Give a folder that is removed when the block ends; folders that killed processes
     left a day ago go first.
     """
-    for left in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
-        if _age(left) > 24 * _STALE:
-            shutil.rmtree(left, ignore_errors=True)
+    for folder in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
+        if _age(folder) > 24 * _STALE:
+            shutil.rmtree(folder, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=_FOLDER) as name:
         yield Path(name)
 

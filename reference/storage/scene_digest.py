@@ -2,12 +2,12 @@
 """A digest of a scene: of every property of every object, every vertex, every value of every file.
 
 Mitsuba tells Python the parameters of its objects, their classes and a few properties beside them.
-That is everything where all classes are in `_WHOLE`. Others have properties that nobody can ask for
-once they are built: how a texture or a grid is filtered and what lies beyond it. A scene with such
-an object has a digest if it carries one of its description, the nodes of Mitsuba's parser and the
-files that they name, or the code that built it: those who load scenes leave that as the id of the
-scene, since Mitsuba's scenes take no other mark. Any other scene has none: results of it are not
-kept.
+That is everything where all classes are in `_WHOLE`. Objects of other classes have properties that
+nobody can ask for once they are built: how a texture or a grid is filtered and which values lie
+beyond it. A scene with such an object has a digest only if it carries a digest of its description:
+of the nodes of Mitsuba's parser and the files that they name, or of the code that built it. The
+code that loads a scene leaves this digest as the id of the scene, since Mitsuba's scenes take no
+other mark. Any other scene has no digest, and its results are not cached.
 """
 
 import hashlib
@@ -24,7 +24,8 @@ from airlight.reference.storage.store import Content
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
-#: Classes of which parameters and `_beside` tell all. How a film filters and stores pixels, and
+# Classes that `_beside` and their parameters describe in full. How a film filters and stores
+# pixels, and
 #: samplers, count for nothing: no estimator and no method uses them.
 _WHOLE = {
     *("Scene", "PerspectiveCamera", "HDRFilm", "IndependentSampler", "BoxFilter", "GaussianFilter"),
@@ -43,7 +44,7 @@ _DESCRIPTION = "description "  # before the digest of a description in the id of
 
 
 class _UnknownError(Exception):
-    """Raised for a value of which there are no bytes that are the same in the next run."""
+    """Raised for a value without bytes that stay the same in the next run."""
 
 
 def scene_digest(scene) -> str | None:
@@ -94,6 +95,8 @@ def description_digest(state: Any) -> str | None:
             props = node.props
             digest.update(f"|{props.plugin_name()} {_ADDRESS.sub('', props.id())}".encode())
             for key in list(props.keys()):
+                # To read a property marks it as used, and Mitsuba warns of unused ones: the mark is
+                # put back.
                 queried = props.was_queried(key)
                 digest.update(f"|{key} {props.type(key)} ".encode() + _property_bytes(props[key]))
                 props.mark_queried(key, queried)
@@ -115,6 +118,7 @@ def _built_digest(scene) -> str:
     parameters = mi.traverse(scene)
     for part in parameters.hierarchy:
         digest.update(f"|{part.class_name()}".encode())
+    # Names by address differ from run to run, and count for nothing.
     for words in _beside(scene) if isinstance(scene, mi.Scene) else ():
         digest.update(f"|{_ADDRESS.sub('', words)}".encode())
     for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
@@ -152,6 +156,7 @@ def _property_bytes(value: Any) -> bytes:
     if hasattr(value, "wavelengths"):
         return _value_bytes(value.wavelengths) + b"|" + _value_bytes(value.values)
     if isinstance(value, str):
+        # A word may name a file, whose content counts, not its name.
         path = Path(str(mi.file_resolver().resolve(value)))
         return hashlib.sha256(path.read_bytes()).digest() if path.is_file() else value.encode()
     if isinstance(value, mi.Bitmap):
@@ -160,6 +165,7 @@ def _property_bytes(value: Any) -> bytes:
     if isinstance(value, mi.VolumeGrid):
         return _value_bytes(np.array(value))
     if isinstance(value, mi.Object):
+        # An object that is built already is known by its parameters alone: they must tell all.
         if not is_whole(value):
             raise _UnknownError
         return _built_digest(value).encode()

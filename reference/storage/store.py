@@ -2,11 +2,11 @@
 """Results that are cached between runs: references, batches, rays, parts of reports.
 
 A frozen record of inputs is the only key of a result: a digest of each of its fields, and of the
-code that computes (`reference.storage.code`). There is no way around it: a field cannot be left
-out, and a field without content that is the same in every process, such as a set, a function or an
-object of a library, is a TypeError. A record may hold another one: the key of a row holds that of
-its reference. Arguments that say how and not what (a progress, other processes, patience) go to the
-function that computes and are no fields.
+code that computes (`reference.storage.code`). No field can be left out, and a field without content
+that is the same in every process, such as a set, a function or an object of a library, is a
+TypeError. A record may hold another one: the key of a row holds that of its reference. Arguments
+that say how and not what (a progress, other processes, patience) go to the function that computes
+and are no fields.
 
 The time of a result is the time to compute it from nothing: when a result is loaded, its original
 time is added to the time of the result that is being computed from it.
@@ -45,8 +45,6 @@ from airlight.reference.storage.cache import (
 )
 from airlight.reference.storage.code import source_digest
 
-# of keys and of what is stored under them: another one, and everything is computed again
-_FORMAT = 2
 # results that are older count as missing [s since 1970]; child processes inherit it
 _FRESH = "AIRLIGHT_FRESH"
 _ABOUT = ("seconds", "processor", "made")  # what is stored beside the arrays of a result
@@ -76,13 +74,16 @@ class Inputs:
     """
 
     kind: ClassVar[str]  #: one or more words with dashes: names of files begin with it
-    modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default that of the class
+    modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default the module of the class
 
     @cached_property
     def key(self) -> str | None:
         """The name under which the result is cached; None if an input has no digest."""
+        # The format of keys and of stored results: with another number everything is computed
+        # again.
+        form = 2
         try:
-            content = json.dumps([_FORMAT, _encoded(self)], sort_keys=True)
+            content = json.dumps([form, _encoded(self)], sort_keys=True)
         except _NoDigestError:
             return None
         return f"{self.kind}-{hashlib.sha256(content.encode()).hexdigest()[:32]}"
@@ -101,6 +102,8 @@ def _encoded(value: Any) -> Any:
     if isinstance(value, Content) and value.digest is None:
         raise _NoDigestError
     if is_dataclass(value) and not isinstance(value, type):
+        # `Inputs` count with the code that computes their result, other records with their fields
+        # alone.
         code = (
             [source_digest(*(value.modules or (type(value).__module__,)))]
             if isinstance(value, Inputs)
@@ -115,9 +118,11 @@ def _encoded(value: Any) -> Any:
         return [_encoded(each) for each in value]
     if isinstance(value, Mapping) and all(isinstance(name, str) for name in value):
         return {name: _encoded(each) for name, each in value.items()}
+    # A file counts by its name and its content.
     if isinstance(value, Path):
         return [value.name, hashlib.sha256(value.read_bytes()).hexdigest()]
     if isinstance(value, np.generic | np.ndarray) and value.dtype.kind in "biufcSU":
+        # Type and shape count too: equal bytes may be other numbers.
         data = np.ascontiguousarray(value).tobytes()
         return [value.dtype.str, value.shape, hashlib.sha256(data).hexdigest()]
     raise TypeError(
@@ -171,6 +176,7 @@ def stored(
     cached = load(inputs.key)
     if cached is not None:
         return _result(cached, kind)
+    # The ledger adds up the time that passes and the original times of loaded parts.
     with counted() as ledger:
         value = compute()
         spent = ledger.spent()
@@ -187,10 +193,11 @@ def keep(
     """Cache the result of some inputs that was computed, here or elsewhere, and return
     it as it will be loaded.
     """
-    kept = store(inputs.key if worth(value) else None, _packed(value), spent)
+    result = store(inputs.key if worth(value) else None, _packed(value), spent)
+    # The whole is cached: parts of the work are not needed any more.
     if inputs.key is not None:
         drop_parts(inputs.key)
-    return _result(kept, kind)
+    return _result(result, kind)
 
 
 def _result(kept: Kept[dict[str, Any]], kind: Any) -> Kept[Any]:
@@ -198,7 +205,7 @@ def _result(kept: Kept[dict[str, Any]], kind: Any) -> Kept[Any]:
 
 
 def _packed(value: Any) -> dict[str, Any]:
-    """Return a value as arrays, of which one is JSON."""
+    """Return a value as arrays, one of them JSON."""
     arrays: dict[str, Any] = {}
 
     def plain(each: Any) -> Any:
@@ -206,6 +213,7 @@ def _packed(value: Any) -> dict[str, Any]:
             return each.item()
         if not isinstance(each, np.ndarray):
             raise TypeError(f"{type(each)} cannot be cached")
+        # An array lies beside the JSON, which has its number in its place.
         arrays[str(len(arrays))] = each
         return {_ARRAY: str(len(arrays) - 1)}
 
@@ -233,6 +241,8 @@ def load(key: str | None) -> Kept[dict[str, Any]] | None:
     arrays = load_arrays(key) if key is not None and is_kept(key) else None
     if arrays is None:
         return None
+    # Loading takes time itself, which counts already where time is measured: only the rest of the
+    # original time is added.
     seconds, processor, made = (float(arrays.pop(name)) for name in _ABOUT)
     spent = Spent(seconds, processor)
     add_spent(spent - loading())
@@ -301,6 +311,7 @@ def counted() -> Iterator[Ledger]:
     finally:
         _LEDGER.reset(token)
         if outer is not None:
+            # A result that is computed from others passes their original times on.
             outer.loaded += ledger.loaded
 
 

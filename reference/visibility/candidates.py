@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Which shapes can stand in the light of which rays: one search for all lights.
+r"""The shapes that can stand in the light of rays: one search for all lights.
 
 Shadow segments lead from a ball about the light, or from far away in its direction, to points of
 the rays, all of which begin at the camera: they lie in the convex hull of both. A shape beyond a
@@ -15,9 +15,10 @@ Rays are taken in tiles: sorted by their azimuth about the axis from the camera 
 strips, and these by the angle from the axis. All planes of rays and a point light hold this axis,
 so the planes on both sides of a strip leave out all but the shapes that the planes of its rays
 meet. Other m lie in the plane of the tile's mean ray and the axis, and touch the ball beside it.
-Where rays are unbounded, m is leaned back until none of them rises along it. Rays are parted again
-and again, and each part looks through what the one that it is of has left, while that is much; for
-a area light, whose samples are many, down to single rays.
+Where rays are unbounded, m is leaned back until none of them rises along it. A group of rays whose
+list of shapes is long is divided, and each part searches the list of its group, again and again
+until the lists are short. For an area light, whose samples are many, groups are divided down to
+single rays.
 """
 
 from collections.abc import Iterator
@@ -30,17 +31,6 @@ from airlight.reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-_TILE = 32  # rays
-_STRIP = 128  # rays of a strip of a point light: thin in azimuth
-_PARTS = 4  # in which rays are parted, again and again
-_FAN = np.arange(12) * np.pi / 6  # directions in the plane of a ray and the axis [rad]
-_LEVEL = 1e-12  # a rise of a vector along a ray below this is rounding
-_SLACK = 1e-9  # of the size of the scene: rounding
-_MANY = 300  # shapes: fewer are held against all planes at once
-# pairs of rays and shapes: to look through fewer costs less than to part them,
-# for 50 samples of a light
-_WORTH = 512
 
 
 @dataclass(frozen=True)
@@ -56,7 +46,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Near:
-    """The shapes near each ray: lists of numbers, and where that of a ray begins and ends."""
+    """The shapes near each ray: lists of numbers, and where the list of a ray begins and ends."""
 
     triangles: tuple[Index, Index, Index]  #: begin, end, (rays,) each, and numbers
     spheres: tuple[Index, Index, Index]
@@ -78,11 +68,13 @@ def near_shapes(
     )
     if not shapes.count or not len(direction):
         return Near(none, none, none)
+    # Balls around all shapes, in the order triangles, spheres, disks, with the camera as the
+    # origin.
     middle = shapes.triangles.mean(axis=1)
     around = np.linalg.norm(shapes.triangles - middle[:, None], axis=2).max(axis=1)
     centres = np.concatenate([middle, shapes.centre, shapes.disks.centre]) - origin
     solids = centres, np.concatenate([around, shapes.radius, shapes.disks.radius])
-    # of rays, and of solids, of which each tile has all pairs
+    # Numbers of rays, and of solids; all rays of a tile share its list of solids.
     lists: list[tuple[Index, Index]] = []
     for rays, numbers in _tiles(light, origin, direction, length, solids):
         lists.append((rays, numbers))
@@ -97,6 +89,8 @@ def _of_kind(
     begin, end = np.zeros(count, np.int64), np.zeros(count, np.int64)
     parts, at = [np.empty(0, np.int64)], 0
     for rays, numbers in lists:
+        # The numbers of one kind lie together in the list of a tile, and lose the offset of their
+        # kind.
         low, high = np.searchsorted(numbers, (first, last))
         begin[rays], end[rays] = at, at + high - low
         parts.append(numbers[low:high] - first)
@@ -114,25 +108,35 @@ def _tiles(
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     turned = np.cross(axis, across)
+    # Rays by their azimuth about the axis: neighbours in this order make thin strips.
     azimuth = np.argsort(np.arctan2(direction @ turned, direction @ across), kind="stable")
     leaning = direction @ axis
     wide = light.radius > 0 and light.w == 1
-    width = max(_TILE, int(np.sqrt(_TILE * len(azimuth)))) if wide else _STRIP
-    size = _SLACK * (1 + (far if light.w else 0) + light.radius + np.abs(solids[0]).max(initial=0))
+    # A tile has 32 rays. The strip of a point light has 128, thin in azimuth; about a ball, which
+    # no plane through the axis holds, tiles are about as wide as long.
+    tile, parts = 32, 4
+    width = max(tile, int(np.sqrt(tile * len(azimuth)))) if wide else 128
+    # 1e-9 of the size of the scene is slack for rounding.
+    size = 1e-9 * (1 + (far if light.w else 0) + light.radius + np.abs(solids[0]).max(initial=0))
     waiting = [(azimuth, np.arange(len(solids[0])))]
     while waiting:
         rays, numbers = waiting.pop()
-        fan = _FAN if len(rays) <= width else _FAN[:0]
+        # The fan of directions in the plane of a ray and the axis [rad]; in a group wider than a
+        # strip only the planes on both sides are tried.
+        fan = np.arange(12 if len(rays) <= width else 0) * np.pi / 6
         hull = _Hull(light, axis, to_light, direction[rays], length[rays], fan, size)
         numbers = hull.near(solids, numbers)
         if not len(numbers):
             continue
-        if len(rays) <= (1 if wide else _TILE) or len(rays) * len(numbers) <= _WORTH:
+        # To look through 512 pairs of rays and shapes costs less than to divide the group, for 50
+        # samples of a light.
+        if len(rays) <= (1 if wide else tile) or len(rays) * len(numbers) <= 512:
             yield rays, numbers
             continue
-        if len(rays) <= width and len(rays) > width // _PARTS:
+        # A strip is divided by the angle from the axis from here on.
+        if len(rays) <= width and len(rays) > width // parts:
             rays = rays[np.argsort(leaning[rays], kind="stable")]
-        step = -(-len(rays) // _PARTS)
+        step = -(-len(rays) // parts)
         waiting += [(rays[first : first + step], numbers) for first in range(0, len(rays), step)]
 
 
@@ -157,6 +161,9 @@ class _Hull:
         fan: Array,
         slack: float,
     ):
+        # The frame of the group: its mean ray, across it the direction `up` in the plane of ray and
+        # axis, and `side` across that plane. Rays that cancel, or a mean ray along the axis, leave
+        # any frame as good.
         mean = direction.mean(axis=0)
         size = np.linalg.norm(mean)
         mean = mean / size if size > 1e-6 else direction[0]
@@ -166,8 +173,8 @@ class _Hull:
         up /= np.linalg.norm(up)
         side = _cross(mean, up)
         vectors = []
-        # Both planes through the axis that hold the rays between them, and those
-        # that touch the ball as well.
+        # Two planes through the axis hold the rays between them, at the smallest and the largest
+        # azimuth from `out`, the mean ray's. For a ball two more planes lean to touch it.
         out = up - (up @ axis) * axis
         if np.linalg.norm(out) < 1e-9:
             out = mean - (mean @ axis) * axis
@@ -183,6 +190,8 @@ class _Hull:
                 lean = min(light.radius / beside, 1.0) if beside > 0 else 1.0
                 vectors.append(sign * np.sqrt(1 - lean**2) * side - lean * up)
         m = np.stack([*vectors, *(np.cos(turn) * mean + np.sin(turn) * up for turn in fan)])
+        # An unbounded ray that rises along m makes the support infinite: m is leaned back against
+        # the mean ray by as much as the steepest ray rises, if all rays go forward.
         if np.isinf(length).any():
             forward = direction @ mean
             rise = (m @ direction.T) / np.maximum(forward, 1e-3)
@@ -191,13 +200,17 @@ class _Hull:
                 - np.where(forward.min() > 1e-3, np.maximum(rise.max(axis=1), 0.0), 0.0)[:, None]
                 * mean
             )
+        # h(m) of the camera, at 0, of the ends of the rays, and of the light. A rise below `level`
+        # is rounding.
+        level = 1e-12
         rise = m @ direction.T
         with np.errstate(invalid="ignore"):
-            reach = np.where(rise > _LEVEL, rise * length, 0.0).max(axis=1)
+            reach = np.where(rise > level, rise * length, 0.0).max(axis=1)
         norm = np.linalg.norm(m, axis=1)
         ball = m @ to_light
-        ball = ball + light.radius * norm if light.w else np.where(ball > _LEVEL, np.inf, 0.0)
+        ball = ball + light.radius * norm if light.w else np.where(ball > level, np.inf, 0.0)
         self.support = np.maximum(np.maximum(reach, ball), 0.0) + slack
+        # An m of no length, or with an infinite support, leaves nothing out.
         useful = np.isfinite(self.support) & (norm > 1e-6)
         self.m, self.support, self.norm = m[useful], self.support[useful], norm[useful]
 
@@ -205,9 +218,9 @@ class _Hull:
         """Return which balls of these numbers no half space leaves out."""
         centre, radius = solids
         for first in range(len(self.m)):
-            # One after the other while they are many: the planes beside the rays,
-            # which come first, leave few.
-            m = slice(first, first + 1 if len(numbers) > _MANY else None)
+            # One plane after the other while more than 300 shapes are left: the planes beside the
+            # rays, which come first, leave out most. Then all other planes at once.
+            m = slice(first, first + 1 if len(numbers) > 300 else None)
             beyond = (
                 centre[numbers] @ self.m[m].T - radius[numbers, None] * self.norm[m]
                 > self.support[m]

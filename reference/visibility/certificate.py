@@ -25,17 +25,8 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-#: of the angle at a light, or of coordinates: shadow rays end 2e-6 early, and are rounded to 1e-7
-ROUNDING = 1e-5
 #: relative uncertainty of the distance of an edge from its light: rounding, a lost digit, merging
 EXACT_EDGE = 1e-11
-#: contradictions that are tested against every shape; more than a few mean that something is wrong
-JUDGED = 256
-_SHORT = 2e-6  # relative: how far before its point a shadow ray ends
-# of the largest coordinate: off the surface of a light, clear of float32 shapes in its plane
-_CLEAR = 1e-5
-_CHUNK = 1 << 22  # rays cast at once
-_SLACK = 1e-9  # of how far away a triangle is: float64 rounding is 1e-15
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,7 @@ class RandomChecks:
 
     @staticmethod
     def of_all(parts: "list[RandomChecks]") -> "RandomChecks":
-        """Add up the checks of several lights or chunks of rays; of the shares the worst counts."""
+        """Add up the checks of several lights or chunks of rays; the largest `missed` counts."""
         return RandomChecks(
             sum(part.checked for part in parts),
             sum(part.disagreements for part in parts),
@@ -100,6 +91,8 @@ def certified(
     ray = ray[ends[1][ray] > ends[0][ray]]
     if not len(ray) or not shapes.count:
         return lit
+    # Random places are even in the angle at a light, or in the distance under a directional one:
+    # `checks` strata, one place in each. The seed follows from the rays.
     low, high = (_measure(rays, end, slice(None)) for end in ends)
     fraction = (
         np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))
@@ -107,10 +100,13 @@ def certified(
     ray, fraction = np.repeat(ray, checks), fraction.ravel()
     at = low[ray] + fraction * (high - low)[ray]
     x = at if rays.w == 0 else rays.distance(at, ray)
-    # a light on the line of a ray sees all of it at one angle, which is endlessly far
+    # A light on the line of a ray sees all of it under one angle, whose distance is infinite: such
+    # a ray is not checked.
     finite = np.isfinite(x)
     ray, fraction, x = ray[finite], fraction[finite], x[finite]
-    # Two a ray, and the fraction of it that comes before: one number orders all.
+    # Ends and places as fractions of the checked range. The number 2 ray + fraction orders the
+    # places of all rays at once: the last interval that begins before a place, and the next one,
+    # are the only ones that can hold the place or have an edge beside it.
     width = np.where(high > low, high - low, 1.0)
     begin, end = (
         np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1)
@@ -118,6 +114,8 @@ def certified(
     )
     number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + fraction, side="right")
     count = len(lit.ray)
+    # Whether the intervals say that the place is lit, and how far the nearest edge, or the end of
+    # the range, is from it.
     expected, gap = np.zeros(len(ray), bool), np.minimum(fraction, 1 - fraction)
     for offset in (-1, 0):
         k = np.clip(number + offset, 0, max(count - 1, 0))
@@ -127,24 +125,34 @@ def certified(
         expected |= same & (begin[k] <= fraction) & (fraction <= end[k])
         near = np.minimum(np.abs(fraction - begin[k]), np.abs(fraction - end[k]))
         gap = np.where(same, np.minimum(gap, near), gap)
-    rounding = ROUNDING * (1.0 if rays.w else coordinates(rays, shapes))
+    # Shadow rays end 2e-6 early and are rounded to 1e-7: within 1e-5 of an edge, in the angle at a
+    # light or in coordinates, they decide nothing.
+    rounding = 1e-5 * (1.0 if rays.w else coordinates(rays, shapes))
     start, target = _segments(rays, ray, x, shapes)
+    # A shadow ray starts off the surface of an area light by 1e-5 of the largest coordinate, clear
+    # of float32 shapes in its plane.
     clear = (
         start
         if normal is None
-        else start + _CLEAR * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
+        else start + 1e-5 * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
     )
-    seen = _cast(occluders, clear, target)
+    unblocked = _cast(occluders, clear, target)
     wrong = np.flatnonzero(
-        (seen != expected) & (gap * width[ray] > np.broadcast_to(rounding, len(low))[ray])
+        (unblocked != expected) & (gap * width[ray] > np.broadcast_to(rounding, len(low))[ray])
     )
-    judged = wrong[:JUDGED]
-    lit_there = ~segments_blocked(start[judged], target[judged], shapes)
-    left = np.append(judged[lit_there != expected[judged]], wrong[JUDGED:])
-    found = RandomChecks(
-        len(ray), len(wrong), len(wrong) - len(left), len(left), len(wrong) / len(ray)
+    # The float64 test looks at every shape. It judges 256 contradictions: more than a few mean that
+    # something is wrong, and the rest stays in doubt.
+    most = 256
+    judged = wrong[:most]
+    lit_by_judge = ~segments_blocked(start[judged], target[judged], shapes)
+    undecided = np.append(judged[lit_by_judge != expected[judged]], wrong[most:])
+    report = RandomChecks(
+        len(ray), len(wrong), len(wrong) - len(undecided), len(undecided), len(wrong) / len(ray)
     )
-    return replace(lit, random_checks=found, doubt=(ray[left], width[ray[left]] / checks))
+    # A place in doubt stands for its stratum.
+    return replace(
+        lit, random_checks=report, doubt=(ray[undecided], width[ray[undecided]] / checks)
+    )
 
 
 def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
@@ -184,6 +192,7 @@ def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, 
     target = rays.point(ray, x)
     if rays.w:
         return rays.position[ray], target
+    # A directional light has no place: the segment begins beyond all shapes.
     reach = 2 * _reach(rays, shapes) + x
     return target + reach[:, None] * rays.position[ray], target
 
@@ -191,12 +200,14 @@ def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, 
 def _cast(occluders: Any, start: Array, target: Array) -> Bools:
     """Return which segments nothing blocks, by Mitsuba."""
     parts = [np.empty(0, bool)]
-    for first in range(0, len(start), _CHUNK):
-        block = slice(first, first + _CHUNK)
+    step = 1 << 22  # rays cast at once
+    for first in range(0, len(start), step):
+        block = slice(first, first + step)
         way = target[block] - start[block]
         length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
         direction = vectors(mi.Vector3f, way / length[:, None])
-        reach = on_device(mi.Float, length * (1 - _SHORT))
+        # The ray ends 2e-6 of its length before its point, which may lie on a surface.
+        reach = on_device(mi.Float, length * (1 - 2e-6))
         ray = mi.Ray3f(vectors(mi.Point3f, start[block]), direction, reach, 0.0, [])
         parts.append(~np.array(occluders.ray_test(ray), dtype=bool))
     return np.concatenate(parts)
@@ -233,13 +244,16 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
             if length > 0
             else np.zeros(len(away))
         )
-        near = np.flatnonzero(off <= longest + _SLACK * (1 + np.abs(away).max(axis=1, initial=0)))
+        # A slack of 1e-9 of how far away a triangle is; float64 rounding is 1e-15.
+        near = np.flatnonzero(off <= longest + 1e-9 * (1 + np.abs(away).max(axis=1, initial=0)))
         blocked[number] = _meets_triangle(
             point, towards, corner[near], (edges[0][near], edges[1][near])
         ).any()
     for centre, radius in zip(shapes.centre, shapes.radius, strict=True):
         blocked |= _meets_sphere(start - centre, way, radius)
     disks = shapes.disks
+    # Where the segment meets the plane of a disk; a segment in parallel to it gives s infinite or
+    # NaN, and meets nothing.
     for centre, normal, radius in zip(disks.centre, disks.normal, disks.radius, strict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             s = ((centre - start) @ normal) / (way @ normal)
@@ -272,6 +286,7 @@ def _meets_sphere(from_centre: Array, way: Array, radius: float) -> Bools:
     discriminant = half**2 - square * outside
     root = np.sqrt(np.maximum(discriminant, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
+        # Either crossing counts: a segment from within meets the sphere at its far side only.
         near, far = (-half - root) / square, (-half + root) / square
         return (discriminant > 0) & (((near > 0) & (near < 1)) | ((far > 0) & (far < 1)))
 
@@ -287,8 +302,8 @@ def reached_by_shadow_rays(
     own shadow ray just clears an edge may then lie in the shadow, and the other way round: shadow
     edges move by about that length, and a renderer that starts its rays so converges to the moved
     edges, as it does to the shortened segment of `reference.scene.shadow_epsilon`. Where Mitsuba's
-    ray and the exact lit intervals differ, what the judge says of the ray from Mitsuba's start
-    holds: so a fault of the lit intervals is still found by the comparison.
+    ray and the exact lit intervals differ, the judge decides by the ray from Mitsuba's start: so a
+    fault of the lit intervals is still found by the comparison.
 
     `interaction`: Mitsuba's surface interactions, one for each ray; `light`: position of the light
     (3,) [m]; `reached`: whether it reaches the surface points themselves, by exact geometry,
@@ -301,6 +316,8 @@ def reached_by_shadow_rays(
     start = np.array(ray.o, dtype=np.float64).T[differs]
     way = light - start
     length = np.linalg.norm(way, axis=1)
+    # Mitsuba's shadow ray ends a little before the light, at `maxt`; the judge looks at the same
+    # segment.
     fraction = np.minimum(
         np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny),
         1.0,

@@ -19,8 +19,6 @@ from airlight.reference.scene.shapes import Disks, Shapes, is_rectangle, read_sh
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_BLOCK = 1 << 21  # numbers in one block of rays and facets
-
 
 def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return where rays enter and leave a body.
@@ -49,13 +47,15 @@ def crossed_facets(
     origin = np.atleast_2d(origin)
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
     low, high = np.empty(len(direction)), np.empty(len(direction))
-    step = max(1, _BLOCK // len(bounds.offset))
+    step = max(1, (1 << 21) // len(bounds.offset))  # rays: 2^21 numbers of rays and facets at once
     for first in range(0, len(direction), step):
         block = slice(first, first + step)
         rate = direction[block] @ bounds.normal.T
         room = bounds.offset - (origin if len(origin) == 1 else origin[block]) @ bounds.normal.T
         with np.errstate(divide="ignore", invalid="ignore"):
             times = room / rate
+        # A convex body is entered at the last facet that faces the ray, and left at the first facet
+        # that faces away.
         entering, leaving = np.where(rate < 0, times, -np.inf), np.where(rate > 0, times, np.inf)
         enter[block], leave[block] = np.argmax(entering, axis=1), np.argmin(leaving, axis=1)
         missed = np.any((rate == 0) & (room < 0), axis=1)  # outside along one of the planes
@@ -77,6 +77,7 @@ def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
+    # The root of larger size has no cancellation; the other one is the power divided by it.
     far = np.where(along >= 0, along + root, along - root)
     with np.errstate(divide="ignore", invalid="ignore"):
         near = np.where(far != 0, power / far, 0.0)
@@ -116,7 +117,9 @@ def exact_distance(
     primitive = np.array(interaction.prim_index, dtype=np.int64)
     refined = distance.copy()
     for shape, part in (shapes or read_shapes(reference.occluders)).single:
+        # Mitsuba tells the shape of a hit by a pointer, whose bits are its number.
         number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
+        # The rays that have met this shape.
         mine = np.flatnonzero(hit & (shape_of_hit == number))
         if not len(mine):
             continue
@@ -159,6 +162,8 @@ def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
 def _along(place: Array, normal: Array, direction: Array, distance: Array) -> Array:
     """Return how far rays go to planes through places."""
     with np.errstate(divide="ignore", invalid="ignore"):
+        # A grazing ray divides two small numbers: a result further than 1e-4 from the cast distance
+        # is not taken.
         exact = np.sum(normal * place, axis=1) / np.sum(normal * direction, axis=1)
     return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
 

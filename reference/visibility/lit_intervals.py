@@ -70,14 +70,17 @@ def before_light(
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
     if len(others) < len(shapes):
         reference = replace(reference, occluders=scene_of(others, reference.scene))
-    known = read_shapes(reference.occluders)
+    occluders = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
         largest = max(
-            1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max())
+            1.0,
+            float(np.abs(occluders.triangles).max(initial=0)),
+            float(np.abs(light.centre).max()),
         )
-        before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
-        known = replace(known, triangles=known.triangles[before.any(axis=1)])
-    return reference, known
+        # A triangle stays if any corner is before the plane by more than rounding.
+        before = (occluders.triangles - light.centre) @ light.normal > IN_PLANE * largest
+        occluders = replace(occluders, triangles=occluders.triangles[before.any(axis=1)])
+    return reference, occluders
 
 
 def lit_intervals(
@@ -100,11 +103,14 @@ def lit_intervals(
     Valid for opaque meshes, rectangles, spheres and disks, wherever they are.
     """
     of = np.arange(len(rays.foot)) if of is None else of
+    # A sphere around the light shows only its inside; all other shapes cast shadows.
     low, high = _inside(rays, ends, known)
     ray, x0, x1 = lit_parts(rays, (low, high), known.near, known.shapes, of)
+    # An end of a lit interval is an edge between light and shadow unless it is an end of the range.
     inner = x0 > ends[0][ray] + _END * (1 + np.abs(x0)), x1 * (1 + _END) + _END < ends[1][ray]
     transitions = int(inner[0].sum() + inner[1].sum())
     lit = LitIntervals(ray, x0, x1, transitions)
+    # Without shapes no edge is uncertain.
     if not known.shapes.count:
         lit = replace(lit, edge=0.0)
     if not checks:
@@ -125,6 +131,7 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
     if not rays.w:
         return low, high
     for centre, radius in zip(known.shapes.centre, known.shapes.radius, strict=True):
+        # A sphere that holds no part of the light's ball holds none of its samples.
         if np.linalg.norm(centre - known.light.centre) >= radius + known.light.radius:
             continue
         within = np.linalg.norm(rays.position - centre, axis=1) < radius
@@ -136,6 +143,7 @@ def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Ar
 
 def reaches(lit: LitIntervals, distance: Array) -> NDArray[np.bool_]:
     """Return by ray whether its last lit interval goes on to a distance, (rays,) [m]."""
+    # The end of each ray's last interval; rays without an interval stay at -inf.
     last = np.full(len(distance), -np.inf)
     np.maximum.at(last, lit.ray, lit.high)
     return last * (1 + _END) + _END >= distance

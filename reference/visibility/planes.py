@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The plane of a ray and a light, and the one map that projects all occluders to the ray.
 
-A light is a homogeneous position: a place p with w = 1, or the unit direction p towards it with w = 0. In the plane of
-a ray o + x d and the light let z be the component along d, and y across it on the light's side; the ray is y = 0. The
-light is at
+A light is a homogeneous position: a place p with w = 1, or the unit direction p towards it with w =
+0. In the plane of a ray o + x d and the light let z be the component along d, and y across it on
+the light's side; the ray is y = 0. The light is at
 
     (z_P, y_P) = (foot, height) of a place,      (cos, sin) of the angle between ray and light of a direction.
 
@@ -36,9 +36,6 @@ from airlight.reference.scene.read import ReferenceLight
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-# a ray this close to the direction of a light [rad] is as good as one beside it
-_SMALLEST_SINE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -90,9 +87,12 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
     way = w * origin - position  # from a place to the camera, or along the light
     foot = -np.sum(way * direction, axis=1)
     away = way + foot[:, None] * direction
+    # Again, since the first subtraction leaves rounding along the ray.
     away -= np.sum(away * direction, axis=1)[:, None] * direction
     height = np.linalg.norm(away, axis=1)
-    least = np.finfo(float).tiny if w else _SMALLEST_SINE
+    # A ray as close as 1e-12 rad to the direction of a light is as good as one beside it.
+    least = np.finfo(float).tiny if w else 1e-12
+    # A ray that meets the light lies in many planes: the normal is then any vector across the ray.
     helper = np.cross(
         direction, np.where(np.abs(direction[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     )
@@ -132,6 +132,8 @@ def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
     if not light.is_soft or light.axis is None:
         return np.ones_like(theta)
     axial, across = (rays.direction @ light.axis)[:, None], (rays.normal @ light.axis)[:, None]
+    # The cosine at a sample of an area light; else Mitsuba's spot, which falls off linearly in the
+    # angle from `beam` to `cutoff`.
     if light.cosine:
         return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
     angle = np.arccos(np.clip(axial * np.sin(theta) + across * np.cos(theta), -1.0, 1.0))
@@ -147,5 +149,7 @@ def before(rays: Rays, normal: Array) -> tuple[Array, Array]:
     rise = np.sum(normal * rays.direction, axis=1)
     start = np.sum(normal * (rays.origin - rays.position), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
+        # Where n . (o + x d - P) passes zero; a ray in parallel to the plane is before it
+        # everywhere or nowhere.
         zero = np.where(rise != 0, -start / rise, np.where(start > 0, -np.inf, np.inf))
     return np.where(rise >= 0, zero, -np.inf), np.where(rise < 0, zero, np.inf)

@@ -22,8 +22,6 @@ from airlight.reference.scene.clouds import CloudScene
 Array = NDArray[np.float64]
 Sets = Sequence[tuple[int, float]]
 
-_LANES = 1 << 18  #: followed at once: their sums take 16 MB a layer
-_FEWEST_LANES = 1 << 14  #: below, each pixel gets several lanes
 SIDE = 0.5  #: probability of a side flight
 
 
@@ -60,18 +58,21 @@ def cloud_paths_batch(
     check_samples(samples)
     targets = _targets([orders for _, orders in sets])
     pixels = np.flatnonzero(seen)
+    most = 1 << 18  # lanes followed at once: their sums take 16 MB a layer
     streams = _streams(len(pixels), samples)
     sums = np.zeros((targets.count, len(seen), 3))
+    # Flights depend on the extinction: channels with the same extinction in all clouds share a
+    # walk, each other channel has its own.
     extinctions = np.stack([cloud.sigma_t for cloud in clouds.clouds], axis=1)
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.flatnonzero(np.all(extinctions == sigma_t, axis=1))
         scene = walk_scene(clouds, int(channels[0]))
-        for place, first in enumerate(range(0, len(pixels), _LANES // streams)):
-            part = pixels[first : first + _LANES // streams]
+        for place, first in enumerate(range(0, len(pixels), most // streams)):
+            part = pixels[first : first + most // streams]
             sampler = mi.load_dict({"type": "independent"})
             # Streams differ by seed: each part of the pixels and each channel has its own seeds.
             sampler.seed(
-                (seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place,
+                (seed * 3 + number) * (1 + len(pixels) * streams // most) + place,
                 len(part) * streams,
             )
             directions = dr.normalize(
@@ -86,6 +87,8 @@ def cloud_paths_batch(
                     targets.count, len(part), streams
                 )
                 sums[:, part, channel] = lanes.sum(axis=2)
+    # The layer `rest` has the orders of no set. Light that came straight from the surface is part
+    # of `surface`, too.
     orders, rest, surface, straight = sums[:-3], sums[-3], sums[-2], sums[-1]
     layers = [orders.sum(axis=0) + rest, surface + straight, *orders, straight]
     return single_batch(
@@ -94,7 +97,8 @@ def cloud_paths_batch(
 
 
 def _targets(sets: Sequence[tuple[int, float]]) -> Targets:
-    """Return the layer of each order; those of no set share one."""
+    """Return the layer of each order; orders of no set share one."""
+    # Orders above the last one of all sets share the last entry.
     last = max((int(first if math.isinf(end) else end) for first, end in sets), default=0) + 1
     by_order = np.full(last + 1, len(sets), dtype=np.uint32)
     for number, (first, end) in enumerate(sets):
@@ -107,6 +111,7 @@ def _streams(pixels: int, samples: int) -> int:
     images fill the machine.
     """
     streams = 1
-    while pixels * streams < _FEWEST_LANES and samples % (2 * streams) == 0:
+    # Below 2^14 lanes each pixel gets several of them.
+    while pixels * streams < 1 << 14 and samples % (2 * streams) == 0:
         streams *= 2
     return streams

@@ -33,32 +33,38 @@ class SeenClouds:
 def seen_clouds(clouds: CloudScene) -> SeenClouds:
     """Follow the pixel-centre rays of a scene."""
     count = len(clouds.direction)
+    # `passed` is how far each ray has been summed up; `cast` is where its next ray cast starts, a
+    # little behind the last crossing.
     depth, distance = np.zeros((count, 3)), np.full(count, np.inf)
     passed, cast, meets = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
     inside = np.full(count, clouds.camera_cloud)
-    left = np.arange(count)
+    active = np.arange(count)
     extinction = np.stack([cloud.sigma_t for cloud in clouds.clouds])
     corners = [
         triangles_of(cloud.shape) if cloud.shape.is_mesh() else None for cloud in clouds.clouds
     ]
     reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
-    while left.size:
-        way = clouds.direction[left]
-        start = cast[left]
+    while active.size:
+        way = clouds.direction[active]
+        start = cast[active]
         ray = mi.Ray3f(mi.Point3f((clouds.origin + start[:, None] * way).T), mi.Vector3f(way.T))
         si = clouds.scene.ray_intersect(ray)
         dr.eval(si)
         shape = np.array(dr.reinterpret_array(mi.UInt32, si.shape))
         hit = np.array(si.is_valid(), dtype=bool)
-        left, way, start = left[hit], way[hit], start[hit]
-        meets[left] = True
+        active, way, start = active[hit], way[hit], start[hit]
+        meets[active] = True
+        # The distance of the crossing from the camera: first as float32 says, then again in float64
+        # where the shape is a mesh.
         length = start + np.array(si.t, dtype=np.float64)[hit]
-        cast[left] = length + step
+        cast[active] = length + step
         face = np.array(si.prim_index, dtype=np.int64)[hit]
         leaves = (np.array(si.n, dtype=np.float64).T[hit] * way).sum(axis=1) > 0
-        opaque = np.ones(len(left), dtype=bool)
-        within = inside[left]
+        opaque = np.ones(len(active), dtype=bool)
+        # A face seen from inside ends a stretch in its cloud, one seen from outside a stretch in
+        # vacuum. Before an opaque surface the medium is the one that the last crossing named.
+        within = inside[active]
         for number, cloud in enumerate(clouds.clouds):
             on = (shape == np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(cloud.shape))))[hit]
             opaque &= ~on
@@ -66,16 +72,19 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
             if triangles is not None:
                 length[on] = to_plane(triangles[face[on]] - clouds.origin, way[on], length[on])
             within = np.where(on, np.where(leaves, number, -1), within)
-            inside[left[on]] = np.where(leaves[on], -1, number)
-        stretch = np.maximum(length - passed[left], 0.0)
+            inside[active[on]] = np.where(leaves[on], -1, number)
+        # Two crossings that rounding swaps leave a stretch of length 0.
+        stretch = np.maximum(length - passed[active], 0.0)
         for number, cloud in enumerate(clouds.clouds):
-            own = within == number
+            # With a density the stretch counts with the integral of the fraction of the largest
+            # extinction.
+            in_cloud = within == number
             if cloud.density is not None:
-                stretch[own] = cloud.density.along(
-                    clouds.origin, way[own], passed[left][own], stretch[own]
+                stretch[in_cloud] = cloud.density.along(
+                    clouds.origin, way[in_cloud], passed[active][in_cloud], stretch[in_cloud]
                 )
-        depth[left] += np.where(within[:, None] >= 0, extinction[within] * stretch[:, None], 0.0)
-        passed[left] = np.maximum(length, passed[left])
-        distance[left[opaque]] = length[opaque]
-        left = left[~opaque]
+        depth[active] += np.where(within[:, None] >= 0, extinction[within] * stretch[:, None], 0.0)
+        passed[active] = np.maximum(length, passed[active])
+        distance[active[opaque]] = length[opaque]
+        active = active[~opaque]
     return SeenClouds(np.exp(-depth), distance, meets)

@@ -42,6 +42,7 @@ class HenyeyGreenstein:
     def value(self, down, up):
         """Return p."""
         g = self._g
+        # 1 + g^2 - 2 g cos from sin^2 or cos^2 of half the angle: the sum has no negative term.
         base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
         return (1 - g * g) * dr.rsqrt(base) / base
 
@@ -61,6 +62,7 @@ class Rayleigh:
 
     def down(self, sampler, active):
         """Return sin^2 of half a random scattering angle."""
+        # The distribution of the cosine c is a cubic: c^3 + 3 c = 2 z for z uniform in [-2, 2].
         z = 4 * sampler.next_1d(active) - 2
         root = dr.cbrt(dr.abs(z) + dr.sqrt(dr.fma(z, z, 1.0)))
         return dr.clip(0.5 - 0.5 * dr.copysign(root - dr.rcp(root), z), 0.0, 1.0)
@@ -94,11 +96,14 @@ class Tabulated:
     def down(self, sampler, active):
         """Return sin^2 of half a random scattering angle."""
         number = dr.minimum(mi.UInt32(sampler.next_1d(active) * self._last), self._last - 1)
-        own = sampler.next_1d(active) < dr.gather(mi.Float, self._fraction, number, active)
-        cell = dr.select(own, number, dr.gather(mi.UInt32, self._other, number, active))
+        # The alias method: a cell keeps a fraction of its draws, the others go to its alias.
+        stays = sampler.next_1d(active) < dr.gather(mi.Float, self._fraction, number, active)
+        cell = dr.select(stays, number, dr.gather(mi.UInt32, self._other, number, active))
         low = dr.gather(mi.Float, self._values, cell, active)
         high = dr.gather(mi.Float, self._values, cell + 1, active)
         u = sampler.next_1d(active)
+        # Within the cell the distribution is a quadratic; this form of its inverse has no
+        # cancellation where both values are alike.
         root = dr.sqrt(dr.lerp(dr.square(low), dr.square(high), u))
         fraction = u * (low + high) / dr.maximum(low + root, dr.smallest(mi.Float))
         return dr.clip((self._last - cell - fraction) / self._last, 0.0, 1.0)
@@ -113,6 +118,7 @@ def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
     other = np.arange(count, dtype=np.uint32)
     small, large = list(np.flatnonzero(fraction < 1)), list(np.flatnonzero(fraction >= 1))
     while small and large:
+        # A cell below the mean is filled up by one above it, whose rest may then be below the mean.
         low, high = small.pop(), large[-1]
         other[low] = high
         fraction[high] -= 1 - fraction[low]

@@ -14,11 +14,6 @@ import numpy as np
 from airlight.reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
 from airlight.reference.scene.clouds import CloudDensity, CloudScene
 
-_FOUR_PI = 4 * np.pi
-#: How far past a crossing the next ray starts, relative to the largest coordinate:
-#: what float32 can tell apart.
-_BEYOND = 4e-7
-
 
 @dataclass(frozen=True)
 class WalkScene:
@@ -53,8 +48,8 @@ class WalkScene:
         """Return the extinction at places in media over the largest one of these."""
         rho = mi.Float(1)
         for number, density in self.densities:
-            own = active & (medium == number)
-            rho = dr.select(own, density.at(point, own), rho)
+            in_medium = active & (medium == number)
+            rho = dr.select(in_medium, density.at(point, in_medium), rho)
         return rho
 
     def uneven(self, medium):
@@ -68,6 +63,7 @@ class WalkScene:
         """Return the number of a sun, drawn by irradiance."""
         if len(self.suns) < 2:
             return mi.UInt32(0)
+        # The number of suns whose cumulated probabilities are not above u.
         u, number, below = sampler.next_1d(active), mi.UInt32(0), 0.0
         for _, _, probability in self.suns[:-1]:
             below += probability
@@ -100,7 +96,7 @@ class WalkScene:
             number = dr.gather(mi.UInt32, self.phase_of, medium, active)
             for place, phase in enumerate(self.phases[1:], 1):
                 value = dr.select(number == place, phase.value(down, up), value)
-        return value / _FOUR_PI
+        return value / (4 * np.pi)
 
     def phase_about_suns(self, medium, direction, active):
         """Return the density of directions drawn about suns [1/sr]."""
@@ -118,6 +114,8 @@ class WalkScene:
             number = dr.gather(mi.UInt32, self.phase_of, medium, active)
             for place, phase in enumerate(self.phases[1:], 1):
                 down = dr.select(number == place, phase.down(sampler, active), down)
+        # down = sin^2(angle/2): the sine of the angle is 2 sqrt(down (1 - down)), its cosine 1 - 2
+        # down.
         sine, azimuth = 2 * dr.sqrt(down * (1 - down)), 2 * dr.pi * sampler.next_1d(active)
         across, along = dr.sincos(azimuth)
         s, t = mi.coordinate_system(about)
@@ -133,6 +131,8 @@ def _numbers(values) -> tuple[float, float, float]:
 
 def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     """Return the scene for the walk, with the extinctions of one channel."""
+    # Mitsuba numbers all shapes of a program; a table by that number says which cloud, from 1 on, a
+    # shape bounds, and 0 that it is opaque.
     numbers = {
         int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n
         for n, each in enumerate(clouds.clouds, 1)
@@ -144,6 +144,7 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     kinds = np.zeros(max(every) + 1, dtype=np.uint32)
     kinds[list(numbers)] = list(numbers.values())
     functions = list(dict.fromkeys(each.phase for each in clouds.clouds))
+    # Suns are drawn by irradiance, and count with irradiance over probability.
     power = np.array([sun.irradiance.sum() for sun in clouds.suns])
     suns = []
     for sun, fraction in zip(clouds.suns, power / power.sum() if len(power) else [], strict=True):
@@ -151,6 +152,8 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
             suns.append(
                 (_numbers(-sun.direction), _numbers(sun.irradiance / fraction), float(fraction))
             )
+    # The next ray starts 4e-7 of the largest coordinate past a crossing: as much as float32 can
+    # tell apart.
     reach = max(
         np.abs(np.array(clouds.scene.bbox().min)).max(),
         np.abs(np.array(clouds.scene.bbox().max)).max(),
@@ -166,7 +169,7 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
         sky=_numbers(clouds.sky),
         suns=tuple(suns),
         has_surfaces=bool(clouds.occluders.shapes()),
-        beyond=_BEYOND * max(float(reach), float(np.abs(clouds.origin).max())),
+        beyond=4e-7 * max(float(reach), float(np.abs(clouds.origin).max())),
         densities=tuple(
             (n, each.density) for n, each in enumerate(clouds.clouds, 1) if each.density is not None
         ),

@@ -49,21 +49,19 @@ import mitsuba as mi
 from airlight.reference.monte_carlo.cloud_paths.tables import WalkScene
 
 MAIN, SIDE, SHADOW, SIDE_SHADOW, SURFACE_SHADOW = range(5)  #: what the ray of a lane is
-_LEAST_WEIGHT = 0.05
-_SHADOW_FRACTION = 8.0
 
 
 @dataclass(frozen=True)
 class Targets:
     """Where light goes: its layer by order of scattering, and two of surfaces.
 
-    Light that met no surface goes to one of `orders` layers, or to the layer `orders` if it is of
-    no order wanted. Two layers follow: light that met surfaces, and of that what came from the
-    lights to the visible surface and from there to the eye straight, which the first of the two
-    lacks.
+    Light that met no surface goes to one of `orders` layers, or to the layer `orders` if its order
+    belongs to none of them. Two layers follow: light that met a surface and was scattered too, or
+    met several surfaces; and light that came straight from the lights to the visible surface and
+    from there to the eye.
     """
 
-    #: layer of each order from 0 on, UInt32; the last number is that of all further orders
+    #: layer of each order from 0 on, UInt32; the last entry stands for all further orders
     by_order: Any
     orders: int  #: how many layers of orders there are
 
@@ -136,6 +134,8 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
         left=mi.UInt32(samples),
         casts=mi.UInt32(0),
     )
+    # A lane starts with its first path: a flight of random length from the eye. The loop ends when
+    # all lanes have followed all of their paths.
     turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
     paths, _ = dr.while_loop(
         state=(paths, sampler),
@@ -166,10 +166,14 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     hit = active & si.is_valid()
     kind = dr.gather(mi.UInt32, scene.kinds, dr.reinterpret_array(mi.UInt32, si.shape), hit)
     opaque, boundary = hit & (kind == 0), hit & (kind > 0)
+    # The medium of the stretch by its end: a face seen from inside is left, and the cloud was
+    # around; before an opaque surface the medium is the one where the path was last.
     leaves = boundary & (dr.dot(si.n, d) > 0)
     within = dr.select(leaves, kind, dr.select(opaque, medium, 0))
     sigma_t = dr.gather(mi.Float, scene.sigma_t, within, active)
     optical = dr.select(within > 0, sigma_t * (si.t + gap), 0.0)
+    # The modes up to `SIDE` are flights, the others shadow rays. A flight whose length is used up
+    # within the stretch ends in its medium.
     flies, is_main = active & (mode <= SIDE), active & (mode == MAIN)
     scatters = flies & (within > 0) & (optical > depth)
     crosses, meets = boundary & ~scatters, opaque & ~scatters
@@ -178,6 +182,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     shadow = active & ~flies
     stays = thins = mi.Bool(False)
     if scene.densities:
+        # Delta and ratio tracking in clouds with a density: a shadow ray takes a new free length on
+        # each stretch. Where a flight of either kind ends, rho is looked up; a flight goes on with
+        # the probability 1 - rho, a shadow ray with that factor.
         uneven, free = scene.uneven(within), -dr.log(1 - sampler.next_1d(active))
         thins = shadow & uneven & (free < optical)
         place = o + d * (free / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)
@@ -190,6 +197,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             thins, -dr.log(dr.maximum(1 - rho, 0)), dr.select(shadow & uneven, 0, optical)
         )
     begins = scatters & is_main
+    # A shadow ray adds up its depth; a flight has the less length left.
     depth = dr.select(shadow, depth + optical, depth - optical)
 
     # Shadow rays add their light, or end in the dark, or by roulette where they leave a cloud.
@@ -201,7 +209,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         dr.scatter_add(
             sums[number], arriving[number], place, arrives, mode=dr.ReduceMode.NoConflicts
         )
-    chance = dr.minimum(_SHADOW_FRACTION * lit, 1.0)
+    # A shadow ray with less than 1/8 of its light goes on with 8 times its fraction as probability.
+    chance = dr.minimum(8.0 * lit, 1.0)
     fades = dims & (sampler.next_1d(active) >= chance)
     value = dr.select(dims, arriving / dr.maximum(chance, dr.smallest(mi.Float)), value)
     depth = dr.select(dims, 0.0, depth)
@@ -219,6 +228,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     )
     over = escapes & is_main
     if scene.has_sky:
+        # The sky that the eye sees directly belongs to no layer. Light of the sky that only one
+        # surface sent on is `straight`.
         of_sky = over & ((order > 0) | (bounces > 0))
         place = targets.layer(order, bounces > 0, (order == 0) & (bounces == 1)) * lanes + lane
         from_sky = weight * mi.Color3f(*scene.sky)
@@ -228,6 +239,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             )
     sun = scene.random_sun(sampler, active)
     to_sun, irradiance = scene.to_sun(sun), scene.irradiance(sun)
+    # At the end of a flight the light of a sun counts by the phase function about the direction of
+    # that flight. A side flight is one more scattering that the path itself does not make: it takes
+    # its albedo here, and its order is one more.
     weighed = dr.select(begins, weight, weight * albedo) * fraction
     scattered = weighed * scene.phase_value(within, d, to_sun, scatters) * irradiance
     value = dr.select(scatters, scattered, value)
@@ -235,6 +249,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     target = dr.select(scatters, targets.layer(of_order, bounces > 0, mi.Bool(False)), target)
     shadow_from, reflects = mi.Point3f(scattered_at), mi.Bool(False)
     if scene.has_surfaces:
+        # Only the path is reflected; a side flight that meets a surface ends there. The material
+        # says what a sun sends from here, and where the path goes on.
         reflects = meets & is_main
         bounces = dr.select(reflects, bounces + 1, bounces)
         bsdf, context = si.bsdf(mi.RayDifferential3f(mi.Ray3f(o, d))), mi.BSDFContext()
@@ -247,8 +263,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             sampler.next_1d(active),
             mi.Point2f(sampler.next_1d(active), sampler.next_1d(active)),
         )
-        drawn, passed = bsdf.sample(context, si, first, second, reflects)
-        onwards = si.to_world(drawn.wo)
+        bsdf_sample, passed = bsdf.sample(context, si, first, second, reflects)
+        onwards = si.to_world(bsdf_sample.wo)
         weight = dr.select(reflects, weight * passed, weight)
         w, x = dr.select(reflects, onwards, w), dr.select(reflects, si.spawn_ray(onwards).o, x)
         cloud = dr.select(reflects, medium, cloud)
@@ -256,11 +272,17 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
 
     # The next ray: a shadow ray, a side flight, the path itself, or the next path.
     begins_shadow = (scatters | reflects) & scene.has_suns
+    # The order at a place of scattering: shadow ray, then perhaps a side flight with its own shadow
+    # ray, then the path goes on. After a surface the path goes on in the direction that was drawn
+    # there. Without suns there are no shadow rays to wait for.
     reflected = (dark & (mode == SURFACE_SHADOW)) if scene.has_suns else reflects
     main_done = (dark & (mode == SHADOW)) if scene.has_suns else begins
     turns_aside = main_done & (sampler.next_1d(active) < side)
     side_done = ((mode == SIDE) & active & (escapes | meets)) | (dark & (mode == SIDE_SHADOW))
     resumes = side_done | (main_done & ~turns_aside)
+    # A side flight is drawn about a sun, the path about its own direction, both by the phase
+    # function of the place. p_a and p_s of the derivation give the fraction with which the next sun
+    # light counts.
     about = dr.select(turns_aside, scene.to_sun(scene.random_sun(sampler, active)), w)
     new = scene.scattered(cloud, about, sampler, resumes | turns_aside)
     of_path = scene.phase_value(cloud, w, new, resumes | turns_aside)
@@ -268,17 +290,23 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     fraction = dr.select(resumes | turns_aside, of_path / (of_path + side * of_suns), fraction)
     fraction = dr.select(reflected, 1.0, fraction)
 
-    # Light paths' weights fall by absorption and at surfaces alone.
-    survival = dr.minimum(dr.max(weight) / _LEAST_WEIGHT, 1.0)
+    # Russian roulette below a weight of 0.05: the weight of a path falls by absorption and at
+    # surfaces alone.
+    survival = dr.minimum(dr.max(weight) / 0.05, 1.0)
     resumes_any = resumes | reflected
     lost = resumes_any & (sampler.next_1d(active) >= survival)
     weight = dr.select(resumes_any, weight / dr.maximum(survival, dr.smallest(mi.Float)), weight)
     over |= lost
 
+    # A flight that begins, or that goes on after a delta collision, has a new length; a shadow ray
+    # begins with no depth.
     flown = resumes_any | turns_aside | over
     free = -dr.log(1 - sampler.next_1d(active))
     depth = dr.select(flown | (stays & flies), free, dr.select(begins_shadow, 0.0, depth))
     forward = scene.beyond
+    # The start of the next ray; later lines override earlier ones: behind a crossing, at a delta
+    # collision, a shadow ray, a flight, the next path from the eye. Direction, medium and mode
+    # follow in the same order.
     next_o = dr.select(crosses, o + d * (si.t + forward), o)
     next_o = dr.select(stays, scattered_at, next_o)
     next_o = dr.select(begins_shadow, shadow_from, next_o)

@@ -46,8 +46,6 @@ from airlight.reference.scene.area_light import ReferenceAreaLight, triangle_are
 from airlight.reference.scene.device import on_device
 
 _PARALLEL = 1e-9  # sine of the angle between ray and plane below which they count as parallel
-_FADE = 16.0  # how soon points about the ray become fewer as it passes further from the light
-_OUTSIDE = 1e-5  # of the radius of a sphere: what is closer to it touches it
 _TOUCHING = 1e-12  # of a light's size: no direction is known over a shorter way
 _LEAST = 1e-30
 
@@ -80,9 +78,12 @@ class Triangles:
         return self._even(number, u, v)
 
     def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly, and half of those of a ray that meets a triangle about
+        """Sample points evenly; of a ray that meets a triangle half of the points are about
         the place where it does.
         """
+        # Half of the points of a ray that meets a triangle are spread about the place where it
+        # does, v below `fraction`; the others are even over all triangles. Both halves use u and v
+        # once, stretched to 0 to 1.
         hit = self.scene.ray_intersect_preliminary(
             mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
         )
@@ -108,18 +109,20 @@ class Triangles:
         sine, cosine = dr.sincos(2 * math.pi * u)
         way = across * cosine + up * sine
         about = meets & (v < fraction)
-        drawn = place + way * (
+        near = place + way * (
             _edge_of_triangle(place, way, ends, normal) * v / dr.maximum(fraction, _LEAST)
         )
-        position = dr.select(about, drawn, even)
+        position = dr.select(about, near, even)
         number = dr.select(about, met, number)
 
-        here = meets & (number == met)
+        # The density of a point is the sum over both techniques, whichever drew it. An even point
+        # in the triangle that the ray meets could have been drawn about the place, too.
+        in_met = meets & (number == met)
         rho = dr.norm(position - place)
-        counts = ~here | (rho > _TOUCHING * dr.norm(first))
-        rho = dr.select(here & counts, rho, 1)
+        counts = ~in_met | (rho > _TOUCHING * dr.norm(first))
+        rho = dr.select(in_met & counts, rho, 1)
         edge = _edge_of_triangle(place, (position - place) / rho, ends, normal)
-        density = (1 - fraction) / self.area + dr.select(here, _about(fraction, edge, rho), 0)
+        density = (1 - fraction) / self.area + dr.select(in_met, _about(fraction, edge, rho), 0)
         return LightSample(
             position, self._vector(self.normals, number * 3), dr.select(counts, density, 0)
         )
@@ -131,6 +134,8 @@ class Triangles:
         before = dr.select(
             number == 0, 0, dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1)
         )
+        # The rest of u within the chosen triangle is uniform again; its root spreads the points
+        # evenly.
         root = dr.sqrt((u - before) / (dr.gather(mi.Float64, self.below, number) - before))
         corner, first, second = (
             self._vector(self.corners, number * 9 + 3 * which) for which in range(3)
@@ -169,6 +174,8 @@ class Flat:
         """Sample points evenly and about the place where the ray meets the
         plane, moved onto the light.
         """
+        # The place where the ray meets the plane of the light, or the one beside the light's centre
+        # if they are parallel, moved to the nearest place of the light.
         slope = dr.dot(direction, self.normal)
         offset = self.centre - origin
         parallel = dr.abs(slope) < _PARALLEL
@@ -184,6 +191,8 @@ class Flat:
         )
         fraction = _fraction(self._at(x0, y0), max(a, b), origin, direction)
 
+        # v below `fraction` draws about the place: rho = R(phi) v, phi uniform. Else evenly over
+        # the light.
         x, y = self._even(u, (v - fraction) / (1 - fraction))
         sine, cosine = dr.sincos(2 * math.pi * u)
         about, distance = v < fraction, self._edge(x0, y0, cosine, sine) * (v / fraction)
@@ -216,6 +225,8 @@ class Flat:
         if self.round:
             along = x0 * cosine + y0 * sine
             return -along + dr.sqrt(dr.maximum(along * along + a * b - x0 * x0 - y0 * y0, 0))
+        # How far it is to the side of the rectangle in each of both directions; the nearer one
+        # counts.
         sideways = (a - x0 * dr.sign(cosine)) / dr.maximum(dr.abs(cosine), _LEAST)
         upwards = (b - y0 * dr.sign(sine)) / dr.maximum(dr.abs(sine), _LEAST)
         return dr.maximum(dr.minimum(sideways, upwards), 0)
@@ -239,8 +250,9 @@ class Ball:
         """
         way = place - self.centre
         distance = dr.maximum(dr.norm(way), _LEAST)
-        # A place on the sphere or in it sees nothing, wherever the samples are.
-        outside = distance > self.radius * (1 + _OUTSIDE)
+        # A place on the sphere or in it sees nothing, wherever the samples are. Closer than 1e-5 of
+        # the radius is on the sphere.
+        outside = distance > self.radius * (1 + 1e-5)
         edge = dr.select(outside, dr.square(self.radius / distance), 0)
         cosine = dr.sqrt(edge + v * (1 - edge))
         normal = _towards(cosine, 2 * math.pi * u, way / distance)
@@ -262,11 +274,15 @@ class Ball:
         places = [dr.normalize(middle + direction * (sign * half)) for sign in (-1, 1)]
         fraction = _fraction(self.centre + radius * places[0], radius, origin, direction)
 
+        # The rest of the points has the density (1 + n . side)/area over the sphere: most of them
+        # on the side turned to the ray, none opposite to it.
         angle = 2 * math.pi * u
         normal = _towards(
             2 * dr.sqrt(dr.clip((v - fraction) / (1 - fraction), 0, 1)) - 1, angle, side
         )
         for number, place in enumerate(places):
+            # The chord from the place, uniform over the diameter: the height over the place's
+            # tangent plane is linear in its square.
             chord = dr.clip(2 * v / fraction - number, 0, 1)  # over the diameter
             chosen = (v < fraction) & ((v < 0.5 * fraction) == (number == 0))
             normal = dr.select(chosen, _towards(1 - 2 * chord * chord, angle, place), normal)
@@ -299,6 +315,8 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     if light.kind == "sphere":
         return Ball(centre, light.radius)
     corners = light.triangles
+    # A mesh of our own for the ray casts, with the triangles in the order of the tables: the number
+    # of a hit is the row of its triangle.
     mesh = mi.Mesh("light", vertex_count=3 * len(corners), face_count=len(corners))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(corners.ravel())
@@ -306,6 +324,7 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     parameters.update()
     areas, normals = triangle_areas(corners), triangle_normals(corners)
     below = np.cumsum(areas) / areas.sum()
+    # Rounding must not leave a u of nearly 1 without a triangle.
     below[-1] = 1.0
     ways = corners.copy()
     ways[:, 1:] -= corners[:, :1]
@@ -323,7 +342,9 @@ def _fraction(place, radius: float, origin, direction):
     """
     offset = place - origin
     gap = dr.norm(offset - direction * dr.dot(offset, direction)) / radius
-    return 0.5 / (1 + _FADE * gap * gap)
+    # The gap between ray and place over the size of the light: at a gap of 1/4 half of the points
+    # about the place are left.
+    return 0.5 / (1 + 16.0 * gap * gap)
 
 
 def _about(fraction, edge, rho):
@@ -335,6 +356,8 @@ def _edge_of_triangle(place, towards, ends, normal):
     """Return how far a triangle reaches from a place in it in a unit direction of its plane [m]."""
     reach = mi.Float64(dr.inf)
     for one, other in zip(ends, (*ends[1:], ends[0])):
+        # A vector across the side, turned to the inside by the triangle's middle. The side is met
+        # where the gap to it is used up.
         inward = dr.cross(normal, other - one)
         inward = inward * dr.sign(dr.dot(inward, sum(ends) / 3 - one))
         rate = -dr.dot(inward, towards)

@@ -23,8 +23,6 @@ import drjit as dr
 import mitsuba as mi
 
 _SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
-# of the largest coordinate: how far beyond a boundary a ray goes on; thinner media are not seen
-_BEYOND = 2e-6
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Segment:
     """The media at the ends of segments from a light to points."""
 
     start: Any  #: pointer to the medium at the light; what is beyond, the boundaries say
-    #: extinction at the points [1/m], that of the whole segment where nothing bounds a medium
+    #: extinction at the points [1/m]; along all of the segment where nothing bounds a medium
     end_sigma_t: Any
 
 
@@ -62,7 +60,8 @@ def is_boundary(interaction, active):
 
 def step_beyond(point):
     """Return how far beyond a boundary at `point` a ray goes on [m]."""
-    return _BEYOND * (1 + dr.max(dr.abs(point)))
+    # 2e-6 of the largest coordinate; media that are thinner are not seen.
+    return 2e-6 * (1 + dr.max(dr.abs(point)))
 
 
 def medium_at(around: Surroundings, position, known_position, known_medium, active):
@@ -80,6 +79,8 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
         ray = mi.Ray3f(position + direction * done, direction, distance - done, 0.0, [])
         hit = around.scene.ray_intersect(ray, walking)
         met = walking & hit.is_valid()
+        # A surface on the way is passed; the first boundary names the medium on the side of the
+        # point.
         at_boundary = met & hit.is_medium_transition()
         medium = dr.select(at_boundary, hit.target_medium(-direction), medium)
         done = dr.select(met, done + hit.t + step_beyond(hit.p), done)
@@ -123,15 +124,18 @@ def transmittance(around: Surroundings, start, direction, distance, *, media: Se
         ray = mi.Ray3f(start + direction * done, direction, distance - done, 0.0, [])
         hit = around.scene.ray_intersect(ray, walking)
         met = walking & hit.is_valid()
-        there = done + hit.t
+        crossing = done + hit.t
         passed = is_boundary(hit, met)
-        lit &= ~met | passed | (there > reach)
+        # A surface blocks the segment unless it is the one at the end of it.
+        lit &= ~met | passed | (crossing > reach)
         changes = passed & hit.is_medium_transition()
+        # The stretch from the last change of medium to this one. A boundary that rounding doubles
+        # names the same medium again, and adds no error.
         _, sigma_t = coefficients(medium, changes)
-        depth = dr.select(changes, depth + sigma_t * (there - boundary), depth)
-        boundary = dr.select(changes, there, boundary)
+        depth = dr.select(changes, depth + sigma_t * (crossing - boundary), depth)
+        boundary = dr.select(changes, crossing, boundary)
         medium = dr.select(changes, hit.target_medium(direction), medium)
-        done = dr.select(passed, there + step_beyond(hit.p), done)
+        done = dr.select(passed, crossing + step_beyond(hit.p), done)
         return passed & (done < distance), lit, done, boundary, medium, depth
 
     zero = dr.zeros(mi.Float, dr.width(distance))
@@ -146,5 +150,6 @@ def transmittance(around: Surroundings, start, direction, distance, *, media: Se
     )
     final = dr.while_loop(state, lambda walking, *_: walking, walk, label="segment through media")
     _, lit, _, boundary, medium, depth = final
+    # The last stretch ends at the point, in whichever medium the walk is there.
     _, sigma_t = coefficients(medium, lit)
     return dr.select(lit, dr.exp(-depth - sigma_t * (distance - boundary)), 0)

@@ -53,18 +53,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-# free flights are cut there: 1e-26 of them are longer, and the other technique goes on
-_MEAN_FREE_PATHS = 60.0
-# By how much samples may fall beside a spot's cone [rad]: above double precision's rounding, and so
-# little that it does not matter that hardly any sample ever does. (A strip that 1 batch in 100
-# feels is a bias in all the others.)
-_CONE_MARGIN = 1e-8
-# where a sample at the very end of an unbounded ray goes; nothing is transmitted from there [m]
-_FAR = 1e30
-_CDF_TOLERANCE = 3e-8  # how exactly the mixture is inverted: a rounding of what samplers draw
-_STEPS = 60  # most take five; every fourth halves the bracket
-_LEAST_DEPTH = 1e-12  # the exponential of a thinner span is uniform to the last bit
-
 
 @dataclass(frozen=True)
 class Approach:
@@ -121,16 +109,20 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
         return mi.Float64(-infinity), mi.Float64(infinity)
+    # By how much samples may fall beside the cone [rad]: above double precision's rounding, and so
+    # little that it does not matter that hardly any sample ever does. (A strip that 1 batch in 100
+    # feels is a bias in all the others.)
+    margin = 1e-8
     height = approach.height
     along, across = dr.dot(axis, direction), dr.dot(axis, approach.normal)
     ratio = math.cos(cutoff) / dr.maximum(dr.sqrt(along * along + across * across), 1e-20)
-    half = dr.acos(dr.minimum(ratio, 1)) + _CONE_MARGIN
+    half = dr.acos(dr.minimum(ratio, 1)) + margin
     middle = dr.atan2(along, across)
     low, high = middle - half, middle + half
-    right = 0.5 * math.pi - 1e-12  # beyond, the tangent would be that of the line's other end
+    right = 0.5 * math.pi - 1e-12  # beyond, the tangent belongs to the line's other end
     low_end = dr.select(low > -right, height * dr.tan(dr.clip(low, -right, right)), -infinity)
     high_end = dr.select(high < right, height * dr.tan(dr.clip(high, -right, right)), infinity)
-    outside = (ratio > 1 + _CONE_MARGIN) | (low > right) | (high < -right)
+    outside = (ratio > 1 + margin) | (low > right) | (high < -right)
     return low_end, dr.select(outside, -infinity, high_end)
 
 
@@ -161,10 +153,11 @@ def _distance(angle, span: Span):
     """
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
-    # r0 cos(theta): above 0, and 0 at the far end of an unbounded ray
+    # r0 cos(theta): above 0, and 0 at the far end of an unbounded ray. A sample there goes to 1e30
+    # m, from where nothing is transmitted.
     beyond = h * cosine - s0 * sine
     y = (h * h + s0 * s0) * sine / dr.maximum(beyond, 1e-30)
-    return dr.minimum(dr.select(beyond > 0, y, _FAR), span.length)
+    return dr.minimum(dr.select(beyond > 0, y, 1e30), span.length)
 
 
 def _angle(y, span: Span):
@@ -189,8 +182,10 @@ def free_flights(length, sigma_t) -> FreeFlight:
 
     Valid for sigma_t > 0, and for sigma_t = 0 where the length is finite.
     """
-    cut = dr.minimum(length, _MEAN_FREE_PATHS / sigma_t)
-    depth = dr.maximum(sigma_t * cut, _LEAST_DEPTH)
+    # Free flights are cut at 60 mean free paths: 1e-26 of them are longer, and the other technique
+    # goes on. The exponential of a span thinner than 1e-12 is uniform to the last bit.
+    cut = dr.minimum(length, 60.0 / sigma_t)
+    depth = dr.maximum(sigma_t * cut, 1e-12)
     return FreeFlight(cut, depth / cut, dr.tanh(0.5 * depth))
 
 
@@ -211,6 +206,7 @@ def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
     """
     inside = y <= flight.cut
     survival = dr.exp(-flight.rate * y)
+    # 1 - exp(-depth) = 2 t/(1 + t): one over it, without cancellation.
     scale = (1 + flight.tanh) / (2 * flight.tanh)
     return dr.select(inside, scale * (1 - survival), 1), dr.select(
         inside, flight.rate * scale * survival, 0
@@ -275,6 +271,8 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
     angle has no digits left for what lies far beyond a close light.
     """
     span, u = mixture.span, mi.Float64(u)
+    # The bracket: the angles at which the distribution functions of the techniques themselves are
+    # u.
     low = high = u * mixture.range
     for flight in mixture.flights:
         angle = _angle(free_flight(u, flight), span)
@@ -290,7 +288,9 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
         # Every fourth step halves the bracket, whatever Newton's method would do.
         use_newton = (newton > low) & (newton < high) & (number % 4 != 3)
         better = dr.select(use_newton, newton, 0.5 * (low + high))
-        searching &= (dr.abs(excess) > _CDF_TOLERANCE) & (number < _STEPS)
+        # The mixture is inverted to 3e-8, a rounding of what samplers draw. Most lanes take five
+        # steps, none more than 60.
+        searching &= (dr.abs(excess) > 3e-8) & (number < 60)
         return number + 1, searching, low, high, dr.select(searching, better, angle)
 
     state = (mi.UInt32(0), dr.full(mi.Bool, True, dr.width(low)), low, high, 0.5 * (low + high))
@@ -312,6 +312,8 @@ def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
     u, length = mi.Float64(u), mi.Float64(length)
     flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]
     fraction = 0.5 / len(flights)
+    # u below a half draws evenly, above it the free flights, an equal part of the rest for each
+    # channel.
     y = 2 * u * length
     for number, flight in enumerate(flights):
         low = 0.5 + number * fraction

@@ -96,17 +96,22 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
         stretch = Stretch(
             task.around, *ends, medium, dr.max(sigma_s) > 0, depth, sigma_t, rates, at_camera
         )
-        sent, sampler = _airlight(known, sampler, ray, stretch, walking)
+        # The lights send airlight from this stretch; a surface at its end reflects, a boundary of a
+        # medium leads on.
+        sent, sampler = _airlight(prepared, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)
-        left, sampler = _surface(known, sampler, ray, hit, end, stretch, met & ~passed)
+        reflected, sampler = _surface(prepared, sampler, ray, hit, end, stretch, met & ~passed)
+        # Behind a boundary the optical depth has grown by the stretch, and the medium is the one
+        # that the boundary names. The ray goes on a little behind it, but the next stretch begins
+        # at the boundary itself.
         depth = dr.select(passed, depth + sigma_t * (end - start), depth)
         changes = passed & hit.is_medium_transition()
         medium = dr.select(changes, hit.target_medium(ray.direction), medium)
         done = dr.select(passed, end + step_beyond(hit.p), done)
         start = dr.select(passed, end, start)
-        return passed, sampler, done, start, depth, medium, airlight + sent, surface + left
+        return passed, sampler, done, start, depth, medium, airlight + sent, surface + reflected
 
-    at_camera, known = task.start, task
+    at_camera, prepared = task.start, task
     width = dr.width(active)
     state = (
         mi.Bool(active),
@@ -118,6 +123,7 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
         dr.zeros(mi.Spectrum, width),
         dr.zeros(mi.Spectrum, width),
     )
+    # Without bounded media one stretch is the whole ray, and needs no loop.
     if not task.around.bounded:
         return walk(*state)[-2:]
     # The medium at a light that stays is looked for once.
@@ -130,7 +136,7 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
         else each
         for each in task.sources
     )
-    known = replace(task, sources=tuple(places))
+    prepared = replace(task, sources=tuple(places))
     return dr.while_loop(
         state, lambda walking, *_: walking, walk, label="camera ray through media"
     )[-2:]
@@ -143,6 +149,8 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
     total = dr.zeros(mi.Spectrum, dr.width(active))
     active = active & part.scatters
     for source in task.sources:
+        # The grid of cells and the sequence of points on the light start at random places, new for
+        # each light.
         shift, start = sampler.next_1d(active), sampler.next_2d(active)
 
         def add_sample(index, total, sampler, source: Source = source, shift=shift, start=start):
@@ -154,8 +162,10 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
             phase, _ = part.medium.phase_function().eval_pdf(
                 mi.PhaseFunctionContext(), point, sample.towards, used
             )
-            kept, sampler = part.kept(sample.x, point, sample.path, ray, sampler, used)
-            value = sigma_s * phase * sample.value * kept * width
+            transmittance, sampler = part.kept(sample.x, point, sample.path, ray, sampler, used)
+            # One sample stands for its cell of the unit interval: the integrand over the density of
+            # x, times the width of the cell.
+            value = sigma_s * phase * sample.value * transmittance * width
             return index + 1, total + dr.select(used, value, 0), sampler
 
         state = (mi.UInt32(0), total, sampler)
@@ -172,6 +182,8 @@ def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple
     total = dr.zeros(mi.Spectrum, dr.width(active))
     if not task.around.surfaces:
         return total, sampler
+    # Rays that meet nothing have an infinite x: their transmittance is asked at the start, and not
+    # counted.
     x = mi.Float64(dr.select(active, x, part.start))
     for source in task.sources:
         start, count = (
@@ -182,14 +194,15 @@ def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple
         def add_sample(index, total, sampler, source: Source = source, start=start, count=count):
             towards, path, irradiance = source.on_surface(place_of(index, start), hit, active)
             material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
-            kept, sampler = part.kept(x, hit, path, ray, sampler, active)
+            transmittance, sampler = part.kept(x, hit, path, ray, sampler, active)
             return (
                 index + 1,
-                total + dr.select(active, material * irradiance * kept / count, 0),
+                total + dr.select(active, material * irradiance * transmittance / count, 0),
                 sampler,
             )
 
         state = (mi.UInt32(0), total, sampler)
+        # A light that is the same for all samples needs one, and no loop.
         if count == 1:
             _, total, sampler = add_sample(*state)
         else:

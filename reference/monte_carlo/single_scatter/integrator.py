@@ -31,8 +31,6 @@ from airlight.reference.monte_carlo.single_scatter.stretches import double_ray
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import VaryingMedium
 
-_RAYS = 1 << 20  # camera rays in one kernel
-
 
 def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> Batches:
     """Trace one batch along the pixel-centre rays, from the pinhole.
@@ -46,10 +44,11 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
     task = _task(reference, samples)
     sampler = mi.load_dict({"type": "independent"})
     pixels = reference.width * reference.height
-    chunks = -(-pixels // _RAYS)
+    most = 1 << 20  # camera rays in one kernel
+    chunks = -(-pixels // most)
     mean = np.empty((2, pixels, 3))
     for number in range(chunks):
-        chunk = slice(number * _RAYS, min((number + 1) * _RAYS, pixels))
+        chunk = slice(number * most, min((number + 1) * most, pixels))
         count = chunk.stop - chunk.start
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)

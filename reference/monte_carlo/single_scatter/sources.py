@@ -37,10 +37,6 @@ from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
 from airlight.reference.scene.read import ReferenceScene, whole_scene
 
-# of places that light is scattered at [m]: squares of longer ways overflow in single precision
-_FARTHEST = 1e15
-_LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
-
 
 @dataclass(frozen=True)
 class Sample:
@@ -83,6 +79,8 @@ class _Near(ABC):
         """Return samples on rays, for `u` uniform in [0, 1) and `numbers` in the unit square."""
         light = self.point(numbers, ray)
         approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
+        # The part of the stretch that the light's point could light: in the cone of a spot, before
+        # the plane of an area light's point.
         low, high = (approach.foot + end for end in self.ends(light, approach, ray))
         low, high = dr.maximum(part.start, low), dr.minimum(part.end, high)
         used = active & (high > low) & (light.density > 0)
@@ -95,12 +93,15 @@ class _Near(ABC):
         # All from the light on: a place close to it keeps its digits.
         way = mi.Vector3f(approach.normal * approach.height + ray.direction_double * s)
         from_light = way / mi.Float(dr.sqrt(square))
-        there = point_on(ray, mi.Point3f(light.position) + way)
-        used &= (density > 0) & (square < _FARTHEST * _FARTHEST)
-        value = self.sent(light, there, from_light) * mi.Float(
+        point = point_on(ray, mi.Point3f(light.position) + way)
+        # Places further than 1e15 m from the light do not count: squares of longer ways overflow in
+        # single precision.
+        farthest = 1e15
+        used &= (density > 0) & (square < farthest * farthest)
+        value = self.sent(light, point, from_light) * mi.Float(
             dr.select(used, 1 / (square * density), 0)
         )
-        return Sample(low + y, there, -from_light, self._path(light, way), value, used)
+        return Sample(low + y, point, -from_light, self._path(light, way), value, used)
 
     def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
         """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
@@ -113,6 +114,7 @@ class _Near(ABC):
     def _path(self, light: LightSample, way) -> Path:
         """Return the paths from a hair before the light's own surface, if it has one."""
         begin = mi.Point3f(light.position)
+        # A path that began on the light's own surface could meet it.
         hair = mi.Vector3f(light.normal) * step_beyond(begin)
         way = way - hair
         length = dr.norm(way)
@@ -171,7 +173,9 @@ class AreaSource(_Near):
         """Return the ends of the part of a line before the plane of each point."""
         slope = dr.dot(ray.direction_double, point.normal)
         level = dr.dot(ray.origin_double - point.position, point.normal)
-        parallel = dr.abs(slope) < _LEAST_SLOPE
+        # A ray with a slope below 1e-12 is parallel to the plane of the point: all of it is before
+        # the plane, or nothing.
+        parallel = dr.abs(slope) < 1e-12
         crossing = -level / dr.select(parallel, 1, slope) - approach.foot
         low = dr.select(~parallel & (slope > 0), crossing, -dr.inf)
         high = dr.select(~parallel & (slope < 0), crossing, dr.inf)
@@ -180,7 +184,7 @@ class AreaSource(_Near):
 
 @dataclass(frozen=True)
 class FarSource:
-    """A sun, or a uniform sky, of which each sample has its own direction, evenly from the sphere.
+    """A sun, or a uniform sky; each sample of a sky has its own direction, even over the sphere.
 
     The emitter names a place beyond everything, in vacuum: there paths begin.
     """
@@ -197,6 +201,7 @@ class FarSource:
         """Return samples on rays; see `_Near`."""
         length = part.end - part.start
         used = active & (length > 0) & (length < dr.inf)
+        # Lights at infinity have no foot on the ray: no span. An unbounded part draws nothing.
         y, density = part.distances(u, part.start, dr.select(used, length, 1), None)
         x = part.start + y
         point = point_on(ray, ray.origin + ray.direction * mi.Float(x))

@@ -26,9 +26,6 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     sample_stretch,
 )
 
-# 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
-_STEPS = (0.7548776662466927, 0.5698402909980532)
-
 
 @dataclass(frozen=True)
 class Ray:
@@ -107,6 +104,8 @@ class Stretch(Part):
 
     def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
         """Return the transmittance of both ways; see `Part`."""
+        # The walk from the light on must know the medium there: vacuum beyond all shapes, the
+        # medium of a light that stays, or the one that is looked for now.
         at_light = path.medium
         if path.end is not None or not self.around.bounded:
             at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is vacuum
@@ -129,8 +128,8 @@ def cell_of(number, shift, count: int) -> tuple[Any, Any]:
     """Return where a cell of the unit interval begins, and its width.
 
     All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift`
-    in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch; in cells
-    that stay, an edge close to the end of one would be felt so rarely that no spread between
+    in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch; in
+    cells that stay, an edge close to the end of one would be felt so rarely that no spread between
     batches could tell.
     """
     if count == 1:
@@ -145,7 +144,9 @@ def place_of(index, start) -> tuple[Any, Any]:
     sequence, Kronecker's, starts.
     """
     number = mi.Float64(index)
-    u, v = (mi.Float64(begin) + number * step for begin, step in zip(start, _STEPS))
+    # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly.
+    steps = (0.7548776662466927, 0.5698402909980532)
+    u, v = (mi.Float64(begin) + number * step for begin, step in zip(start, steps))
     return u - dr.floor(u), v - dr.floor(v)
 
 

@@ -38,10 +38,6 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
 from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 
-_LEVEL = 1e-5  # scale heights between two heights that are as good as one
-_FARTHEST = 1e6  # of level rays [m]
-_BISECTIONS = 48
-
 
 def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance) -> Part:
     """Return the part of camera rays in a medium, up to the surface at a distance [m]."""
@@ -50,10 +46,13 @@ def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance
         up = mi.Vector3d(*(float(each) for each in medium.up))
         height, rise = dr.dot(ray.origin_double, up), dr.dot(ray.direction_double, up)
         ends = [(z - height) / rise for z in (medium.floor, medium.cap)]
+        # The ray is in the fog between its passages through floor and cap. A level ray is in the
+        # fog everywhere or nowhere; it counts up to `farthest` [m].
+        farthest = 1e6
         level, inside = rise == 0, (height >= medium.floor) & (height <= medium.cap)
         first = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
         last = dr.select(
-            level, dr.select(inside, _FARTHEST, 0), dr.clip(dr.maximum(*ends), 0, _FARTHEST)
+            level, dr.select(inside, farthest, 0), dr.clip(dr.maximum(*ends), 0, farthest)
         )
         last = dr.minimum(last, mi.Float64(distance))
         return _FogPart(around, first, last, plugin, last > first, medium, up, height, rise)
@@ -79,24 +78,30 @@ class _FogPart(Part):
         u = mi.Float64(u)
         before = self._depth_to(low)
         whole = 1 - dr.exp(before - self._depth_to(low + length))
-        own = u if span is None else dr.select(u < 0.5, 2 * u, 2 * u - 1)
-        wanted = before - dr.log(1 - own * whole)
+        # Half of u draws free flights, half draws angles at the light; each half is stretched to 0
+        # to 1.
+        v = u if span is None else dr.select(u < 0.5, 2 * u, 2 * u - 1)
+        wanted = before - dr.log(1 - v * whole)
 
         def halve(number, below, above):
             middle = 0.5 * (below + above)
             short = self._depth_to(middle) < wanted
             return number + 1, dr.select(short, middle, below), dr.select(short, above, middle)
 
+        # The depth grows along the ray: 48 bisections find where it is the wanted one, to 2^-48 of
+        # the stretch.
         state = (mi.UInt32(0), mi.Float64(low), mi.Float64(low + length))
-        found = dr.while_loop(
-            state, lambda number, *_: number < _BISECTIONS, halve, label="inverse of the depth"
+        bracket = dr.while_loop(
+            state, lambda number, *_: number < 48, halve, label="inverse of the depth"
         )
-        y = 0.5 * (found[1] + found[2]) - low
+        y = 0.5 * (bracket[1] + bracket[2]) - low
         if span is not None:
-            y = dr.select(u < 0.5, equi_angular(own, span), y)
+            y = dr.select(u < 0.5, equi_angular(v, span), y)
         x = low + y
-        kept = dr.exp(before - self._depth_to(x))
-        flights = dr.select(whole > 0, self._density(self.height + self.rise * x) * kept / whole, 0)
+        transmittance = dr.exp(before - self._depth_to(x))
+        flights = dr.select(
+            whole > 0, self._density(self.height + self.rise * x) * transmittance / whole, 0
+        )
         return y, flights if span is None else 0.5 * (flights + equi_angular_pdf(y, span))
 
     def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
@@ -108,8 +113,10 @@ class _FogPart(Part):
             )
         else:
             depth = self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
-        left = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
-        return dr.select(unblocked(self.around, *path.shadow_ray(), active), left, 0), sampler
+        transmittance = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
+        return dr.select(
+            unblocked(self.around, *path.shadow_ray(), active), transmittance, 0
+        ), sampler
 
     def _depth_to(self, x):
         """Return the optical depth from the camera to distances x [m]."""
@@ -119,24 +126,27 @@ class _FogPart(Part):
         """Return optical depths between two heights, a length apart [m]."""
         fog = self.fog
         least = min((scale for _, _, scale in fog.layers), default=1.0)
-        level = dr.abs(z1 - z0) < _LEVEL * least
+        # Heights within 1e-5 of the least scale height are as good as one.
+        level = dr.abs(z1 - z0) < 1e-5 * least
         rise = dr.select(level, 1, z1 - z0)
         middle = 0.5 * (z0 + z1)
         inside = (middle >= fog.floor) & (middle <= fog.cap)
-        there = dr.select(inside, length * self._density(middle), 0)
+        on_level = dr.select(inside, length * self._density(middle), 0)
         return dr.select(
-            level, there, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise
+            level, on_level, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise
         )
 
     def _depth_beyond(self, z, rise):
         """Return the optical depth from heights [m] out of the fog; `rise`:
         vertical, of unit directions.
         """
-        there = self._antiderivative(z)
+        at_height = self._antiderivative(z)
         above, below = (
             self._antiderivative(mi.Float64(end)) for end in (self.fog.cap, self.fog.floor)
         )
-        return dr.select(rise > 0, above - there, there - below) / dr.maximum(dr.abs(rise), 1e-30)
+        return dr.select(rise > 0, above - at_height, at_height - below) / dr.maximum(
+            dr.abs(rise), 1e-30
+        )
 
     def _antiderivative(self, z):
         """Return G at heights [m]."""
@@ -144,6 +154,8 @@ class _FogPart(Part):
         total = self.fog.constant * z
         for sigma_t, base, scale in self.fog.layers:
             over = z - base
+            # Below z_i a clamped layer has its full density: G is linear there, and continuous at
+            # z_i.
             fallen = -scale * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
             total += sigma_t * (
                 dr.select(over < 0, over - scale, fallen) if self.fog.clamped else fallen
@@ -190,14 +202,23 @@ class _GridPart(Part):
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
         begin, end = dr.maximum(near, 0), dr.minimum(far, distance)
 
-        def fly(x, kept, sampler):
+        def fly(x, transmittance, sampler):
+            # The next point of the Poisson process of the density m; the product of 1 - sigma_t/m
+            # over its points is the estimate.
             x = x - dr.log(1 - sampler.next_1d()) / self.majorant
             place = dr.zeros(mi.MediumInteraction3f)
             place.p = origin + direction * x
             _, _, sigma_t = self.medium.get_scattering_coefficients(place, x < end)
-            return x, dr.select(x < end, kept * (1 - sigma_t[0] / self.majorant), kept), sampler
+            return (
+                x,
+                dr.select(x < end, transmittance * (1 - sigma_t[0] / self.majorant), transmittance),
+                sampler,
+            )
 
+        # Lanes that miss the box start behind their end, and take no step.
         start = dr.select(active & meets, begin, dr.inf)
         state = start, dr.full(mi.Float, 1, dr.width(start)), sampler
-        _, kept, sampler = dr.while_loop(state, lambda x, *_: x < end, fly, label="ratio tracking")
-        return kept, sampler
+        _, transmittance, sampler = dr.while_loop(
+            state, lambda x, *_: x < end, fly, label="ratio tracking"
+        )
+        return transmittance, sampler

@@ -15,11 +15,6 @@ from airlight.reference.monte_carlo.slab_walk.walk import Counts, Slab, walk
 
 Array = NDArray[np.float64]
 
-#: Photons of a batch: their arrays fit into the cache of a core.
-BATCH = 25_000
-_FEWEST = 5
-_MOST_COARSE = 64  #: batches there are at least, so that standard errors are known to 9 %
-
 
 @dataclass(frozen=True)
 class SlabEstimate:
@@ -51,13 +46,16 @@ def slab_estimate(
 
     `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for a set
     without end; order 0 is the beam; `photons`: at least two; they are walked in batches of at most
-    `BATCH`, at least 64 if there are as many photons; `seed`: the same seed gives the same numbers,
+    25 000, at least 64 if there are as many photons; `seed`: the same seed gives the same numbers,
     whatever the number of workers; `workers`: threads; `progress`: called with (fraction done,
     what).
     """
-    batches = max(math.ceil(photons / BATCH), min(photons, _MOST_COARSE))
+    # The arrays of 25 000 photons fit into the cache of a core. With 64 batches at least, standard
+    # errors are known to 9 %.
+    batches = max(math.ceil(photons / 25_000), min(photons, 64))
     sizes = [photons // batches + (number < photons % batches) for number in range(batches)]
     seeds = np.random.SeedSequence(seed).spawn(batches)
+    # All orders, and all scattered ones, come after the sets: totals and fluxes need them.
     ranges = [*sets, (0, math.inf), (1, math.inf)]
 
     def batch(number: int) -> list[Array]:
@@ -75,6 +73,7 @@ def slab_estimate(
     fraction = np.array(sizes) / photons
     places = [reflected, transmitted, *np.moveaxis(slab.mu0 * fluence, 1, 0)]
     exits = [[_exit(place[:, number], fraction) for place in places] for number in range(len(sets))]
+    # A photon stands for a flux of pi mu0 over the number of photons.
     flux = math.pi * slab.mu0 * np.stack([up[..., -1, 0], down[..., -1, 0]], axis=-1)
     return SlabEstimate(
         exits=np.moveaxis(np.reshape(exits, (len(sets), len(places), 2, 3)), 2, 0),
@@ -117,17 +116,20 @@ def _exit(batches: Array, fraction: Array) -> Array:
     """Return amount, mean and rms of (batches, 3) moments, and their errors, (2, 3);
     ratios by the delta method.
 
-    The errors of ratios need light in several batches: below `_FEWEST` there is none to tell.
+    The errors of ratios need light in five batches; with less they are NaN.
     """
     amount, first, second = fraction @ batches
-    found = np.full((2, 3), np.nan)
-    found[:, 0] = _amounts(batches[:, 0], fraction)
+    estimate = np.full((2, 3), np.nan)
+    estimate[:, 0] = _amounts(batches[:, 0], fraction)
     if amount > 0.0:
         mean, square = first / amount, second / amount
         rms = math.sqrt(square)
-        found[0, 1:] = mean, rms
-        if np.count_nonzero(batches[:, 0]) >= _FEWEST:
-            found[1, 1] = _standard_error((batches[:, 1] - mean * batches[:, 0]) / amount, fraction)
+        estimate[0, 1:] = mean, rms
+        # A ratio of moments has an error by the delta method, if five batches have light.
+        if np.count_nonzero(batches[:, 0]) >= 5:
+            estimate[1, 1] = _standard_error(
+                (batches[:, 1] - mean * batches[:, 0]) / amount, fraction
+            )
             error = _standard_error((batches[:, 2] - square * batches[:, 0]) / amount, fraction)
-            found[1, 2] = error / (2 * rms) if rms > 0 else error
-    return found
+            estimate[1, 2] = error / (2 * rms) if rms > 0 else error
+    return estimate

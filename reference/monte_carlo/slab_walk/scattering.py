@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_CELLS = 1 << 17  #: of the table of a tabulated phase function
-
 
 @dataclass(frozen=True)
 class HenyeyGreenstein:
@@ -43,7 +41,7 @@ class Tabulated:
     """
 
     def __init__(self, angles: Array, heights: Array):
-        parts = max(1, _CELLS // (angles.size - 1))
+        parts = max(1, (1 << 17) // (angles.size - 1))  # about 2^17 cells of the whole table
         fraction = np.arange(parts) / parts
         fine = np.append(
             (angles[:-1, None] + np.diff(angles)[:, None] * fraction).reshape(-1), angles[-1]

@@ -9,10 +9,10 @@ at order n, which loses no photon.
 
 Counted for each order: what leaves above and below, with the moments 1, x and x^2 + y^2 of the
 place of exit; and at each depth the passages upwards and downwards, and the fluence, which is the
-sum of 1/|mu| over passages. Every flight counts at every plane before it with its probability to
-reach it, exp(-distance), whether it does or not: that has the same mean as to count those that do,
-and less noise. The fluence's variance diverges with the logarithm of the smallest |mu|, hence
-slowly: its standard error can be a little small.
+sum of 1/|mu| over passages. Every flight counts at every plane before it with the probability to
+reach the plane, exp(-distance), whether it does or not. The mean is the same as if only flights
+counted that reach the plane, and the noise is smaller. The fluence's variance diverges with the
+logarithm of the smallest |mu|, hence slowly: its standard error can be a little small.
 
 The walk shares nothing with the deterministic computation that it checks
 (`realtime/clouds/slab_orders/`).
@@ -29,9 +29,6 @@ from airlight.reference.monte_carlo.slab_walk.scattering import turned
 
 Array = NDArray[np.float64]
 Vectors = tuple[Array, Array, Array]
-
-#: Weight below which light that is absorbed is followed no more: what is lost is below rounding.
-_LEAST_WEIGHT = 1e-14
 
 
 class Scattering(Protocol):
@@ -82,6 +79,7 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     for weight, (x, y, z), direction in flights(slab, photons, random):
         rising = direction[2] < 0
         row = np.zeros((2 + 3 * len(slab.depths), 3))
+        # Light leaves above and below: passages through the faces of the slab.
         row[0], _ = _passages(x, y, z, direction, rising, 0.0)
         row[1], _ = _passages(x, y, z, direction, ~rising, slab.tau)
         for place, depth in enumerate(slab.depths):
@@ -108,7 +106,8 @@ def flights(
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
     direction = np.full(photons, sine), np.zeros(photons), np.full(photons, slab.mu0)
     weight = 1.0
-    while place[0].size and weight > _LEAST_WEIGHT:
+    # Below a weight of 1e-14 what absorption loses is below rounding.
+    while place[0].size and weight > 1e-14:
         yield weight, place, direction
         place, direction = _next_scattering(slab, place, direction, random)
         weight *= slab.albedo
@@ -142,6 +141,8 @@ def _passages(
     them, and the same over |mu|.
     """
     u, v, w = (part[which] for part in direction)
+    # A photon reaches the plane with the probability exp(-distance), and counts with it, whether it
+    # gets there or not.
     length = (depth - z[which]) / w
     at_x, at_y = x[which] + u * length, y[which] + v * length
     reaching = np.exp(-length)
