@@ -17,9 +17,9 @@ the kinks of its lengths (`reference.quadrature.segments`) the integrand is an e
 linear function, and eight nodes are exact to rounding over up to four optical depths.
 
 In height fog pieces end where the density has kinks too, and panels span four scale heights at
-most, two under a directional light: over these the density changes smoothly. A light path out of the
-fog has the length 0 here, as in homogeneous fog; its optical depth is the depth of a column, which
-the fog knows.
+most, two under a directional light: over these the density changes smoothly. A light path out of
+the fog has the length 0 here, as in homogeneous fog; its optical depth is the depth of a column,
+which the fog knows.
 """
 
 from collections.abc import Sequence
@@ -300,8 +300,8 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
 
     `place`: an unbounded ray is followed from its foot point from there until little light is left.
     """
-    # `sigma_t` [1/m] decides how far an unbounded ray is followed: in height fog the largest density
-    # at the heights of light, camera and bases of layers; elsewhere the extinction itself.
+    # `sigma_t` [1/m] decides how far an unbounded ray is followed: in height fog the largest
+    # density at the heights of light, camera and bases of layers; elsewhere the extinction itself.
     medium, (ray, x0, x1), direction = reference.medium, stretches, reference.direction
     kinks = np.empty(0, np.int64), np.empty(0)
     if not isinstance(medium, HeightMedium):

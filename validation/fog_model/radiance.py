@@ -220,8 +220,8 @@ class FogModel:
             places.light,
             places.towards * places.r[:, None],
         )
-        # A light that is moved by d with its paths held: r' = |r v - d| and cos = -(r v - d) . w / r'
-        # of the module, and its path grows with r'/r in every medium.
+        # A light that is moved by d with its paths held: r' = |r v - d| and
+        # cos = -(r v - d) . w / r' of the module, and its path grows with r'/r in every medium.
         if any(fog.moved[number]):
             away = away - np.array(fog.moved[number])
             r = np.linalg.norm(away, axis=1)

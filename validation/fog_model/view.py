@@ -173,8 +173,8 @@ class View:
         rays, ray = reach.rays, reach.lit.ray
         if not len(ray):
             return reach
-        # Every interval is divided into `steps` equal angles at the light. Of the 2 steps + 1 places
-        # the odd ones are the middles, which shadow rays test, and the even ones the ends of steps.
+        # Every interval is divided into `steps` equal angles at the light. Of the 2 steps + 1
+        # places the odd ones are the middles, which shadow rays test, the even ones the ends.
         # A light with a cosine is one of many samples, which smooth its shadows together.
         low, high = (rays.theta(x, ray)[:, None] for x in (reach.lit.low, reach.lit.high))
         steps = self.steps // 4 if light.cosine else self.steps
@@ -192,8 +192,8 @@ class View:
         # The shadow ray ends a ten-thousandth of the way before the light.
         shadow_ray.maxt = on_device(mi.Float, (1 - 1e-4) * far)
         lit = ~np.array(occluders.ray_test(shadow_ray), dtype=bool).reshape(-1, steps)
-        # A run of lit steps begins where the step before it is dark, and ends where the next one is;
-        # runs are found in the same order by both.
+        # A run of lit steps begins where the step before it is dark, and ends where the next one
+        # is; beginnings and ends have the same order.
         beside = np.pad(lit, ((0, 0), (1, 1)))
         row, first = np.nonzero(lit & ~beside[:, :-2])
         last = np.nonzero(lit & ~beside[:, 2:])[1]
