@@ -77,13 +77,13 @@ class Diagnosis:
     path: str
     layer: str
     pixel: str  #: 'centre' or 'area'
-    #: name of the first explanation; 'right', 'black' or 'unexplained' where it is no fault
+    #: name of the first explanation: a fault, or 'right', 'black' or 'unexplained'
     first: str
     ranked: tuple[Ranked, ...]  #: one where no fault was looked for
     residual: float  #: mean relative error of the image as it is
-    left: float  #: what the first explanation leaves of it
-    rest: str  #: what that is: like noise, or little; empty where it is neither
-    explained: bool  #: whether that is nothing to explain
+    left: float  #: mean relative error that the first explanation leaves
+    rest: str  #: whether this error is like noise, or little; empty where it is neither
+    explained: bool  #: whether the first explanation leaves nothing to explain
     place: str  #: where the remaining error lies; empty where it is like noise, or little
     #: which pixels are wrong where these are few and all others are right; empty otherwise
     few: str
@@ -194,7 +194,7 @@ def diagnose_image(
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     light
-        The light of this scene, as other images of it have found it.
+        The paths of light of this scene, which several images of it share.
     reference_of
         A function that computes the scene's reference for 'centre' or 'area'.
     progress
@@ -369,12 +369,12 @@ class _Attempt:
         self.found += explanations
 
     def is_settled(self, explanation: Explanation) -> bool:
-        """Return whether nothing is left that another fault could explain: noise, or little."""
+        """Return whether an explanation leaves noise, or little: nothing for another fault."""
         return self.blocks.is_noise(explanation) or self._is_little(explanation)
 
     def _is_little(self, explanation: Explanation) -> bool:
-        """Return whether an explanation leaves no more than the fog model's error in
-        its place, or nearly so.
+        """Return whether an explanation leaves no more than the error of the fog model itself, or
+        little more.
         """
         # A twentieth of the error of the image is little too, up to the model's error of means.
         most = max(KNOWN[self.pixel], min(KNOWN["area"], _LITTLE * self.right.error))
@@ -395,8 +395,8 @@ class _Attempt:
 
     @property
     def chosen(self) -> Explanation:
-        """The explanation with the most evidence, or the simplest of those that are as
-        good; or the scene as it is.
+        """The explanation with the most evidence, or the simplest of all that are as good; or the
+        scene as it is.
         """
         singles = [each for each in self.found if len(each.faults) == 1]
         pairs = [each for each in self.found if len(each.faults) > 1]
@@ -409,7 +409,7 @@ class _Attempt:
         return best
 
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:
-        """Return the explanation with the most evidence, or the simplest of those that are as good.
+        """Return the explanation with the most evidence, or the simplest of all that are as good.
 
         A further number is worth its error only where the simpler explanation leaves more than
         little: fog with a scale height of 10 km is an extinction, and so is fog with a scale height

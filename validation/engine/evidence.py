@@ -33,8 +33,8 @@ from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
 
-#: Relative error of the fog model itself, in most pixels: of pixel centres the
-#: quadrature's, of means 3 x 3 rays'.
+#: Relative error of the fog model itself, in most pixels: of pixel centres the error of its
+#: quadrature, of means over pixels the error of 3 x 3 rays.
 KNOWN = {"centre": 3e-4, "area": 3e-3}
 
 _LIMITS = json.loads(Path(__file__).with_name("calibration.json").read_text(encoding="utf-8"))
@@ -85,8 +85,8 @@ class Blocks:
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
-    """Return the scale of the errors that an explanation leaves [1]: the
-    fog model's own at least.
+    """Return the scale of the errors that an explanation leaves [1]: the error of the fog model at
+    least.
     """
     return max(usual_size(explanation.errors[explanation.lit]), KNOWN[pixel])
 

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of faults that an engine's image may have: what is said of each, and
-what it makes of a guess.
+"""The catalogue of faults that an engine's image may have.
 
-`airlight compare --diagnose` tries all of them; the hints of `airlight compare` are those with an
-`undo`, which takes a fault back from a whole image, without any path of light.
+`airlight compare --diagnose` tries all of them. The hints of `airlight compare` are the faults with
+an `undo`, which takes a fault back from a whole image, without any path of light.
 """
 
 from dataclasses import replace
@@ -16,7 +15,7 @@ from airlight.validation.engine.media_faults import MEDIUM
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.fog_model.view import light_sources
 
-_MANY_LIGHTS = 6  # of more, a fault of a single one is not looked for
+_MANY_LIGHTS = 6  # in a scene with more lights, no faults of single lights are looked for
 
 _TABLES = {
     "brightness": (BRIGHTNESS,),
@@ -32,8 +31,8 @@ FAULTS = tuple(replace(fault, kind=kind) for kind, table in _TABLES.items() for 
 
 
 def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
-    """Return the faults that an image of a scene may have, those of its single lights
-    and classes of lights too.
+    """Return the faults that an image of a scene may have, and with them the faults of its single
+    lights and classes of lights.
     """
     # Lights are numbered in the order of `light_sources`: point and spot lights, directional ones,
     # area lights. A class that is all lights, or one light, is no group of its own.

@@ -113,7 +113,7 @@ class EngineComparison:
     kind: PixelKind
     hints: Hints  #: what may be wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    #: mean of the layer of the reference that it was compared with, and its error [W/(m^2 sr)]
+    #: mean of the layer of the reference, and the error of this mean [W/(m^2 sr)]
     known: Estimate
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
@@ -164,12 +164,26 @@ def compare_scene(
 ) -> EngineComparison:
     """Compare an EXR file with the reference of a scene at the file's size.
 
-    `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what
-    it holds, see `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area', see
-    `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what
-    fits; `mask`: an EXR file that is 0 in pixels to leave out; `all_metrics`: see
-    `validation.comparison.images.compare_images`; `margin`: largest relative bias [1] that counts
-    as agreement; with standard errors, what they can show counts.
+    Parameters
+    ----------
+    scene
+        A built-in scene or a Mitsuba XML file.
+    path
+        The EXR file.
+    layer, holds
+        The layer to judge and what it holds, see `validation.engine.seen.judged_layer`.
+    pixel
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the
+        image says of itself, or what fits.
+    mask
+        An EXR file that is 0 in pixels to leave out.
+    margin
+        Largest relative bias [1] that counts as agreement; an image with standard errors must show
+        with them that its bias is within it.
+    all_metrics
+        See `validation.comparison.images.compare_images`.
+    progress
+        Called with (fraction done, what).
     """
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
@@ -200,13 +214,23 @@ def judge_image(
     margin: float | None = None,
     **metrics: Any,
 ) -> EngineComparison:
-    """Judge a layer of an image by the reference of its scene, as
-    `compare_scene` and the report do.
+    """Judge a layer of an image by the reference of its scene, as in `compare_scene` and reports.
 
-    `image`, `judged`: the image, and the layer of it; `loaded`, `reference_of`: the scene at its
-    size, and what computes its reference for 'centre' or 'area'; `mask`: which pixels are compared,
-    (height, width); all by default; `metrics`: more for
-    `validation.comparison.images.compare_images`.
+    Parameters
+    ----------
+    image, judged
+        The image, and the layer of it.
+    loaded, reference_of
+        The scene at the size of the image, and a function that computes its reference for 'centre'
+        or 'area'.
+    path
+        The name of the image in messages.
+    pixel, margin
+        See `compare_scene`.
+    mask
+        Which pixels are compared, (height, width); all by default.
+    metrics
+        More parameters of `validation.comparison.images.compare_images`.
     """
     # Pixels outside of the mask count nowhere: neither in what pixels are, nor in the verdict.
     check_margin(margin)
@@ -216,7 +240,7 @@ def judge_image(
             judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan)
         )
     kind, hints = fitting_kind(judged, reference_of, kinds)
-    # Light of another kind says nothing of the pixels: either reference may fit it.
+    # An image of another kind of light does not say what its pixels are: either reference may fit.
     other = _other_light(judged, [reference_of(each) for each in (kinds[0], kind.pixel)])
     hints, fitting = replace(hints, words=(*hints.words, *other)), reference_of(kind.pixel)
     # The comparison gets the layer and the reference under one name, with their standard errors if
@@ -276,8 +300,8 @@ def references(
 
 
 def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
-    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in
-    the middle of the image].
+    """Return the distance of each pixel from the nearest light, (height, width) [pixels in the
+    middle of the image].
     """
     angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
     return (
@@ -288,8 +312,8 @@ def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
 
 
 def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[str, ...]:
-    """Say so where an image is the airlight or the surface alone, or all light, and
-    not what it was taken for.
+    """Return a sentence where an image is the airlight or the surface alone, or all light, and was
+    taken for another of these.
     """
     # The mean square error against each kind of light, by the reference that fits better, and the
     # mean square of that light itself.
@@ -305,7 +329,8 @@ def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[st
         )
         if GAIN**2 * without_lights < with_lights:
             return (
-                "the image does not show the area lights that the camera sees: compare its airlight",
+                "the image does not show the area lights that the camera sees: "
+                "compare its airlight",
             )
     for name in KINDS:
         layers = [reference_layer(reference, name, emitted=judged.emitted) for reference in fitting]

@@ -63,7 +63,7 @@ class JudgedLayer:
     name: str
     holds: str  #: 'airlight', 'surface' or 'total'
     values: NDArray[np.floating]  #: (height, width, 3) [W/(m^2 sr)]
-    #: whether its total shows the area lights themselves: files of our own do not
+    #: whether a layer of all light shows the area lights themselves: files of our own do not
     emitted: bool = True
 
     @property
@@ -77,9 +77,20 @@ def judged_layer(
 ) -> JudgedLayer:
     """Return the layer to judge.
 
-    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the
-    only layer, else the only one that Blender calls Combined; `holds`: what it holds, one of
-    `KINDS`: by default what its name says, else all light.
+    Parameters
+    ----------
+    image, path
+        The image, and its name in messages.
+    name
+        The layer. By default 'airlight' where there is one, else the plain channels, else the only
+        layer, else the only one that Blender calls Combined.
+    holds
+        What the layer holds, one of `KINDS`; by default what its name says, else all light.
+
+    Raises
+    ------
+    InputError
+        If `holds` is no such word, or no layer is the usual one.
     """
     if holds is not None and holds not in KINDS:
         raise InputError(f"holds {holds}; expected one of {', '.join(KINDS)}")
@@ -272,8 +283,8 @@ def seen_image(
 def layers_of(
     image: Image, path: str, name: str | None, holds: str | None
 ) -> tuple[JudgedLayer, ...]:
-    """Return the layers to explain: the one that is named, or airlight and surface
-    where an image has both.
+    """Return the layers to explain: the named layer, or airlight and surface where an image
+    has both.
     """
     if name is None and holds is None and {AIRLIGHT, SURFACE} <= image.layers.keys():
         return tuple(judged_layer(image, path, name=each) for each in (AIRLIGHT, SURFACE))
@@ -354,8 +365,8 @@ def needed_samples(reference: ReferenceScene) -> int:
     """Return how many samples stand for an area light: twice as many until
     the image hardly changes.
 
-    A window before pillars needs 128 where a lamp above an edge needs 16: each
-    sample has its own shadows.
+    A window before pillars needs 128 samples where a lamp above an edge needs 16: each sample has
+    its own shadows.
     """
     samples, fog = SAMPLES, scene_fog(reference)
     if not reference.area:

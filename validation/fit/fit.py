@@ -121,17 +121,36 @@ def fit_image(
 ) -> Fit:
     """Find the parameters that explain an image.
 
-    `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it,
-    and what is not looked for; `parameters`, `starts`: what is looked for, see
-    `validation.fit.unknowns`, and values to begin with; the scene's own by default; `layer`,
-    `holds`: which layer, and what it holds, see `validation.engine.seen.judged_layer`; `pixel`:
-    'centre' or 'area'; by default what the image says of itself, or what fits better; `mask`: which
-    pixels may take part, (height, width); all by default.
-
     Valid for single scattering: homogeneous media and height fog, point and spot lights,
     directional ones where media have bounds or density falls with height; area lights are 16 to 128
     samples here, which leaves some 0.5 % in a pixel. The intervals count pixels as independent of
     one another.
+
+    Parameters
+    ----------
+    image, path
+        The image, and its name in messages.
+    loaded
+        The scene at the size of the image: it says the geometry, the camera, the lights, and all
+        parameters that are not looked for.
+    parameters
+        The names of the parameters that are looked for, see `validation.fit.unknowns`.
+    layer, holds
+        The layer, and what it holds, see `validation.engine.seen.judged_layer`.
+    pixel
+        'centre' or 'area'; by default what the image says of itself, or what fits better.
+    mask
+        Which pixels may take part, (height, width); all by default.
+    starts
+        Values to begin with, by the name of the parameter; by default the values of the scene.
+    progress
+        Called with (fraction done, what).
+
+    Raises
+    ------
+    InputError
+        If too few pixels say something, the scene has no parameter of a name, or fits do not
+        predict the scene.
     """
     # What is judged, which pixels take part, and which numbers are looked for.
     took = stopwatch()
