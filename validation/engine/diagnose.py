@@ -220,7 +220,7 @@ def diagnose_image(
     compared = judge_image(
         image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data()
     )
-    # Of a right image the comparison has decided what its pixels are. Elsewhere every kind of pixel
+    # The comparison has decided what the pixels of a right image are. Elsewhere every kind of pixel
     # has an attempt with the faults that cost nothing, and the smaller error decides. An image that
     # is wrong as a whole, such as a black one, needs no search.
     light = light or SceneLight(seen.reference)

@@ -96,7 +96,7 @@ def measure_image(
     or 'area'; `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers
     that were judged by what they hold, and the error of the surface where an image has both layers.
     """
-    # Of an image with both layers the airlight is judged; the surface has an error beside it.
+    # The airlight of an image with both layers is judged; the surface has an error beside it.
     image = read_exr(shown.path)
     layer = judged_layer(image, shown.path)
     layers = {layer.holds: layer.values}

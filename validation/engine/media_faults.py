@@ -364,7 +364,8 @@ MEDIUM = (
     *(
         Fault(
             "depth-axis",
-            f"distances along the axis of the camera were taken for distances along the ray {where}",
+            "distances along the axis of the camera were taken for distances along the ray "
+            f"{where}",
             change,
             needs=needs,
         )

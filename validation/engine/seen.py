@@ -85,7 +85,7 @@ def judged_layer(
         The layer. By default 'airlight' where there is one, else the plain channels, else the only
         layer, else the only one that Blender calls Combined.
     holds
-        What the layer holds, one of `KINDS`; by default what its name says, else all light.
+        The kind of light in the layer, one of `KINDS`; by default as its name says, else all light.
 
     Raises
     ------

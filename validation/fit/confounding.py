@@ -4,9 +4,9 @@
 Where a combination of steps changes no pixel, the derivatives are linearly dependent: albedo
 against intensity in the airlight, always; exposure against the intensity of the only light. The
 columns of the derivatives are divided by their lengths. Their singular vectors with a singular
-value below a millionth of the largest are such combinations. Of the parameters in them, as many
-stay free as the image determines; later ones in the list are held, and free ones stand for products
-with the ones that are held.
+value below a millionth of the largest are such combinations. As many of the parameters in them stay
+free as the image determines; later ones in the list are held, and free ones stand for products with
+the ones that are held.
 """
 
 import math

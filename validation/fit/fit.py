@@ -152,7 +152,7 @@ def fit_image(
         If too few pixels say something, the scene has no parameter of a name, or fits do not
         predict the scene.
     """
-    # What is judged, which pixels take part, and which numbers are looked for.
+    # The layer that is fitted, the pixels that take part, and the numbers that are looked for.
     took = stopwatch()
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
@@ -219,7 +219,7 @@ def _solved(
     start = best_start(
         Model.of(few, unknowns) if len(model.image) > 4 * few.seen.most_pixels else model
     )
-    # Of parameters that the image does not tell apart some are held from here on.
+    # Some of the parameters that the image does not tell apart are held from here on.
     groups = confounded_groups(
         (model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns))
     )

@@ -132,8 +132,8 @@ class View:
         """
 
         def lit_parts() -> Any:
-            # What can stand in the light: nothing without shadows, and only what lies before an
-            # area light for the samples on it.
+            # The shapes that can stand in the light: none without shadows; for the samples of an area
+            # light neither its own shape nor what lies behind it.
             reference, shapes = self.reference, self.shapes
             empty = self._once("empty", lambda: mi.load_dict({"type": "scene"}))
             if not shadows:
@@ -173,8 +173,8 @@ class View:
         rays, ray = reach.rays, reach.lit.ray
         if not len(ray):
             return reach
-        # Every interval is divided into `steps` equal angles at the light. Of the 2 steps + 1
-        # places the odd ones are the middles, which shadow rays test, the even ones the ends.
+        # Every interval is divided into `steps` equal angles at the light. Shadow rays test their
+        # middles, the odd ones of the 2 steps + 1 places; the even places are their ends.
         # A light with a cosine is one of many samples, which smooth its shadows together.
         low, high = (rays.theta(x, ray)[:, None] for x in (reach.lit.low, reach.lit.high))
         steps = self.steps // 4 if light.cosine else self.steps
