@@ -132,8 +132,8 @@ class View:
         """
 
         def lit_parts() -> Any:
-            # The shapes that can stand in the light: none without shadows; for the samples of an area
-            # light neither its own shape nor what lies behind it.
+            # The shapes that can stand in the light: none without shadows; for the samples of an
+            # area light neither its own shape nor what lies behind it.
             reference, shapes = self.reference, self.shapes
             empty = self._once("empty", lambda: mi.load_dict({"type": "scene"}))
             if not shadows:
