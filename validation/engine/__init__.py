@@ -4,13 +4,13 @@
 Read in this order:
 
 - `seen.py`: which layer of an image is judged, its values, and the pixels that take part;
-- `prediction.py`: what a fog, lights, a camera and an encoding make of a scene;
+- `prediction.py`: the image of a scene for a fog, lights, a camera and an encoding;
 - `curves.py`: encodings and tone curves;
 - `fault.py`: what a fault is, and how it changes a guess;
 - `media_faults.py`, `light_faults.py`, `image_faults.py`, `layer_faults.py`: the faults;
-- `faults.py`: the catalogue of all, and those of single lights;
+- `faults.py`: the catalogue of all faults, and the faults of single lights;
 - `search.py`: the parameters with which faults fit best;
-- `evidence.py`: how much speaks for an explanation, and whether it leaves anything;
+- `evidence.py`: how much speaks for an explanation, and whether it leaves noise alone;
 - `error_place.py`: where an error lies;
 - `diagnose.py`: what is wrong with an image;
 - `hints.py`: what may be wrong with an image as a whole, without any path of light;

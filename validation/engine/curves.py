@@ -18,7 +18,7 @@ def to_srgb(linear: Array) -> Array:
 
 
 def from_srgb(encoded: Array) -> Array:
-    """Return the linear values of those encoded by that curve."""
+    """Return linear values, given values encoded by the curve of IEC 61966-2-1."""
     with np.errstate(invalid="ignore"):
         return np.where(
             encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4
@@ -26,7 +26,7 @@ def from_srgb(encoded: Array) -> Array:
 
 
 def srgb_in_8_bits(radiance: Array) -> Array:
-    """Return values after 8-bit encoding by that curve, as numbers from 0 to 1."""
+    """Return values encoded by the same curve in 8 bits, as numbers from 0 to 1."""
     return np.round(255 * np.clip(to_srgb(radiance), 0.0, 1.0)) / 255
 
 
@@ -79,6 +79,7 @@ _AGX_AFTER = np.array(
 
 
 def _by_stops(curve: tuple[float, ...], radiance: Array) -> Array:
+    # Stops over middle grey; black, which has no logarithm, is the lowest one.
     stops = np.log2(np.maximum(radiance, 1e-30) / 0.18)
     return np.asarray(PchipInterpolator(_STOPS, curve)(np.clip(stops, _STOPS[0], _STOPS[-1])))
 
@@ -89,7 +90,8 @@ def blender_filmic(radiance: Array) -> Array:
 
 
 def agx(radiance: Array) -> Array:
-    """Return Blender's view transform AgX, which it begins with."""
+    """Return Blender's view transform AgX, its default."""
+    # The curve is applied to mixed channels and leaves encoded values; mixing back is linear.
     encoded = _by_stops(_AGX, radiance @ _AGX_BEFORE.T)
     linear = from_srgb(encoded)
     return np.clip(to_srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
@@ -111,19 +113,21 @@ _BRADFORD = np.array(
 
 def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
     """Return the matrix from colours to Bradford's cone responses over those of white."""
+    # Columns are the XYZ of red, green, blue and white at Y = 1. The primaries are scaled so that
+    # they add up to white, and the cone responses divided by those of white.
     xyz = np.array([(x / y, 1.0, (1 - x - y) / y) for x, y in space]).T
     cones = _BRADFORD @ xyz
     return (cones[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])) / cones[:, 3:]
 
 
-#: Matrices from colours with the primaries of sRGB to others, white to white,
-#: by the name of the others.
+#: Matrices from colours with the primaries of sRGB to colours with others, white to white, by the
+#: name of the others.
 PRIMARIES: Mapping[str, Array] = {
     name: np.asarray(np.linalg.solve(_to_cones(space), _to_cones(_SRGB)), dtype=np.float64)
     for name, space in _SPACES.items()
 }
 
-#: By what is said of an image.
+#: Tone curves by the words for them in a sentence on an image.
 TONE_CURVES: Mapping[str, Callable[[Array], Array]] = {
     "the tone curve x/(1 + x)": reinhard,
     "the tone curve 1 - exp(-x)": exponential,

@@ -4,14 +4,15 @@ make, and the data choose.
 
 1. An image that is right by `validation.engine.judge` is right: no fault is looked for.
    One that is black is black.
-2. Faults are tried alone, those that need paths of their own only where no other one leaves noise;
-   where none does, pairs of faults of different kinds. Whether pixels are centres or means is
-   decided once, by what the faults without paths of their own leave of the image.
-3. The explanation with the most evidence is chosen, or the simplest of those that are
-   as good (`evidence.py`).
+2. Faults without paths of their own are tried alone. Where none of them leaves noise alone, pairs
+   of faults of different kinds follow, and then the faults that need paths of their own. Whether
+   pixels are centres or means is decided once, by the errors that the faults without paths of their
+   own leave.
+3. The explanation with the most evidence is chosen, or the simplest one of all that are as good
+   (`evidence.py`).
 4. It is named if its evidence and the fraction of the error that it leaves are within the limits of
-   the calibration (`calibration.json`): chosen so that of right images with errors of engines at
-   most 5 % have a name.
+   the calibration (`calibration.json`). The limits are chosen so that the diagnosis names a fault
+   in at most 5 % of the right images with errors of engines.
 """
 
 import os
@@ -50,17 +51,8 @@ from airlight.validation.scenes.loading import LoadedScene
 
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
 
-_FEWEST = 16  # pixels
-# faults whose numbers are found to all digits: those that leave least after a coarse search
-_REFINED = 5
-_FAR = 3.0  # errors over the least one that more digits do not bring down to it
-_PARTNERS = 6  # faults, those that leave least, with which all others are tried as pairs
-_PAIRS = 12  # pairs that are followed, those that leave least where they begin
 _LITTLE = 0.05  # fraction of the error: less is no second fault, nor another image
-_ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
-_SHOWN, _PRINTED = 8, 5
-_CERTAIN = 1e4  # evidence beyond which the number says no more
-# of the time: faults by what they cost, and pairs
+# Fractions of the progress: faults of the costs 0, 1 and 2, and pairs, which follow the cost 0.
 _PARTS = (0.0, 0.3), (0.5, 0.8), (0.8, 1.0), (0.3, 0.5)
 
 
@@ -71,7 +63,7 @@ class Ranked:
     name: str
     parameters: tuple[float, ...]
     words: str
-    residual: float  #: mean relative error that it leaves, with what stands beside it
+    residual: float  #: mean relative error that it leaves, together with the others of `together`
     evidence: float  #: score against the unchanged scene, see `validation.engine.evidence`
     #: names of all that explain the image together, where it takes more than one
     together: tuple[str, ...]
@@ -85,13 +77,13 @@ class Diagnosis:
     path: str
     layer: str
     pixel: str  #: 'centre' or 'area'
-    #: name of the first explanation; 'right', 'black' or 'unexplained' where it is no fault
+    #: name of the first explanation: a fault, or 'right', 'black' or 'unexplained'
     first: str
     ranked: tuple[Ranked, ...]  #: one where no fault was looked for
     residual: float  #: mean relative error of the image as it is
-    left: float  #: what the first explanation leaves of it
-    rest: str  #: what that is: like noise, or little; empty where it is neither
-    explained: bool  #: whether that is nothing to explain
+    left: float  #: mean relative error that the first explanation leaves
+    rest: str  #: whether this error is like noise, or little; empty where it is neither
+    explained: bool  #: whether the first explanation leaves nothing to explain
     place: str  #: where the remaining error lies; empty where it is like noise, or little
     #: which pixels are wrong where these are few and all others are right; empty otherwise
     few: str
@@ -112,11 +104,10 @@ class Diagnosis:
         lines += [f"The file: {self.note}."] if self.note else []
         if len(self.ranked) < 2:  # no fault was looked for
             return lines
+        # Five rows are printed. Evidence beyond 10 000 says no more by its digits.
         lines += ["", f"{'fault':<16} {'left':>9} {'evidence':>9}  what it says"]
-        for row in self.ranked[:_PRINTED]:
-            weight = (
-                f"{row.evidence:.0f}" if abs(row.evidence) < _CERTAIN else f"{row.evidence:.1e}"
-            )
+        for row in self.ranked[:5]:
+            weight = f"{row.evidence:.0f}" if abs(row.evidence) < 1e4 else f"{row.evidence:.1e}"
             lines.append(f"{row.name:<16} {_percent(row.residual):>9} {weight:>9}  {row.words}")
         return [
             *lines,
@@ -137,15 +128,16 @@ class Diagnosis:
             return [f"The image is black: {self.verdict}."]
         if self.first == UNEXPLAINED:
             return [f"Nothing here explains it{place} ({self.verdict})."]
+        # A pair of faults is two rows, each of which names both.
         together = [row for row in self.ranked if row.together]
-        both = (
+        pair = (
             f"Two faults explain it: {'; and '.join(row.words for row in together)}."
             if together
             else ""
         )
         more = f"more than noise: something else is wrong too{place}"
         return [
-            both or f"{self.first}: {self.ranked[0].words}.",
+            pair or f"{self.first}: {self.ranked[0].words}.",
             f"Without that, values are {_percent(self.left)} off in the mean, which is "
             f"{self.rest or more}.",
         ]
@@ -170,11 +162,13 @@ def diagnose_file(
     several = layers_of(image, str(path), layer, holds)
     loaded = scene_of_size(scene, several[0].size, path)
     how["reference_of"] = references(loaded)
-    found = [
+    diagnoses = [
         diagnose_image(image, loaded, path=str(path), layer=each.name, holds=each.holds, **how)
         for each in several
     ]
-    return tuple(each for each in found if each.first != BLACK or each.residual > 0) or tuple(found)
+    # A black layer without an error is right: it is left out, unless there is no other layer.
+    telling = tuple(each for each in diagnoses if each.first != BLACK or each.residual > 0)
+    return telling or tuple(diagnoses)
 
 
 def diagnose_image(
@@ -200,7 +194,7 @@ def diagnose_image(
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     light
-        The light of this scene, as other images of it have found it.
+        The paths of light of this scene, which several images of it share.
     reference_of
         A function that computes the scene's reference for 'centre' or 'area'.
     progress
@@ -213,10 +207,11 @@ def diagnose_image(
     """
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, failures = seen_image(image, judged, loaded.scene)
-    if (count := int(seen.used.sum())) < _FEWEST:
+    fewest = 16  # pixels
+    if (count := int(seen.used.sum())) < fewest:
         raise InputError(
             f"{path}: {count} pixels of the layer '{judged.name}' say something; expected at least "
-            f"{_FEWEST}, finite "
+            f"{fewest}, finite "
             "and not of a light itself: fewer do not tell a fault from noise"
         )
     # The comparison decides whether anything is wrong; the diagnosis says what,
@@ -225,6 +220,9 @@ def diagnose_image(
     compared = judge_image(
         image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data()
     )
+    # The comparison has decided what the pixels of a right image are. Elsewhere every kind of pixel
+    # has an attempt with the faults that cost nothing, and the smaller error decides. An image that
+    # is wrong as a whole, such as a black one, needs no search.
     light = light or SceneLight(seen.reference)
     pixels = (compared.pixel,) if compared.verdict.right else pixel_kinds(image, pixel)
 
@@ -234,8 +232,9 @@ def diagnose_image(
             attempt.try_faults(0)
         return attempt
 
-    kind, attempt = decide_pixel(pixels, begun, lambda found: [each.chosen.error for each in found])
-    said = Diagnosis(
+    kind, attempt = decide_pixel(pixels, begun, lambda each: [one.chosen.error for one in each])
+    # The diagnosis of a right image, from which the others differ by what a search finds.
+    diagnosis = Diagnosis(
         scene=loaded.name,
         path=path,
         layer=judged.name,
@@ -253,19 +252,21 @@ def diagnose_image(
         note=str(image.attributes.get(NOTE, "")),
     )
     if compared.verdict.right:
-        return said
+        return diagnosis
     if compared.hints.reason:
         first = BLACK if "black" in compared.hints.reason else UNEXPLAINED
-        row = Ranked(first, (), compared.hints.reason, said.residual, 0.0, ())
-        return replace(said, first=first, ranked=(row,), rest="", explained=False)
+        row = Ranked(first, (), compared.hints.reason, diagnosis.residual, 0.0, ())
+        return replace(diagnosis, first=first, ranked=(row,), rest="", explained=False)
+    # Where a few pixels are wrong and all others right, such as a mark on the image, no path of
+    # light explains it: the costly faults are not tried.
     few = "" if attempt.chosen.faults else all_but_few(compared)
     if not few:
         attempt.go_on()
-    return _concluded(said, attempt, compared, few)
+    return _concluded(diagnosis, attempt, compared, few)
 
 
 def _concluded(
-    said: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str
+    diagnosis: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str
 ) -> Diagnosis:
     """Return a diagnosis with what a search has found."""
     chosen = attempt.chosen
@@ -276,12 +277,13 @@ def _concluded(
         first, chosen = RIGHT, attempt.right
     else:
         first = UNEXPLAINED
+    # The record has eight rows. Where the error lies is said only if it is not explained.
     rest = attempt.rest(chosen)
     explained = bool(rest) and first != UNEXPLAINED
     return replace(
-        said,
+        diagnosis,
         first=first,
-        ranked=tuple(attempt.ranked(chosen)[:_SHOWN]),
+        ranked=tuple(attempt.ranked(chosen)[:8]),
         left=chosen.error,
         rest=rest,
         explained=explained,
@@ -326,6 +328,7 @@ class _Attempt:
         Each pair has one of the faults that leave least, and starts from the values found for its
         faults alone; the best pairs are followed until one leaves nothing to explain.
         """
+        # Single faults that cost nothing, by what they leave; some are never half of a pair.
         ordered = sorted(self.found, key=lambda each: each.error)
         cheap = [
             each.faults[0]
@@ -335,23 +338,28 @@ class _Attempt:
         # An exposure is wrong beside anything else, and alone explains little
         # where a curve comes after it.
         cheap.sort(key=lambda fault: fault.name != "factor")
-        both = [
+        # The first six faults are tried with all that follow them.
+        pairs = [
             _in_order(a, b)
-            for n, a in enumerate(cheap[:_PARTNERS])
+            for n, a in enumerate(cheap[:6])
             for b in cheap[n + 1 :]
             if _differ(a, b)
         ]
+        # First half of the time: the error of each pair at its best start, on few pixels.
         few, begun = self.predictor.few, []
-        for number, pair in enumerate(both):
+        for number, pair in enumerate(pairs):
             self._tell(
-                _PARTS[-1], 0.5 * number / len(both), " and ".join(fault.name for fault in pair)
+                _PARTS[-1], 0.5 * number / len(pairs), " and ".join(fault.name for fault in pair)
             )
             begun.append((*begin(few, pair), pair))
         begun.sort(key=lambda each: each[0])
+        # Second half: the twelve pairs that leave least are followed, on few pixels first. All
+        # pixels are looked at only if a pair leaves much less than the best single fault.
+        most = 12
         explanations: list[Explanation] = []
-        for number, (_, near, pair) in enumerate(begun[:_PAIRS]):
+        for number, (_, near, pair) in enumerate(begun[:most]):
             self._tell(
-                _PARTS[-1], 0.5 + 0.5 * number / _PAIRS, " and ".join(fault.name for fault in pair)
+                _PARTS[-1], 0.5 + 0.5 * number / most, " and ".join(fault.name for fault in pair)
             )
             rough = explain(few, pair, near, fine=False)
             if rough.error < LEFT * ordered[0].error:
@@ -361,13 +369,14 @@ class _Attempt:
         self.found += explanations
 
     def is_settled(self, explanation: Explanation) -> bool:
-        """Return whether nothing is left that another fault could explain: noise, or little."""
+        """Return whether an explanation leaves noise, or little: nothing for another fault."""
         return self.blocks.is_noise(explanation) or self._is_little(explanation)
 
     def _is_little(self, explanation: Explanation) -> bool:
-        """Return whether an explanation leaves no more than the fog model's error in
-        its place, or nearly so.
+        """Return whether an explanation leaves no more than the error of the fog model itself, or
+        little more.
         """
+        # A twentieth of the error of the image is little too, up to the model's error of means.
         most = max(KNOWN[self.pixel], min(KNOWN["area"], _LITTLE * self.right.error))
         return explanation.error <= most
 
@@ -386,8 +395,8 @@ class _Attempt:
 
     @property
     def chosen(self) -> Explanation:
-        """The explanation with the most evidence, or the simplest of those that are as
-        good; or the scene as it is.
+        """The explanation with the most evidence, or the simplest of all that are as good; or the
+        scene as it is.
         """
         singles = [each for each in self.found if len(each.faults) == 1]
         pairs = [each for each in self.found if len(each.faults) > 1]
@@ -400,19 +409,18 @@ class _Attempt:
         return best
 
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:
-        """Return the explanation with the most evidence, or the simplest of those that are as good.
+        """Return the explanation with the most evidence, or the simplest of all that are as good.
 
         A further number is worth its error only where the simpler explanation leaves more than
-        little: fog of a scale height of 10 km is an extinction, and one of 90 m that fits a rest of
-        0.1 % is it too.
+        little: fog with a scale height of 10 km is an extinction, and so is fog with a scale height
+        of 90 m that fits a rest of 0.1 %.
         """
+        # Explanations whose evidence differs by five are as good as one another.
         weights = self._evidence(explanations)
         ordered = sorted(zip(weights, explanations, strict=True), key=lambda each: -each[0])
         most, best = ordered[0]
         alike = [
-            each
-            for weight, each in ordered
-            if weight >= most - _ALIKE or self._is_as_good(each, best)
+            each for weight, each in ordered if weight >= most - 5.0 or self._is_as_good(each, best)
         ]
         return min(alike, key=lambda each: (each.parameters, len(each.faults)))
 
@@ -429,7 +437,9 @@ class _Attempt:
         return apart <= _LITTLE * self.right.error and (leaves_little or hardly_more)
 
     def _evidence(self, explanations: Iterable[Explanation]) -> list[float]:
-        """Return the evidence of explanations, by what the best of all leaves."""
+        """Return the evidence of explanations."""
+        # The explanation that leaves least says how large the errors are that no fault makes, and
+        # how many pixels count as one: the same scale for all explanations.
         least = min([self.right, *self.found], key=lambda each: scale_of(each, self.pixel))
         scale, area = scale_of(least, self.pixel), self.blocks.area(least.errors, least.lit)
         return [evidence(each, self.right, scale, max(area, 1.0)) for each in explanations]
@@ -440,6 +450,7 @@ class _Attempt:
         weights = dict(
             zip(map(id, [chosen, *singles]), self._evidence([chosen, *singles]), strict=True)
         )
+        # Several faults have one name, such as the laws of distance: the best one is listed.
         rows = _rows(chosen, weights[id(chosen)])
         named = {row.name for row in rows}
         for each in sorted(singles, key=lambda each: -weights[id(each)]):
@@ -449,11 +460,13 @@ class _Attempt:
         return rows
 
     def _refined(self, explanations: list[Explanation]) -> list[Explanation]:
-        """Return explanations, the few that leave least with all digits."""
+        """Return explanations; the few that leave least have their parameters to all digits."""
+        # After a coarse search the best five faults are refined. More digits do not bring an error
+        # down from three times the least error, or three times the error of the model.
         least = min((each.error for each in [*self.found, *explanations]), default=1.0)
         finer: dict[int, Explanation] = {}
-        for each in sorted(explanations, key=lambda each: each.error)[:_REFINED]:
-            if each.parameters and each.error < _FAR * max(least, KNOWN[self.pixel]):
+        for each in sorted(explanations, key=lambda each: each.error)[:5]:
+            if each.parameters and each.error < 3.0 * max(least, KNOWN[self.pixel]):
                 finer[id(each)] = explain(self.predictor, each.faults, each.values)
         return [finer.get(id(each), each) for each in explanations]
 

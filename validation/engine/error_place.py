@@ -15,15 +15,7 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation
 
-_MOST = 0.9  # fraction of the squared error that is most of it
-_FEW = 0.01  # fraction of the pixels that counts as few
 _BESIDE = 3.0  # pixels from a light
-_STEP = 1.5  # ratio of neighbours across an edge
-_BENT = 0.05  # of the largest of one over the depth: by how much it bends at the outline of a shape
-_WIDE = 4  # pixels from an outline: as far as low resolutions and filters carry an error
-_MORE = 1.7  # how much larger the error is where it lies than all over the image
-_FRACTION = 0.5  # of the error, that lies there
-_RINGS = 0.5  # fraction of the squared error that only depends on the angle to a light
 _PLACES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 
 
@@ -45,7 +37,10 @@ class ErrorPlace:
         kinds = {"lamp": "beside a light", "edge": "at edges of light and shadow"}
         if not self.few:
             where = f", most of them {kinds[self.kind]}" if self.kind else ""
-            return f"spread: {100 * self.fraction:.3g} % of the squared error in {self.pixels} pixels{where}"
+            return (
+                f"spread: {100 * self.fraction:.3g} % of the squared error in "
+                f"{self.pixels} pixels{where}"
+            )
         single = self.pixels == 1
         place = f"{kinds[self.kind]}, " if self.kind else ""
         at = "" if single else "the worst "
@@ -69,89 +64,97 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     total = float(squared.sum())
     if total == 0:
         return None
+    # The fewest pixels that have nine tenths of the squared error: the largest errors come first.
     order = np.argsort(squared, axis=None)[::-1]
     below = np.cumsum(squared.reshape(-1)[order]) / total
-    count = min(int(np.searchsorted(below, _MOST)) + 1, squared.size)
+    count = min(int(np.searchsorted(below, 0.9)) + 1, squared.size)
     chosen = np.zeros(squared.size, dtype=bool)
     chosen[order[:count]] = True
     rest = squared.reshape(-1)[~chosen]
     mean = float(reference[np.isfinite(reference)].mean())
     chosen = chosen.reshape(squared.shape)
     row, column = divmod(int(order[0]), squared.shape[1])
+    # A kind of place is named where more than half of the pixels lie at it, a light before an edge.
     light = np.where(np.isfinite(reference), reference, 0.0).sum(axis=2)
     lamp, edge = (light_pixels[chosen] < _BESIDE).mean() > 0.5, at_edges(light)[chosen].mean() > 0.5
     kind = "lamp" if lamp else "edge" if edge else ""
-    left = (
+    rmse_without = (
         math.sqrt(float(rest.mean()) / reference.shape[2]) / mean if len(rest) and mean > 0 else 0.0
     )
+    # A hundredth of the pixels counts as few.
     return ErrorPlace(
         count,
         float(below[count - 1]),
         (column, row),
         kind,
-        left,
-        count <= max(1, _FEW * squared.size),
+        rmse_without,
+        count <= max(1, 0.01 * squared.size),
     )
 
 
 def at_edges(values: Array) -> Bools:
-    """Return where a pixel or one beside it is much larger than another
-    of these, (height, width).
+    """Return where the values of 3 x 3 neighbouring pixels differ by more than a factor of 1.5,
+    (height, width).
     """
     return np.asarray(
-        maximum_filter(values, 3, mode="nearest")
-        > _STEP * minimum_filter(values, 3, mode="nearest")
+        maximum_filter(values, 3, mode="nearest") > 1.5 * minimum_filter(values, 3, mode="nearest")
     )
 
 
 def place_words(predictor: Predictor, explanation: Explanation) -> str:
     """Say where the error lies that an explanation leaves, such as 'at the edges of shapes'."""
+    # Signed errors say whether they depend on an angle, their sizes where they lie, (m,) each.
     reference, (height, width) = predictor.reference, predictor.shape
     errors = explanation.errors.mean(axis=1)
     size = np.abs(explanation.errors).mean(axis=1)
     row, column = np.divmod(predictor.pixels, width)
     regions: list[tuple[str, Bools]] = []
     for words, angle in _angles(reference):
+        # `step` is the usual angle between neighbouring pixels, by which pixels are measured.
         pixel = angle.reshape(height, width)
         step = float(np.median(np.abs(np.diff(pixel, axis=1)))) or math.inf
         regions.append((f"beside {words}", (angle < 2 * _BESIDE * step)[predictor.pixels]))
     # One over the depth is linear in the image of a plane: what bends it is an outline.
     depth = surface_hits(reference).distance * (reference.direction @ predictor.view.axis)
     inverse = (1 / depth).reshape(height, width)
-    outline = np.abs(laplace(inverse, mode="nearest")) > _BENT * inverse.max()
-    wide = binary_dilation(outline, iterations=max(1, min(_WIDE, min(height, width) // 12) - 1))
+    outline = np.abs(laplace(inverse, mode="nearest")) > 0.05 * inverse.max()
+    # Four pixels from an outline, less in small images: as far as low resolutions and filters carry
+    # an error.
+    wide = binary_dilation(outline, iterations=max(1, min(4, min(height, width) // 12) - 1))
     regions.append(("at the edges of shapes", wide[row, column]))
-    # Relative errors, and radiance: beside a light the latter is most of all, at an
-    # outline in the dark the former.
-    shown, predicted = predictor.shown(explanation.guess), predictor.predicted(explanation.guess)
-    amount = np.nan_to_num(np.abs(shown - predicted).mean(axis=1))
-    found = [words for words, here in regions if _lies(size, here) or _lies(amount, here)]
-    if found:
-        return " and ".join(found)
+    # Relative errors are largest at an outline in the dark, errors of radiance beside a light: a
+    # place counts by either of them.
+    image, predicted = predictor.shown(explanation.guess), predictor.predicted(explanation.guess)
+    amount = np.nan_to_num(np.abs(image - predicted).mean(axis=1))
+    places = [words for words, mask in regions if _lies(size, mask) or _lies(amount, mask)]
+    if places:
+        return " and ".join(places)
+    # Neither at lights nor at outlines: rings around a light, or a ninth of the image.
     for words, angle in _angles(reference):
         if _is_ringed(errors, angle[predictor.pixels]):
             return f"in rings around {words}"
     for high, vertical in enumerate(_PLACES[0]):
         for across, horizontal in enumerate(_PLACES[1]):
-            here = (3 * row // height == high) & (3 * column // width == across)
-            if _lies(size, here):
+            mask = (3 * row // height == high) & (3 * column // width == across)
+            if _lies(size, mask):
                 return f"in the {vertical} {horizontal} of the image".replace(
                     "middle middle", "middle"
                 )
     return "all over the image"
 
 
-def _lies(size: Array, here: Bools) -> bool:
+def _lies(size: Array, mask: Bools) -> bool:
     """Return whether the error lies in some pixels: most of it, or far more
     for a pixel than elsewhere.
     """
-    if not 0.001 < here.mean() < 0.7 or size.sum() <= 0:
+    # A place that is most of the image, or hardly any of it, is no place.
+    if not 0.001 < mask.mean() < 0.7 or size.sum() <= 0:
         return False
-    inside, outside = float(size[here].mean()), float(size[~here].mean())
-    fraction = float(size[here].sum() / size.sum())
-    return inside > _MORE * outside and (
-        fraction > _FRACTION or (inside > 4 * outside and fraction > 0.05)
-    )
+    # The error of a pixel there is 1.7 times the error of others, and half of all errors lie there;
+    # or it is four times as large, and a twentieth lies there.
+    inside, outside = float(size[mask].mean()), float(size[~mask].mean())
+    fraction = float(size[mask].sum() / size.sum())
+    return inside > 1.7 * outside and (fraction > 0.5 or (inside > 4 * outside and fraction > 0.05))
 
 
 def _angles(reference: ReferenceScene) -> list[tuple[str, Array]]:
@@ -161,23 +164,28 @@ def _angles(reference: ReferenceScene) -> list[tuple[str, Array]]:
     places = [light.position for light in reference.lights] + [
         light.centre for light in reference.area
     ]
-    found = []
+    # A light more than 26 degrees outside of the image, behind the camera for instance, is no place
+    # in it.
+    angles = []
     for place in places:
         way = (place - reference.origin) / max(
             float(np.linalg.norm(place - reference.origin)), 1e-300
         )
         cosine = reference.direction @ way
         if cosine.max() > 0.9:
-            found.append(
+            angles.append(
                 ("the light" if len(places) == 1 else "a light", np.arccos(np.clip(cosine, -1, 1)))
             )
-    return found
+    return angles
 
 
 def _is_ringed(errors: Array, angle: Array) -> bool:
     """Return whether errors depend, for the most part, on the angle to a light."""
+    # Rings of the same number of pixels, 64 if there are enough. The squared error of the means of
+    # rings is what depends on the angle.
     order = np.argsort(angle)
     parts = np.array_split(errors[order], max(4, len(errors) // 64))
     smooth = sum(len(part) * float(part.mean()) ** 2 for part in parts)
-    alike = len(errors) * float(errors.mean()) ** 2  # of all rings, which is no ring
-    return smooth - alike > _RINGS * float(np.sum(errors**2))
+    # An error that is the same in all rings is no ring. The rest must be half of the squared error.
+    alike = len(errors) * float(errors.mean()) ** 2
+    return smooth - alike > 0.5 * float(np.sum(errors**2))

@@ -7,8 +7,8 @@ that three values count as one. The evidence of an explanation is this logarithm
 minus the logarithm for the unchanged scene.
 
 Neighbouring pixels share their errors where an image was denoised, has fog of a low resolution, or
-leans on its last frames; such pixels are no independent witnesses. Blocks of B x B pixels say how
-many count as one: with S the sum of the errors of a block and Q that of their squares,
+was accumulated over frames; such pixels are no independent witnesses. Blocks of B x B pixels say
+how many count as one: with S the sum of the errors of a block and Q the sum of their squares,
 
     A = sum over blocks of S^2 / sum over blocks of Q
 
@@ -33,8 +33,8 @@ from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
 
-#: Relative error of the fog model itself, in most pixels: of pixel centres the
-#: quadrature's, of means 3 x 3 rays'.
+#: Relative error of the fog model itself, in most pixels: of pixel centres the error of its
+#: quadrature, of means over pixels the error of 3 x 3 rays.
 KNOWN = {"centre": 3e-4, "area": 3e-3}
 
 _LIMITS = json.loads(Path(__file__).with_name("calibration.json").read_text(encoding="utf-8"))
@@ -42,12 +42,6 @@ _LIMITS = json.loads(Path(__file__).with_name("calibration.json").read_text(enco
 #: leave where that is no noise. `docs/tools/calibrate_diagnosis.py` chooses both and writes the
 #: file.
 EVIDENCE, LEFT = float(_LIMITS["evidence"]), float(_LIMITS["left"])
-
-_BLOCK = 8  # pixels, as in a comparison (`validation.engine.judge`)
-# along the shorter side of an image at least: a few blocks tell no noise from a gradient
-_BLOCKS = 6
-_CLIP = 3.0  # usual errors: beyond, single pixels such as those at a light would decide
-_SIGMAS = 2.0
 
 
 @dataclass(frozen=True)
@@ -60,8 +54,11 @@ class Blocks:
     @classmethod
     def of(cls, predictor: Predictor) -> "Blocks":
         """Return the blocks of what is looked at."""
+        # Eight pixels a side, as in a comparison (`validation.engine.judge`), but six blocks at
+        # least along the shorter side: a few blocks tell no noise from a gradient. Not all pixels
+        # are looked at, so that blocks have different numbers of them, or none.
         height, width = predictor.shape
-        side = max(1, min(_BLOCK, min(height, width) // _BLOCKS))
+        side = max(1, min(8, min(height, width) // 6))
         row, column = np.divmod(predictor.pixels, width)
         used, number = np.unique((row // side) * width + column // side, return_inverse=True)
         return cls(number, len(used))
@@ -72,8 +69,9 @@ class Blocks:
 
         `lit`: which values are not dark, (m, 3): the others have no noise.
         """
+        # Three usual errors: beyond, single pixels such as the ones at a light would decide.
         clipped = np.where(lit, errors, 0.0)
-        most = _CLIP * usual_size(errors[lit])
+        most = 3.0 * usual_size(errors[lit])
         clipped = np.clip(clipped, -most, most)
         sums = sum(np.sum(np.bincount(self.number, channel) ** 2) for channel in clipped.T)
         power = float(np.sum(clipped**2))
@@ -81,13 +79,14 @@ class Blocks:
 
     def is_noise(self, explanation: Explanation) -> bool:
         """Return whether what an explanation leaves is independent from pixel to pixel."""
+        # Two standard errors of A for independent pixels.
         area = self.area(explanation.errors, explanation.lit)
-        return area <= 1 + _SIGMAS * math.sqrt(2 / self.count)
+        return area <= 1 + 2.0 * math.sqrt(2 / self.count)
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:
-    """Return the scale of the errors that an explanation leaves [1]: the
-    fog model's own at least.
+    """Return the scale of the errors that an explanation leaves [1]: the error of the fog model at
+    least.
     """
     return max(usual_size(explanation.errors[explanation.lit]), KNOWN[pixel])
 
@@ -96,10 +95,13 @@ def evidence(explanation: Explanation, right: Explanation, scale: float, area: f
     """Return the evidence of an explanation against the unchanged scene; `area`: how
     many pixels count as one.
     """
+    # Schwarz's price of a number grows with the count of independent pixels, e at least, so that no
+    # number is free.
     gain = _likelihood(explanation.errors, scale) - _likelihood(right.errors, scale)
     independent = max(len(explanation.errors) / area, math.e)
     return gain / area - 0.5 * explanation.parameters * math.log(independent)
 
 
 def _likelihood(errors: Array, scale: float) -> float:
+    # The mean over channels: the three values of a pixel count as one.
     return -float(np.sum(np.mean(np.log1p((errors / scale) ** 2), axis=1)))

@@ -76,12 +76,12 @@ class Fault:
     begin: Callable[[Predictor, Guess], Sequence[Values]] | None = (
         None  #: values to begin with, by what the image shows
     )
-    solved: bool = False  #: whether these are the best already
-    #: The same with the paths held where they are for other values, which slopes can do with.
+    solved: bool = False  #: whether the values to begin with are the best already
+    #: The change with the paths of light held where they are for other values: enough for slopes.
     held: Callable[[Predictor, Guess, Values, Values], Guess] | None = None
     costly: int = 0  #: 1: tried where nothing of 0 explains the image; 2: where no pair does either
     single: bool = False  #: whether it is not tried together with another one
-    needs: tuple[str, ...] = ()  #: what the scene and its image must have for it, of `traits`
+    needs: tuple[str, ...] = ()  #: the `traits` that the scene and its image must have for it
     #: the image without it, (height, width, 3) -> the same
     undo: Callable[[Array], Array] | None = None
     factor: bool = False  #: whether its number is a factor that may have a name
@@ -95,8 +95,9 @@ class Fault:
 def factor_name(times: float) -> str:
     """Return the name of a factor in brackets, such as 4 pi, or nothing."""
     for word, value in _NAMED.items():
-        for name, known in ((word, value), (f"1/({word})", 1 / value)):
-            if abs(times / known - 1) < 0.01:
+        # A factor has a name if it agrees to 1 %.
+        for name, constant in ((word, value), (f"1/({word})", 1 / value)):
+            if abs(times / constant - 1) < 0.01:
                 return f" ({name})"
     return ""
 
@@ -176,6 +177,7 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         predictor.seen.holds,
         predictor.seen.values,
     )
+    # `optics` are the pairs of extinction and albedo of all channels of all media.
     spots, right = [light for light in reference.lights if light.axis is not None], Guess(fog)
     shapes, lobes = bool(reference.occluders.shapes()), any(isinstance(g, float) for g in fog.phase)
     optics = [

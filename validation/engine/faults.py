@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The catalogue of faults that an engine's image may have: what is said of each, and
-what it makes of a guess.
+"""The catalogue of faults that an engine's image may have.
 
-`airlight compare --diagnose` tries all of them; the hints of `airlight compare` are those with an
-`undo`, which takes a fault back from a whole image, without any path of light.
+`airlight compare --diagnose` tries all of them. The hints of `airlight compare` are the faults with
+an `undo`, which takes a fault back from a whole image, without any path of light.
 """
 
 from dataclasses import replace
@@ -16,7 +15,7 @@ from airlight.validation.engine.media_faults import MEDIUM
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.fog_model.view import light_sources
 
-_MANY_LIGHTS = 6  # of more, a fault of a single one is not looked for
+_MANY_LIGHTS = 6  # in a scene with more lights, no faults of single lights are looked for
 
 _TABLES = {
     "brightness": (BRIGHTNESS,),
@@ -32,9 +31,11 @@ FAULTS = tuple(replace(fault, kind=kind) for kind, table in _TABLES.items() for 
 
 
 def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
-    """Return the faults that an image of a scene may have, those of its single lights
-    and classes of lights too.
+    """Return the faults that an image of a scene may have, and with them the faults of its single
+    lights and classes of lights.
     """
+    # Lights are numbered in the order of `light_sources`: point and spot lights, directional ones,
+    # area lights. A class that is all lights, or one light, is no group of its own.
     sources = light_sources(predictor.reference)
     near, far = (
         len(predictor.reference.lights),
@@ -53,19 +54,27 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
     if 1 < len(sources) <= _MANY_LIGHTS:
         singles = [(number,) for number in range(len(sources))]
     groups |= {f"the light '{sources[number].name}'": (number,) for (number,) in singles}
-    own = []
+    # Faults of each group, or of a single light: its factor, its factor in the fog, and no shadows
+    # in all of its light or in the fog alone.
+    group_faults = []
     for which, numbers in groups.items():
         are, they = ("is", "it") if len(numbers) == 1 else ("are", "they")
         words = f"{which} {are} {{0:.4g}} times as bright as {they} should be"
-        own.append(factor_fault("light-factor", words, scaled("intensity", numbers)))
+        group_faults.append(factor_fault("light-factor", words, scaled("intensity", numbers)))
         words = f"the fog of {which} is {{0:.4g}} times as bright as it should be"
-        own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), ("both",)))
+        group_faults.append(
+            factor_fault("fog-factor", words, scaled("airlight", numbers), ("both",))
+        )
         unshadowed = with_scenery(unshadowed=numbers)
         for change, where, needs in (
             (unshadowed, "", ("shapes",)),
             (of_fog_alone(unshadowed), " in the fog, on surfaces it does", ("both",)),
         ):
             words = f"nothing casts a shadow in the light of {which}{where}"
-            own.append(Fault("no-shadow", words, change, needs=needs, kind="light"))
-    there = traits(predictor)
-    return tuple(fault for fault in (*FAULTS, *own) if all(there[need] for need in fault.needs))
+            group_faults.append(Fault("no-shadow", words, change, needs=needs, kind="light"))
+    traits_of_scene = traits(predictor)
+    return tuple(
+        fault
+        for fault in (*FAULTS, *group_faults)
+        if all(traits_of_scene[need] for need in fault.needs)
+    )

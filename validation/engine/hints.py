@@ -6,10 +6,10 @@ Such a fault of set-up hides everything else. For each combination of suspects t
 faults back, computes the root mean square error again, and names the combinations that make it ten
 times smaller, the fewest first.
 
-The radiance grows without bound towards a lamp, so that one pixel next to it can have most of the
-error, whatever the others are like. The error that decides therefore leaves out the worst hundredth
-of the lit values; and the factor that fits best is k = exp(median(log(r/t))) over the values that
-both images light, with t the test image and r the reference.
+The radiance grows without bound towards a point light, so that one pixel next to it can have most
+of the error, whatever the others are like. The error that decides therefore leaves out the worst
+hundredth of the lit values. The factor that fits best is k = exp(median(log(r/t))) over the values
+that are lit in both images, with t the test image and r the reference.
 """
 
 import math
@@ -26,10 +26,7 @@ from airlight.validation.engine.seen import stopped
 from airlight.validation.metrics.errors import FLOOR
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
-LEAST = 0.01  #: relative error below which nothing is suspected
 OUTLIERS = 0.01  #: fraction of the lit values that may be as wrong as they like
-
-_LARGEST = 700.0  # the logarithm of a number that a float can hold
 
 #: The faults that are taken back from an image, by name: none, or one of each.
 _UNDONE = [
@@ -56,6 +53,7 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
 
     Values that are not finite in either are left out.
     """
+    # Values that are not finite become NaN, which the means below leave out.
     ref, tst = (np.asarray(values, dtype=np.float64) for values in (reference, test))
     ref = np.where(np.isfinite(ref), ref, np.nan)
     tst = np.where(np.isfinite(tst), tst, np.nan)
@@ -78,9 +76,12 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ..
     """
     first = smallest = _usual_error(ref, tst)
     hints: tuple[str, ...] = ()
-    corrected, left = tst, math.nan
-    if first < LEAST * mean:
+    corrected, rmse = tst, math.nan
+    # An error of less than 1 % is no fault of the whole image.
+    if first < 0.01 * mean:
         return corrected, ()
+    # The combinations of fewest faults come first; a factor counts as one. A later combination
+    # replaces an earlier one only if it makes the error ten times smaller again.
     combinations = product(product(*_UNDONE), (False, True))
     for faults, scaled in sorted(combinations, key=lambda each: sum(map(bool, each[0])) + each[1]):
         changed, words = tst, list[str]()
@@ -91,11 +92,14 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ..
         error = _usual_error(ref, factor * changed)
         if not error * GAIN < smallest:  # NaN where no factor fits
             continue
-        smallest, corrected, left = error, factor * changed, _rmse(ref, factor * changed)
+        smallest, corrected, rmse = error, factor * changed, _rmse(ref, factor * changed)
         hints = (*words, _brightness(factor)) if scaled else tuple(words)
     if not hints:
         return corrected, ()
-    fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {left / mean:.3g} instead of "
+    fall = (
+        f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is "
+        f"{rmse / mean:.3g} instead of "
+    )
     return corrected, (*hints[:-1], hints[-1] + fall + f"{_rmse(ref, tst) / mean:.3g}")
 
 
@@ -105,19 +109,21 @@ def _fitted(ref: Array, tst: Array) -> float:
     if not lit.any():
         return math.nan
     sign = float(np.sign(np.median(tst[lit])))
-    # A difference of logarithms: the ratio may be out of range.
+    # A difference of logarithms: the ratio may be out of range. e^700 is a number that a float can
+    # hold.
     power = float(np.median(np.log(ref[lit]) - np.log(np.abs(tst[lit]))))
-    return sign * math.exp(power) if power < _LARGEST else math.nan
+    return sign * math.exp(power) if power < 700.0 else math.nan
 
 
 def _usual_error(ref: Array, tst: Array) -> float:
     """Return the rmse without the worst hundredth of the values that are lit in either image."""
     squared = _squared_errors(ref, tst)
     floor = FLOOR * float(np.nanmean(ref))
+    # A hundredth of the lit values, not of all: in a dark image all lit values could be outliers.
     lit = int(np.count_nonzero((ref > floor) | (tst > floor)))
-    kept = max(len(squared) - int(OUTLIERS * lit), 1)
+    count = max(len(squared) - int(OUTLIERS * lit), 1)
     return (
-        math.sqrt(float(np.mean(np.partition(squared, kept - 1)[:kept])))
+        math.sqrt(float(np.mean(np.partition(squared, count - 1)[:count])))
         if len(squared)
         else math.nan
     )
@@ -144,11 +150,12 @@ def _brightness(factor: float) -> str:
 
 def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
     """Say where values stop at their largest while the reference goes on."""
-    values, wanted = tst[stopped(tst)], ref[stopped(tst)]
-    if not len(values) or not (wanted > 1.02 * values[0]).mean() > 0.5:
+    # Equal values are cut off only if most of them should be larger, by 2 % at least.
+    values, correct = tst[stopped(tst)], ref[stopped(tst)]
+    if not len(values) or not (correct > 1.02 * values[0]).mean() > 0.5:
         return ()
     return (
         f"{len(values)} values stop at {values[0]:.4g} where the reference goes up to "
-        f"{np.nanmax(wanted):.4g}: write "
+        f"{np.nanmax(correct):.4g}: write "
         "floats, without a tone curve",
     )

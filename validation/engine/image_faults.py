@@ -48,6 +48,7 @@ def best_corner(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]
         def error(shift: Values) -> float:
             return float(np.abs(predictor.errors(change(predictor, guess, shift))).mean())
 
+        # Without a shift, or half a pixel in both directions.
         return [min(((0.0, 0.0), *product((-0.5, 0.5), repeat=2)), key=error)]
 
     return begin
@@ -125,16 +126,15 @@ def _exposed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, fog=replace(guess.fog, exposure=(red, green, blue)))
 
 
-# that a curve after it may hide
-_EXPOSURES = tuple(2.0**stops for stops in (0, 1, -1, 2, -2, 3, -3, 4, -4))
-
-
 def _ratio(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    """Return the usual ratio of image and guess, and some times it: a curve may come after."""
-    predicted, shown = predictor.predicted(guess), predictor.shown(guess)
-    lit = (predicted > 0.01 * predicted.mean()) & (shown > 0)
-    usual = float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0
-    return [(usual * exposure,) for exposure in _EXPOSURES]
+    """Return the usual ratio of image and guess, and up to four stops more or less: a curve
+    after the exposure may hide it.
+    """
+    # Dark values have no ratio of use; the median is one that few pixels do not decide.
+    predicted, image = predictor.predicted(guess), predictor.shown(guess)
+    lit = (predicted > 0.01 * predicted.mean()) & (image > 0)
+    usual = float(np.median(image[lit] / predicted[lit])) if lit.any() else 1.0
+    return [(usual * 2.0**stops,) for stops in (0, 1, -1, 2, -2, 3, -3, 4, -4)]
 
 
 def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
@@ -144,9 +144,10 @@ def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 def _darkest(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     """Return the excess of the darker half of the image over the guess."""
-    predicted, shown = predictor.predicted(guess), predictor.shown(guess)
-    more = (shown - predicted)[predicted <= np.median(predicted)]
-    return [(max(float(np.median(more)), 1e-6 * float(np.abs(shown).mean()), 1e-30),)]
+    # A level above 0, since it is looked for by its logarithm.
+    predicted, image = predictor.predicted(guess), predictor.shown(guess)
+    excess = (image - predicted)[predicted <= np.median(predicted)]
+    return [(max(float(np.median(excess)), 1e-6 * float(np.abs(image).mean()), 1e-30),)]
 
 
 def _swapped(order: tuple[int, ...]) -> Fault:

@@ -52,6 +52,7 @@ def find_images(
             f"--images: got {folder}, expected a folder with EXR files named by scene, such as "
             "open-fog.exr"
         )
+    # Hidden files are no images, even if their names end like one.
     files = sorted(
         path
         for path in place.iterdir()
@@ -64,6 +65,7 @@ def find_images(
         )
     by_scene: dict[str, tuple[EngineImage, ...]] = {}
     for path in files:
+        # SCENE.NAME.exr has a label after the dot, SCENE.exr the name of the folder.
         scene = _scene_of(path, scenes)
         label = path.stem[len(scene) + 1 :] or place.resolve().name or "image"
         by_scene[scene] = (*by_scene.get(scene, ()), EngineImage(scene, label, path))
@@ -94,6 +96,7 @@ def measure_image(
     or 'area'; `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers
     that were judged by what they hold, and the error of the surface where an image has both layers.
     """
+    # The airlight of an image with both layers is judged; the surface has an error beside it.
     image = read_exr(shown.path)
     layer = judged_layer(image, shown.path)
     layers = {layer.holds: layer.values}
@@ -130,11 +133,13 @@ def image_times(path: Path) -> tuple[Timing, str] | None:
     file = path.with_name(TIMES)
     if not file.is_file():
         return None
+    # A file in another form, or times that are no times, are one mistake of the user: one message.
     try:
-        said = json.loads(file.read_text(encoding="utf-8"))
-        entry = said.get(path.name, said.get(path.stem))
+        entries = json.loads(file.read_text(encoding="utf-8"))
+        entry = entries.get(path.name, entries.get(path.stem))
         if entry is None:
             return None
+        # A time without quartiles is its own quartiles.
         low, high = entry.get("quartiles", (entry["ms"], entry["ms"]))
         times = Timing(float(entry["ms"]), float(low), float(high), repetitions=0)
         if not 0 < times.low_ms <= times.median_ms <= times.high_ms < math.inf:

@@ -4,23 +4,24 @@ of that scene at its size.
 
 **Pixels.** A renderer that filters its samples by a box writes means over the areas of pixels, one
 that traces a ray through each centre does not, and few say which. The two differ where the radiance
-changes within a pixel: at edges, and beside a light, by 10 % and more. Only these values can tell
-the one from the other, so only they are looked at. With r the reference of either kind and t the
-image, without the faults of the whole that `hints.py` finds, the error is the mean of
+changes within a pixel: at edges, and beside a light, by 10 % and more. Only values that differ can
+decide, so only these values are compared. With r the reference of either kind and t the image,
+without the faults of the whole that `hints.py` finds, the error is the mean of
 
     |t - r| / max(|t|, |r|, 0.001 mean(r))
 
-which no single value decides, and the kind with the smaller error fits.
+No single value decides this mean. The kind with the smaller error fits.
 
 **Verdict.** The noise of a path tracer is independent from pixel to pixel, and near a light its
 variance is infinite: no bound on the error of single pixels tells noise from a fault. Means over
 blocks of pixels do: noise falls as the root of their number, an error of light, medium or shadow
 stays. An image is right if the relative error of the block means,
 
-    |sum(t) - sum(r)| / max(sum(r), 0.05 n mean(r))    over the n pixels of a block, channel by channel,
+    |sum(t) - sum(r)| / max(sum(r), 0.05 n mean(r))    over the n pixels of a block, by channel,
 
-is at most `RIGHT` in the root mean square, the worst hundredth of the blocks left out (that of the
-light), if the best factor is as close to one, and if nothing is suspected of the image as a whole.
+is at most `RIGHT` in the root mean square without the worst hundredth of the blocks, which are
+beside the light; if the best factor is as close to one; and if nothing is suspected of the image as
+a whole.
 """
 
 import math
@@ -70,15 +71,6 @@ ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'cen
 
 BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
 RIGHT = 0.01  #: largest relative error of an image that is called right
-_DIM = 0.05  # of the mean: a block that is dimmer in both images says nothing
-# by how much the two references must differ, relative to the larger, for a value to say which fits
-_APART = 0.01
-# of the pixels: what stands on an image, or is missing in it; more are another image
-_FEW_WRONG = 0.1
-# median errors: noise of a normal distribution is beyond in 5 pixels of 100 000
-_APART_FROM_NOISE = 6.0
-# relative error of an image that fits the centres so well that nothing can fit better
-_EXACT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -89,7 +81,7 @@ class Verdict:
     reasons: tuple[str, ...]  #: why it is not; empty if it is
     block: int  #: side of a block [pixels]
     block_error: float  #: relative error of block means; NaN where no block is lit
-    block_noise: float  #: what the scatter of the pixels within them explains of it
+    block_noise: float  #: the relative error of block means that scatter of pixels alone makes
 
     @property
     def noise_alone(self) -> bool:
@@ -121,7 +113,7 @@ class EngineComparison:
     kind: PixelKind
     hints: Hints  #: what may be wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    #: mean of the layer of the reference that it was compared with, and its error [W/(m^2 sr)]
+    #: mean of the layer of the reference, and the error of this mean [W/(m^2 sr)]
     known: Estimate
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
@@ -147,7 +139,10 @@ class EngineComparison:
             self.comparison.summary(),
         ]
         hints = self.hints
-        fitted = f"{hints.factor:.6g} times the image leaves a relative rmse of {100 * hints.factor_rmse:.4g} %"
+        fitted = (
+            f"{hints.factor:.6g} times the image leaves a relative rmse of "
+            f"{100 * hints.factor_rmse:.4g} %"
+        )
         lines.append(f"best factor      {f'none: {hints.reason}' if hints.reason else fitted}")
         lines += [] if self.place is None else [f"where            {self.place.words}"]
         lines += [f"suspect          {words}" for words in self.hints.words]
@@ -169,12 +164,26 @@ def compare_scene(
 ) -> EngineComparison:
     """Compare an EXR file with the reference of a scene at the file's size.
 
-    `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what
-    it holds, see `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area', see
-    `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what
-    fits; `mask`: an EXR file that is 0 in pixels to leave out; `all_metrics`: see
-    `validation.comparison.images.compare_images`; `margin`: largest relative bias [1] that counts
-    as agreement; with standard errors, what they can show counts.
+    Parameters
+    ----------
+    scene
+        A built-in scene or a Mitsuba XML file.
+    path
+        The EXR file.
+    layer, holds
+        The layer to judge and what it holds, see `validation.engine.seen.judged_layer`.
+    pixel
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the
+        image says of itself, or what fits.
+    mask
+        An EXR file that is 0 in pixels to leave out.
+    margin
+        Largest relative bias [1] that counts as agreement; an image with standard errors must show
+        with them that its bias is within it.
+    all_metrics
+        See `validation.comparison.images.compare_images`.
+    progress
+        Called with (fraction done, what).
     """
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
@@ -205,14 +214,25 @@ def judge_image(
     margin: float | None = None,
     **metrics: Any,
 ) -> EngineComparison:
-    """Judge a layer of an image by the reference of its scene, as
-    `compare_scene` and the report do.
+    """Judge a layer of an image by the reference of its scene, as in `compare_scene` and reports.
 
-    `image`, `judged`: the image, and the layer of it; `loaded`, `reference_of`: the scene at its
-    size, and what computes its reference for 'centre' or 'area'; `mask`: which pixels are compared,
-    (height, width); all by default; `metrics`: more for
-    `validation.comparison.images.compare_images`.
+    Parameters
+    ----------
+    image, judged
+        The image, and the layer of it.
+    loaded, reference_of
+        The scene at the size of the image, and a function that computes its reference for 'centre'
+        or 'area'.
+    path
+        The name of the image in messages.
+    pixel, margin
+        See `compare_scene`.
+    mask
+        Which pixels are compared, (height, width); all by default.
+    metrics
+        More parameters of `validation.comparison.images.compare_images`.
     """
+    # Pixels outside of the mask count nowhere: neither in what pixels are, nor in the verdict.
     check_margin(margin)
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
@@ -220,15 +240,17 @@ def judge_image(
             judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan)
         )
     kind, hints = fitting_kind(judged, reference_of, kinds)
-    # Light of another kind says nothing of the pixels: either reference may fit it.
+    # An image of another kind of light does not say what its pixels are: either reference may fit.
     other = _other_light(judged, [reference_of(each) for each in (kinds[0], kind.pixel)])
     hints, fitting = replace(hints, words=(*hints.words, *other)), reference_of(kind.pixel)
+    # The comparison gets the layer and the reference under one name, with their standard errors if
+    # the image has any.
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: image.layers[name]} | (
         {f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {}
     )
-    wanted = expected_layer(fitting, judged)
-    expected = {name: wanted}
+    correct = expected_layer(fitting, judged)
+    expected = {name: correct}
     own_error = reference_error(fitting, judged.holds)
     if with_errors and own_error is not None:
         # Where no path of the image arrived it has no standard error: the reference alone
@@ -242,10 +264,11 @@ def judge_image(
         margin=margin if with_errors else None,
         **metrics,
     )
+    # Without standard errors a margin is no matter of statistics: the bias must be within it.
     bias = comparison.metrics.relative_bias
     if margin is not None and not with_errors and (bias is None or abs(bias) > margin):
-        told = "undefined" if bias is None else f"{bias:+.3g}"
-        words = f"the relative bias, {told}, is not within +-{margin:.3g}"
+        bias_words = "undefined" if bias is None else f"{bias:+.3g}"
+        words = f"the relative bias, {bias_words}, is not within +-{margin:.3g}"
         comparison = replace(comparison, failures=(*comparison.failures, words))
     test = judged.values.astype(np.float64)
     return EngineComparison(
@@ -257,11 +280,11 @@ def judge_image(
         expected=judged.holds,
         known=known_to(fitting, judged.holds),
         comparison=comparison,
-        place=error_place(wanted, test, lamp_distance(loaded, fitting)),
-        verdict=judge(wanted, test, hints, comparison.failures),
+        place=error_place(correct, test, lamp_distance(loaded, fitting)),
+        verdict=judge(correct, test, hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
         layers=fitting,
-        reference=wanted,
+        reference=correct,
         image=image.layers[name],
     )
 
@@ -277,8 +300,8 @@ def references(
 
 
 def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
-    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in
-    the middle of the image].
+    """Return the distance of each pixel from the nearest light, (height, width) [pixels in the
+    middle of the image].
     """
     angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
     return (
@@ -289,21 +312,25 @@ def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
 
 
 def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[str, ...]:
-    """Say so where an image is the airlight or the surface alone, or all light, and
-    not what it was taken for.
+    """Return a sentence where an image is the airlight or the surface alone, or all light, and was
+    taken for another of these.
     """
+    # The mean square error against each kind of light, by the reference that fits better, and the
+    # mean square of that light itself.
     errors, powers = {}, {}
     if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
-        shown, hidden = (
+        # An image of all light may leave out the area lights that the camera sees.
+        with_lights, without_lights = (
             min(
                 _mean_square(judged.values - reference_layer(reference, TOTAL, emitted=emitted))
                 for reference in fitting
             )
             for emitted in (True, False)
         )
-        if GAIN**2 * hidden < shown:
+        if GAIN**2 * without_lights < with_lights:
             return (
-                "the image does not show the area lights that the camera sees: compare its airlight",
+                "the image does not show the area lights that the camera sees: "
+                "compare its airlight",
             )
     for name in KINDS:
         layers = [reference_layer(reference, name, emitted=judged.emitted) for reference in fitting]
@@ -336,30 +363,34 @@ def fitting_kind(
     faults of the whole image.
 
     `reference_of`: computes a reference; asked for the means only if the image does not fit the
-    centres to `_EXACT`; `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
+    centres to 0.1 %; `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
 
     def attempt(kind: str) -> tuple[Array, Hints]:
-        wanted = expected_layer(reference_of(kind), judged)
-        return wanted, find_hints(wanted, judged.values)
+        correct = expected_layer(reference_of(kind), judged)
+        return correct, find_hints(correct, judged.values)
 
-    def errors(found: Sequence[tuple[Array, Hints]]) -> list[float]:
-        (centre, _), (area, _) = found
-        # an infinite centre counts
-        apart = np.abs(area - centre) > _APART * np.maximum(area, centre)
-        return [_error(wanted, hints.corrected, apart) for wanted, hints in found]
+    def errors(attempts: Sequence[tuple[Array, Hints]]) -> list[float]:
+        (centre, _), (area, _) = attempts
+        # Where the references differ by 1 % of the larger one, a value says which of them fits. A
+        # centre at a light itself is infinite, and counts too.
+        apart = np.abs(area - centre) > 0.01 * np.maximum(area, centre)
+        return [_error(correct, hints.corrected, apart) for correct, hints in attempts]
 
     kind, (_, hints) = decide_pixel(
-        kinds, attempt, errors, lambda found: _fits(found[0], found[1].corrected)
+        kinds, attempt, errors, lambda each: _fits(each[0], each[1].corrected)
     )
     return kind, hints
 
 
 def _fits(reference: Array, image: Array) -> bool:
+    """Return whether an image fits so well that nothing can fit better: to a relative rmse of
+    0.1 %.
+    """
     finite = np.isfinite(reference)
     difference = (image - reference)[finite]
     power = float(np.mean(reference[finite] ** 2)) if finite.any() else 0.0
-    return bool(np.isfinite(difference).all() and np.mean(difference**2) <= _EXACT**2 * power)
+    return bool(np.isfinite(difference).all() and np.mean(difference**2) <= 1e-3**2 * power)
 
 
 def _error(reference: Array, image: Array, where: Bools) -> float:
@@ -378,9 +409,11 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
     the image as a whole; `failures`: why it must be called wrong anyway: values that are not
     finite, or negative.
     """
+    # Ten blocks at least along the shorter side of the image.
     side = min(BLOCK, max(1, min(reference.shape[:2]) // 10))
     error, noise = _block_errors(reference, image, side)
     reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
+    # A factor other than one, or an image without light, counts only where nothing else is wrong.
     if not reasons and abs(hints.factor - 1) > RIGHT:
         reasons.append(f"the best factor is {hints.factor:.4g}")
     if not reasons and math.isnan(error):
@@ -403,9 +436,12 @@ def all_but_few(compared: EngineComparison) -> str:
     finite = np.isfinite(reference)
     floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
-    wrong = errors > max(RIGHT, _APART_FROM_NOISE * float(np.median(errors)))
-    if not 0 < np.count_nonzero(wrong) <= _FEW_WRONG * wrong.size:
+    # Six median errors: noise of a normal distribution is beyond in 5 pixels of 100 000.
+    wrong = errors > max(RIGHT, 6.0 * float(np.median(errors)))
+    # A tenth of the pixels may be a mark on the image, or a hole in it; more are another image.
+    if not 0 < np.count_nonzero(wrong) <= 0.1 * wrong.size:
         return ""
+    # All others must be right by the same verdict.
     others = np.where(wrong[..., None], np.nan, image)
     if not judge(reference, others, find_hints(reference, others), ()).right:
         return ""
@@ -418,25 +454,30 @@ def all_but_few(compared: EngineComparison) -> str:
 
 
 def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
-    """Return the relative error of the means of lit blocks, and the fraction
-    of it that noise explains.
+    """Return the relative error of the means of lit blocks, and the error that
+    the scatter of pixels within them alone would make.
     """
+    # Sums over blocks, of each channel: pixels that count, light of the reference, light of the
+    # image, and their difference and its square.
     finite = np.isfinite(reference) & np.isfinite(image)
-    wanted, got = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
-    difference = got - wanted
-    count, light, seen, offset, square = (
+    correct, test = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
+    difference = test - correct
+    count, light, test_light, offset, square = (
         block_sums(values, side)
-        for values in (finite.astype(float), wanted, got, difference, difference**2)
+        for values in (finite.astype(float), correct, test, difference, difference**2)
     )
-    floor = _DIM * float(wanted.mean())
-    lit = (count > 0) & (np.maximum(light, seen) > floor * count)
+    # A block that is dimmer in both images than 5 % of the mean says nothing.
+    floor = 0.05 * float(correct.mean())
+    lit = (count > 0) & (np.maximum(light, test_light) > floor * count)
     if not lit.any():
         return math.nan, math.nan
     scale = np.maximum(light, floor * count)[lit]
     error = np.abs(offset[lit]) / scale
+    # Noise that is independent from pixel to pixel gives the sum of a block the variance
+    # sum(d^2) - sum(d)^2/n.
     scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
-    # of few blocks none may be wrong
-    kept = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
-    return math.sqrt(float(np.mean(error[kept] ** 2))), math.sqrt(
-        float(np.mean((scatter / scale**2)[kept]))
+    # Without the worst hundredth of the blocks; of less than a hundred, none may be wrong.
+    best = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
+    return math.sqrt(float(np.mean(error[best] ** 2))), math.sqrt(
+        float(np.mean((scatter / scale**2)[best]))
     )

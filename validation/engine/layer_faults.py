@@ -38,29 +38,29 @@ def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
 
 
 def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
-    """Return the start of a factor: its part of the light then explains most of
-    the residual of the rest.
+    """Return a function that finds the start of a factor on a part of the light: with it the part
+    explains most of what the image has beyond the rest of the light.
     """
 
     def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-        once, none = (
+        # The image is the rest plus the factor times the part, both of which are guesses with the
+        # factors 1 and 0. Bright pixels of the part say most of its factor: they are its weights.
+        whole, rest = (
             predictor.predicted(change(predictor, guess, (value,))) for value in (1.0, 0.0)
         )
-        part, left = once - none, predictor.shown(guess) - none
+        part, residual = whole - rest, predictor.shown(guess) - rest
         lit = part > 0.01 * max(float(part.mean()), 1e-300)
         if not lit.any():
             return [(1.0,)]
-        return [(max(_weighted_median(left[lit] / part[lit], part[lit]), 1e-9),)]
+        return [(max(_weighted_median(residual[lit] / part[lit], part[lit]), 1e-9),)]
 
     return begin
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
     order = np.argsort(values)
-    heavier = np.cumsum(weights[order])
-    return float(
-        values[order][min(int(np.searchsorted(heavier, 0.5 * heavier[-1])), len(order) - 1)]
-    )
+    total = np.cumsum(weights[order])
+    return float(values[order][min(int(np.searchsorted(total, 0.5 * total[-1])), len(order) - 1)])
 
 
 def factor_fault(name: str, words: str, change: Change, needs: tuple[str, ...] = ()) -> Fault:
@@ -75,26 +75,33 @@ def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Ch
     """Return the change of airlight and surfaces by the transmittance of the fog."""
 
     def make(predictor: Predictor, guess: Guess, p: Values) -> Layers:
-        left = predictor.transmittance(guess)
-        return lambda airlight, surface: change(airlight, surface, left)
+        transmittance = predictor.transmittance(guess)
+        return lambda airlight, surface: change(airlight, surface, transmittance)
 
     return changed_layers(make)
 
 
 def _ambient(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    fog = 1 - predictor.transmittance(guess)
+    # Ambient light shows in the fog by its opacity.
+    opacity = 1 - predictor.transmittance(guess)
     return replace(
         guess,
-        layers=(*guess.layers, lambda airlight, surface: (airlight + np.array(p) * fog, surface)),
+        layers=(
+            *guess.layers,
+            lambda airlight, surface: (airlight + np.array(p) * opacity, surface),
+        ),
     )
 
 
 def _ambient_colour(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    fog = 1 - predictor.transmittance(guess)
-    more = predictor.shown(guess) - predictor.predicted(guess)
-    safe = np.maximum(fog, 1e-6)
+    # In each channel the excess of the image over the guess is the ambient light times the opacity:
+    # the median of their ratios, with the opacity as weights, is the solution already.
+    opacity = np.maximum(1 - predictor.transmittance(guess), 1e-6)
+    excess = predictor.shown(guess) - predictor.predicted(guess)
     return [
-        tuple(max(_weighted_median(m / f, f), 0.0) for m, f in zip(more.T, safe.T, strict=True))
+        tuple(
+            max(_weighted_median(e / o, o), 0.0) for e, o in zip(excess.T, opacity.T, strict=True)
+        )
     ]
 
 

@@ -49,6 +49,8 @@ def _of_a_disk(r: Array, radius: float) -> Array:
 
 
 def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return ranges of lights to begin with, by the usual distance from a light."""
+    # Distances of the nodes in the fog; of lit surface points where no ray has fog.
     r = np.concatenate(
         [each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).lights]
     )
@@ -73,9 +75,10 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
     """
     if predictor.reference.lights[0].axis is not None:
         return at_position(predictor, guess, p)
-    held = at_position(predictor, guess, at)
-    x, y, z = (value - before for value, before in zip(p, held.scenery.moved[0], strict=True))
-    return replace(held, fog=held.fog.put(("moved", 0), (x, y, z)))
+    # The paths belong to the light at `at`; the fog moves the light from there to p.
+    guess_at = at_position(predictor, guess, at)
+    x, y, z = (value - before for value, before in zip(p, guess_at.scenery.moved[0], strict=True))
+    return replace(guess_at, fog=guess_at.fog.put(("moved", 0), (x, y, z)))
 
 
 PLACE = tuple(Number(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))

@@ -25,7 +25,7 @@ from airlight.validation.engine.fault import (
 from airlight.validation.engine.prediction import Guess, Layers, Predictor
 from airlight.validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
-_FACTOR = (0.5, 0.7, 1.4, 2.0)
+_FACTOR = (0.5, 0.7, 1.4, 2.0)  # factors to begin with
 _SHIFT = Number(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]
 # of cameras in engines and modelling programs [m]
 _USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
@@ -50,6 +50,7 @@ def changed_optics(fog: Fog, change: Callable[[float, float], tuple[float, float
 
 def _absorption(sigma_t: float, albedo: float, factor: float = 0.0) -> tuple[float, float]:
     """Return optics whose absorption has a factor; the scattering stays."""
+    # The albedo is the same scattering over the new extinction.
     scattering = sigma_t * albedo
     extinction = scattering + factor * (sigma_t - scattering)
     return extinction, scattering / extinction if extinction > 0 else albedo
@@ -92,6 +93,8 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
     Irradiance and radiance, of lights that are far or have extent, are what they were.
     """
+    # Lengths times p: depths are sigma_t p times the old lengths, and 1/r^2 of point and spot
+    # lights, which come first, is p^-2 times what it was.
     near = len(predictor.reference.lights)
     intensity = tuple(
         value / p[0] ** 2 if light < near else value
@@ -114,18 +117,21 @@ def _between(spherical: bool, end: str, at: float | None = None) -> Change:
 
 def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     """Return distances at which a fog may end: parts of those that the image shows."""
+    # Parts of the distance of the farther surfaces, or of twice the farthest light where no surface
+    # is in the image.
     view = predictor.view
-    seen = view.distance[np.isfinite(view.distance)]
+    distances = view.distance[np.isfinite(view.distance)]
     lights = [
         float(np.linalg.norm(light.position - view.reference.origin))
         for light in view.reference.lights
     ]
-    far = float(np.quantile(seen, 0.9)) if seen.size else 2 * max(lights, default=5.0)
+    far = float(np.quantile(distances, 0.9)) if distances.size else 2 * max(lights, default=5.0)
     return [(far * part,) for part in (0.9, 0.6, 0.35)]
 
 
 def _falling(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return homogeneous fog with a density that falls with height, from the camera's on."""
+    # The layer has the density 1 at the camera: the extinction is a factor on it.
     up = _up(predictor.reference)
     height = HeightFog((Layer(1.0, float(predictor.reference.origin @ up), p[0]),))
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[1], albedo))
@@ -174,6 +180,7 @@ def _up(reference: ReferenceScene) -> Colour:
 
 
 def _heights(predictor: Predictor, guess: Guess) -> Sequence[Values]:
+    """Return scale heights and factors to begin with: parts of the depth of the scene."""
     size = _depths(predictor, guess)[0][0]
     return [(size * part, factor) for part in (0.1, 0.3, 1.0) for factor in (1.0, 2.0)]
 
@@ -184,6 +191,7 @@ def _depth_for_distance(*what: str) -> Change:
 
 def _multiple(of_surfaces: bool) -> Change:
     def make(predictor: Predictor, guess: Guess, p: Values) -> Layers:
+        # Too large an image has no light of higher orders: the fault then changes nothing.
         more = predictor.light.higher_orders
         if more is None:
             return lambda airlight, surface: (airlight, surface)
@@ -356,7 +364,8 @@ MEDIUM = (
     *(
         Fault(
             "depth-axis",
-            f"distances along the axis of the camera were taken for distances along the ray {where}",
+            "distances along the axis of the camera were taken for distances along the ray "
+            f"{where}",
             change,
             needs=needs,
         )

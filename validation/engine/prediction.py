@@ -24,12 +24,6 @@ Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfa
 _FEW_RAYS = 800  # with which faults that move paths are told apart
 # of which exact paths cost much: few pixels are looked at, and faults are searched by others
 _MANY_TRIANGLES = 20_000
-_STEPS = 64  # shadow rays that find the lit parts of a ray there
-_BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
-_SMOOTH = 40  # of the width of an image: the width of the filter for that light
-_MOST_RADIANCE = 6_000_000  # numbers of radiance that are kept
-_FLOOR = 0.01  # of the mean of an image: below it values count relative to this
-_BLACK = 1e-7  # of the mean that the scene itself would have: below it an image is black
 
 
 @dataclass(frozen=True)
@@ -38,7 +32,7 @@ class Guess:
 
     fog: Fog
     scenery: Scenery = field(default_factory=Scenery)
-    surfaces: Scenery | None = None  #: of what surfaces reflect, where that is another one
+    surfaces: Scenery | None = None  #: the scenery of surfaces, where it is another one
     #: what was done to airlight and surfaces before they were added
     layers: tuple[Layers, ...] = ()
     values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
@@ -51,10 +45,10 @@ class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
     reference: ReferenceScene
-    #: numbers of paths that are kept, those used last: some eight bytes each
+    #: how many numbers of paths stay in memory, some eight bytes each; the oldest go first
     most: float = 12_000_000
     # By kind, with their sizes; the one used last comes last.
-    _kept: dict[str, dict[Any, tuple[Any, int]]] = field(
+    _cached: dict[str, dict[Any, tuple[Any, int]]] = field(
         default_factory=lambda: {"paths": {}, "radiance": {}}
     )
 
@@ -68,17 +62,19 @@ class SceneLight:
         reference = self.reference
         if reference.width * reference.height > 1 << 17:
             return None
+        # Paths of up to 64 segments less paths of up to two segments, which are single scattering:
+        # four batches of 16 paths a pixel, each with one seed for both.
         parts = []
-        for seed in range(_BATCHES):
+        for seed in range(4):
             whole, single = (
-                volpath_batch(reference, seed, _PATHS, max_depth=depth).mean for depth in (64, 2)
+                volpath_batch(reference, seed, 16, max_depth=depth).mean for depth in (64, 2)
             )
             parts.append(
                 (whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]]
             )
         image = np.mean(parts, axis=0).reshape(2, reference.height, reference.width, 3)
-        # It is smooth except for edges, and noisy.
-        width = reference.width / _SMOOTH
+        # It is smooth except for edges, and noisy: a filter of a fortieth of the image's width.
+        width = reference.width / 40
         return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
 
     def view(self, seen: Seen, scenery: Scenery) -> View:
@@ -103,29 +99,33 @@ class SceneLight:
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""
+        # Factors on lights need no new sums: the radiance by light is found without them.
         plain = fog.without_factors
         ends = fog.ends if layer == 0 else None
         key = scenery, plain, layer, _sight(seen)
-        made = self._once(
+        by_light = self._once(
             "radiance",
             key,
             lambda: self.model(seen, scenery, layer, ends).by_light(plain),
             lambda each: each.size,
         )
-        return fog.combined(made)[layer]
+        return fog.combined(by_light)[layer]
 
     def _once(
-        self, kind: str, key: Any, made: Callable[[], Any], size: Callable[[Any], int]
+        self, kind: str, key: Any, compute: Callable[[], Any], size: Callable[[Any], int]
     ) -> Any:
-        kept, most = self._kept[kind], self.most if kind == "paths" else _MOST_RADIANCE
-        known = kept.pop(key, None)
-        if known is None:
-            value = made()
-            known = value, size(value)
-            while kept and sum(each for _, each in kept.values()) > most - known[1]:
-                del kept[next(iter(kept))]
-        kept[key] = known
-        return known[0]
+        # A dictionary keeps the order of insertion: an entry that is used is taken out and put in
+        # again, so that the first one is the one used longest ago. It goes first where a new entry
+        # needs its room, 6 million numbers for radiance.
+        cached, most = self._cached[kind], self.most if kind == "paths" else 6_000_000
+        entry = cached.pop(key, None)
+        if entry is None:
+            value = compute()
+            entry = value, size(value)
+            while cached and sum(each for _, each in cached.values()) > most - entry[1]:
+                del cached[next(iter(cached))]
+        cached[key] = entry
+        return entry[0]
 
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
@@ -173,26 +173,26 @@ class Predictor:
 
     @cached_property
     def few(self) -> "Predictor":
-        """One with fewer pixels."""
+        """A predictor with fewer pixels."""
         return Predictor(replace(self.seen, rays=_FEW_RAYS), self.light)
 
     @cached_property
     def quick(self) -> "Predictor":
-        """One with so many pixels that all faults that move no paths are told apart."""
+        """A predictor with enough pixels to tell faults apart that move no paths."""
+        # As many pixels as with centres: a mean over the area of a pixel has nine rays.
         rays = _FEW_RAYS * (9 if self.seen.area else 1)
         return Predictor(replace(self.seen, rays=min(rays, self.seen.rays)), self.light)
 
     @cached_property
     def fewest(self) -> "Predictor":
-        """One with as few pixels as tell the size of a light, each of which needs many paths."""
+        """A predictor with just enough pixels for the size of a light: each needs many paths."""
         return Predictor(replace(self.seen, rays=_FEW_RAYS // 8), self.light)
 
     @cached_property
     def coarse(self) -> "Predictor":
-        """One with fewer pixels, and where exact paths cost much with shadow rays."""
-        return (
-            Predictor(replace(self.few.seen, steps=_STEPS), self.light) if self.many else self.few
-        )
+        """A predictor with fewer pixels, and with shadow rays where exact paths cost much."""
+        # 64 shadow rays find the lit parts of a ray.
+        return Predictor(replace(self.few.seen, steps=64), self.light) if self.many else self.few
 
     @cached_property
     def view(self) -> View:
@@ -206,17 +206,20 @@ class Predictor:
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
-        """Which rows of `errors` are pixels, and which their neighbours, those of the
-        next columns if it can be.
+        """Which rows of `errors` are pixels, and which their neighbours: in the next column
+        where all pixels are looked at.
         """
+        # `partner` is the row of each pixel's neighbour, if there is one: pixels ascend.
         pixels, width = self.pixels, self.shape[1]
         for apart in (1, APART) if len(pixels) == self.seen.used.sum() else (APART,):
             partner = np.searchsorted(pixels, pixels + apart)
             row = np.flatnonzero(partner < len(pixels))
             partner = partner[row]
-            there = (pixels[partner] == pixels[row] + apart) & (pixels[row] % width + apart < width)
-            if there.any():
-                return row[there], partner[there]
+            paired = (pixels[partner] == pixels[row] + apart) & (
+                pixels[row] % width + apart < width
+            )
+            if paired.any():
+                return row[paired], partner[paired]
         return np.empty(0, np.int64), np.empty(0, np.int64)
 
     def layers(self, guess: Guess) -> tuple[Array, Array]:
@@ -225,7 +228,7 @@ class Predictor:
         """
         parts = []
         for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
-            held = self.seen.holds != ("surface", "airlight")[layer]
+            is_shown = self.seen.holds != ("surface", "airlight")[layer]
             # Where surfaces have their own scenery, a light that moves with its paths held
             # moves for the fog alone.
             fog = (
@@ -233,7 +236,7 @@ class Predictor:
                 if layer == 1 and guess.surfaces
                 else guess.fog
             )
-            parts.append(self.light.radiance(self.seen, scenery, fog, layer) if held else None)
+            parts.append(self.light.radiance(self.seen, scenery, fog, layer) if is_shown else None)
         airlight, surface = (
             np.zeros((len(self.pixels), 3)) if part is None else part for part in parts
         )
@@ -268,11 +271,13 @@ class Predictor:
 
     @cached_property
     def _least(self) -> float:
-        return _BLACK * float(np.mean(np.abs(self.predicted(Guess(self.fog))))) + 1e-300
+        # An image that is dimmer than 1e-7 of the mean that the scene itself would have is black.
+        return 1e-7 * float(np.mean(np.abs(self.predicted(Guess(self.fog))))) + 1e-300
 
     def _floor(self, shown: Array) -> float:
+        # Below 1 % of the mean of the image values count relative to that.
         finite = shown[np.isfinite(shown)]
-        return max(_FLOOR * float(np.mean(np.abs(finite))) if finite.size else 0.0, self._least)
+        return max(0.01 * float(np.mean(np.abs(finite))) if finite.size else 0.0, self._least)
 
     def errors(self, guess: Guess) -> Array:
         """Return the errors of a guess, relative to the larger of both

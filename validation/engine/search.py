@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters with which faults fit an image best, one alone or two together.
 
-The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale:
-pixels that disagree cannot decide (Cauchy's loss). One parameter is looked for on the line, since
-there may be several minima; several by steps of Gauss and Newton with Cauchy's weights. A light
-that is off moves shadows, whose pixels are off by all of their light whatever a small step does, so
-that there are no slopes to follow: it is looked for along the axes first, by steps as long as its
-shadows are wide (Hooke and Jeeves 1961, J. ACM 8, 212). The scale begins at what the unchanged
-scene leaves and ends at what the search leaves.
+The measure is the mean of log(1 + (e/s)^2) over all values, with e the relative errors and s a
+scale: pixels that disagree cannot decide (Cauchy's loss). One parameter is looked for on the line,
+since there may be several minima. Several parameters are looked for by steps of Gauss and Newton
+with Cauchy's weights. A light that is off moves shadows. The pixels of these are off by all of
+their light whatever a small step does, so that there are no slopes to follow: the light is looked
+for along the axes first, by steps as long as its shadows are wide (Hooke and Jeeves 1961, J. ACM 8,
+212). The scale of the first search is the least usual error at any start. The scale of the second
+search is the usual error that the first one leaves.
 """
 
 import math
@@ -21,22 +22,8 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.fault import Fault, Number, Values
 from airlight.validation.engine.prediction import Guess, Predictor
 
-# where most pixels do not know a parameter, those that do are no outliers
-_LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2
-# on a line, of a logarithm or in units of the parameter: enough to tell faults apart
-_COARSE = 0.02
-# Starts that are followed where no paths move, on a line and by steps: the best one may lead to a
-# lesser minimum. Half of the starts of fog that thins with height lead to even fog.
-_BEGUN, _BEGUN_BY_STEPS = 2, 3
-# steps of Gauss and Newton at most; the last with all paths
-_TURNS, _TURNS_COARSE, _TURNS_LAST = 8, 4, 3
-_STRIDES = 10  # rounds of steps along the axes at most
-_DONE = 0.02  # fraction of the loss at which slopes find what is left
-_LOST = 0.5  # fraction of the loss that is left of what is not this fault, after steps of two sizes
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
-_NEAR = 3  # steps of differences: how far few paths are off at most
-_STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
 
 
 @dataclass(frozen=True)
@@ -71,30 +58,34 @@ def explain(
     all starts of the faults are tried; `fine`: whether the values are found to all digits, or to
     some per cent, which is enough for a wrong fault.
     """
-    # Faults that move paths, which are found again for each value, are tried on few pixels
-    # first to tell faults apart.
+    # The first search looks at few pixels: paths of a fault that moves them are found again for
+    # each value. A second one, if all digits are asked for, looks at all pixels.
     coarse = _coarse(predictor, faults)
-    sought = [coarse, *[predictor] * fine]
+    predictors = [coarse, *[predictor] * fine]
     if predictor.many and not fine:
         predictor = coarse
-    searches = [_Search(each, tuple(faults)) for each in sought]
+    searches = [_Search(each, tuple(faults)) for each in predictors]
     search = searches[0]
     parameters = search.numbers
-    starts = (
-        [tuple(value for part in near for value in part)] if near else _starts(sought[0], faults)
-    )
+    starts = [tuple(value for part in near for value in part)] if near else _starts(coarse, faults)
     best = starts[0]
     if all(fault.solved or not fault.parameters for fault in faults):
         parameters = ()
     if parameters:
+        # The starts by their loss, at the least scale of any of them.
         scale = min(search.scale(start, fine) for start in starts)
         starts = sorted(starts, key=lambda start: search.loss(start, scale))
         on_a_line = len(parameters) == 1
         moves = any(parameter.step for parameter in parameters)
-        followed = 1 if moves else _BEGUN if on_a_line else _BEGUN_BY_STEPS
+        # One start is followed where paths move, which cost most. Elsewhere two are followed on a
+        # line, and three by steps: the best one may lead to a lesser minimum. Half of the starts of
+        # fog that thins with height lead to even fog.
+        followed = 1 if moves else 2 if on_a_line else 3
         places = [inward(parameters, start) for start in starts[:followed]]
         if any(parameter.stride for parameter in parameters) and not near:
             places = [search.along_axes(place, scale) for place in places]
+        # The second search begins where the first one ends, at the scale of the errors there. Where
+        # paths move it is near the end already, and takes few steps.
         for turn, search in enumerate(searches):
             scale = scale if turn == 0 else search.scale(outward(parameters, places[0]), fine)
             if on_a_line:
@@ -121,14 +112,15 @@ def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[V
     """Return the least mean error at the starts of some faults together, and the values there."""
     predictor = _coarse(predictor, faults) if predictor.many else predictor
     starts = _starts(predictor, faults)
-    left = [
+    errors = [
         float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean())
         for start in starts
     ]
-    return min(left), _parted(faults, starts[int(np.argmin(left))])
+    return min(errors), _parted(faults, starts[int(np.argmin(errors))])
 
 
 def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
+    """Return a predictor with fewer pixels, by what the paths of faults cost."""
     if any(fault.costly > 1 for fault in faults) and not predictor.many:
         return predictor.fewest
     moves = any(parameter.step for fault in faults for parameter in fault.parameters)
@@ -148,6 +140,7 @@ def guess_of(
     `at`: values for which paths are found, and held for others by the faults that can do with that;
     `guess`: what the faults change; the scene as it is by default.
     """
+    # Faults change the guess in turn, each with its own part of the values.
     guess = guess or Guess(predictor.fog)
     olds = _parted(faults, values if at is None else at)
     for fault, part, old in zip(faults, _parted(faults, values), olds, strict=True):
@@ -195,14 +188,16 @@ class _Search:
         return self.loss(outward(self.numbers, place), scale)
 
     def scale(self, values: Values, fine: bool) -> float:
-        left = self.errors(values)[
+        # Where a parameter changes only a few pixels, most are right and the usual error is tiny: a
+        # least scale keeps the few from being outliers.
+        errors = self.errors(values)[
             self.predictor.lit(guess_of(self.predictor, self.faults, values))
         ]
-        return max(usual_size(left), _LEAST_SCALE if fine else _LEAST_COARSE)
+        return max(usual_size(errors), 1e-4 if fine else 1e-2)
 
     def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
-        """Return the best value of one parameter; `near`: it is known except for a
-        few steps of differences.
+        """Return the best place of one parameter; `near`: a search on few pixels has found it
+        except for a few steps of differences.
         """
         (parameter,) = self.numbers
         low, high = (parameter.inward(end) for end in (parameter.low, parameter.high))
@@ -212,12 +207,14 @@ class _Search:
 
         place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
+        # Few paths are off by three steps of differences at most.
         if near:
             ends = (
-                max(ends[0], place[0] - _NEAR * parameter.step),
-                min(ends[1], place[0] + _NEAR * parameter.step),
+                max(ends[0], place[0] - 3 * parameter.step),
+                min(ends[1], place[0] + 3 * parameter.step),
             )
-        enough = (_SMALL * parameter.step or 1e-7) if fine else _COARSE
+        # 2 % of a logarithm, or of the unit of the parameter, is enough to tell faults apart.
+        enough = (_SMALL * parameter.step or 1e-7) if fine else 0.02
         solved = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": enough})
         return np.array([solved.x]) if solved.fun <= loss(float(place[0])) else place
 
@@ -228,16 +225,20 @@ class _Search:
         Where they have gained, diagonals are tried too: a shadow stays where a light
         moves towards what casts it.
         """
+        # `strides` are as long as shadows are wide; moves are along the axes and the diagonals of
+        # pairs of axes.
         longest = strides = np.array([parameter.stride for parameter in self.numbers])
         least = begun = self.loss_at(place, scale)
         axes = np.eye(len(place))
         diagonals = [
             a + sign * b for n, a in enumerate(axes) for b in axes[n + 1 :] for sign in (1, -1)
         ]
-        for _ in range(_STRIDES):
+        for _ in range(10):
             before = least
-            if least < _DONE * begun:
+            # At 2 % of the loss shadows lie nearly where they should: slopes find the rest.
+            if least < 0.02 * begun:
                 break
+            # Diagonals follow the axes once a tenth of the loss is gone.
             for moves in (axes, diagonals) if least < _LITTLE * begun else (axes,):
                 for move in strides * moves:
                     for trial in (place + move, place - move):
@@ -248,8 +249,10 @@ class _Search:
                 if least < _LITTLE * before:
                     break
             else:
+                # A round that gains less than a tenth is repeated with half the stride. If steps of
+                # two sizes leave half of the loss, this fault is not what makes it.
                 strides = 0.5 * strides
-                if least > _LOST * begun and np.all(strides < 0.5 * longest):
+                if least > 0.5 * begun and np.all(strides < 0.5 * longest):
                     break
         return place
 
@@ -260,15 +263,19 @@ class _Search:
         low, high = (
             inward(self.numbers, [getattr(p, end) for p in self.numbers]) for end in ("low", "high")
         )
-        steps = np.array([parameter.step or _STEP for parameter in self.numbers])
+        # Differences of 1e-4, of a logarithm or in units of the parameter, where no paths move.
+        steps = np.array([parameter.step or 1e-4 for parameter in self.numbers])
         least = self.loss_at(place, scale)
-        for _ in range(_TURNS_LAST if near else _TURNS if fine else _TURNS_COARSE):
-            left = self.errors(outward(self.numbers, place)).ravel()
-            slopes = self._slopes(place, left, steps)
-            weights = 1 / (1 + (left / scale) ** 2)
+        for _ in range(3 if near else 8 if fine else 4):
+            # The step that is best for errors linear in the parameters. The weights are those of
+            # Cauchy's loss: an error of the scale counts half.
+            errors = self.errors(outward(self.numbers, place)).ravel()
+            slopes = self._slopes(place, errors, steps)
+            weights = 1 / (1 + (errors / scale) ** 2)
             move = -np.linalg.lstsq(
-                slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10
+                slopes * np.sqrt(weights)[:, None], errors * np.sqrt(weights), rcond=1e-10
             )[0]
+            # Halves of the step, until one is better; if none is, the search is at its end.
             for _ in range(4 if fine else 2):
                 trial = np.clip(place + move, low, high)
                 reached = self.loss_at(trial, scale)
@@ -283,15 +290,17 @@ class _Search:
             place, least = trial, reached
             if small:
                 break
+            # Differences of faults that move paths become shorter as the search comes nearer.
             steps = np.where([p.step > 0 for p in self.numbers], 0.6 * steps, steps)
         return place
 
-    def _slopes(self, place: Array, left: Array, steps: Array) -> Array:
+    def _slopes(self, place: Array, errors: Array, steps: Array) -> Array:
+        """Return the derivatives of `errors` at a place, (values, parameters), by differences."""
         at = outward(self.numbers, place)
         columns = []
         for step, axis in zip(steps, np.eye(len(place)), strict=True):
             values = outward(self.numbers, place + step * axis)
-            columns.append((self._held_errors(values, at).ravel() - left) / step)
+            columns.append((self._held_errors(values, at).ravel() - errors) / step)
         return np.stack(columns, axis=1)
 
     def _held_errors(self, values: Values, at: Values) -> Array:
@@ -302,9 +311,11 @@ class _Search:
 
 
 def _between(parameter: Number, inner: float, low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a search on the line: a start's are the starts beside
-    it, others have some room.
+    """Return the ends of a search on the line about a place.
+
+    The ends of a start are the starts beside it, unless the search is of a logarithm.
     """
+    # Everywhere else the search has some room: a factor of two, or 30 % of the value.
     step = 0.7 if parameter.scale == "log" else max(0.3 * abs(inner), 0.1)
     ends = inner - step, inner + step
     if parameter.scale != "log" and inner in parameter.starts:
@@ -316,6 +327,7 @@ def _between(parameter: Number, inner: float, low: float, high: float) -> tuple[
 
 
 def _parted(faults: Sequence[Fault], values: Values) -> tuple[Values, ...]:
+    """Return the values of each fault by itself."""
     parts, start = [], 0
     for fault in faults:
         end = start + len(fault.parameters)
@@ -325,7 +337,9 @@ def _parted(faults: Sequence[Fault], values: Values) -> tuple[Values, ...]:
 
 
 def _starts(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
-    """Return values to begin with, those of each fault chosen after what those before it change."""
+    """Return values to begin with: a fault chooses its own on the guess that the faults before it
+    have changed.
+    """
     starts: list[Values] = [()]
     for number, fault in enumerate(faults):
         before = faults[:number]

@@ -35,7 +35,7 @@ from airlight.validation.fog_model.view import (
 from airlight.validation.metrics.errors import wrong_pixels
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 
-Found = TypeVar("Found")  #: what an attempt at an image is
+Found = TypeVar("Found")  #: the result of an attempt at an image
 
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
@@ -52,16 +52,8 @@ PIXELS = tuple(PIXEL_WORDS)
 #: a pixel joins neighbours.
 APART = 2
 
-_MOST_RAYS = 3200  # every pixel of an image of 64 x 48
-_FEWEST = 64  # pixels, whatever rays they need
-# pixels that values may be cut off in, and that are looked at: chance may meet none of them
-_FEW = 4
-_STOPPED = 8  # values
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
-# mean relative change of an image with twice the samples, below which there are enough
-_SETTLED = 0.005
-_TRIED = 48  # pixels that say how many samples a light needs
 
 
 @dataclass(frozen=True)
@@ -71,7 +63,7 @@ class JudgedLayer:
     name: str
     holds: str  #: 'airlight', 'surface' or 'total'
     values: NDArray[np.floating]  #: (height, width, 3) [W/(m^2 sr)]
-    #: whether its total shows the area lights themselves: files of our own do not
+    #: whether a layer of all light shows the area lights themselves: files of our own do not
     emitted: bool = True
 
     @property
@@ -85,9 +77,20 @@ def judged_layer(
 ) -> JudgedLayer:
     """Return the layer to judge.
 
-    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the
-    only layer, else the only one that Blender calls Combined; `holds`: what it holds, one of
-    `KINDS`: by default what its name says, else all light.
+    Parameters
+    ----------
+    image, path
+        The image, and its name in messages.
+    name
+        The layer. By default 'airlight' where there is one, else the plain channels, else the only
+        layer, else the only one that Blender calls Combined.
+    holds
+        The kind of light in the layer, one of `KINDS`; by default as its name says, else all light.
+
+    Raises
+    ------
+    InputError
+        If `holds` is no such word, or no layer is the usual one.
     """
     if holds is not None and holds not in KINDS:
         raise InputError(f"holds {holds}; expected one of {', '.join(KINDS)}")
@@ -105,10 +108,13 @@ def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
 
 
 def _usual(image: Image, path: str | os.PathLike[str]) -> str:
+    """Return the name of the layer to judge where the user names none."""
+    # Standard errors are no image.
     colours = [each for each in image.layers if not each.endswith("_se")]
     for usual in (AIRLIGHT, TOTAL):
         if usual in colours:
             return usual
+    # The only layer there is, or the only one that Blender calls Combined.
     whole = [each for each in colours if each.rpartition(".")[2].lower() == _WHOLE]
     for several in (colours, whole):
         if len(several) == 1:
@@ -121,16 +127,17 @@ def _usual(image: Image, path: str | os.PathLike[str]) -> str:
 
 @dataclass(frozen=True)
 class Seen:
-    """An image and what is known of it."""
+    """An image that is to be explained, and which of its pixels and rays are looked at."""
 
     reference: ReferenceScene
     values: Array  #: (pixels, 3), all pixels of the image, row by row [W/(m^2 sr)]
     holds: str  #: 'airlight', 'surface' or 'total'
     used: Bools  #: which pixels may take part, (pixels,)
     area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
-    samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
-    rays: int = _MOST_RAYS  #: that are looked at, at most
-    #: pixels between those that are looked at in pairs, where not all are; 0: each by itself
+    samples: int = SAMPLES  #: how many stand for an area light, see `needed_samples`
+    #: how many rays are looked at, at most; by default every pixel of an image of 64 x 48
+    rays: int = 3200
+    #: distance of the two pixels of a pair [pixels], where not all are looked at; 0: no pairs
     apart: int = APART
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
 
@@ -140,12 +147,15 @@ class Seen:
         """
         pixels, count = np.flatnonzero(self.used), self.most_pixels
         if len(pixels) > count:
+            # One place at random in each of `count` equal parts of the list of pixels. Every second
+            # pixel gives way to a partner of the one before it.
             places = (np.arange(count) + np.random.default_rng(0).random(count)) * (
                 len(pixels) / count
             )
             pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
             if self.apart:
                 pixels = self._with_partners(pixels[::2])
+            # Chance may meet none of the pixels that are cut off: the same fraction of them joins.
             pixels = np.union1d(
                 pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))]
             )
@@ -169,9 +179,10 @@ class Seen:
 
     @property
     def most_pixels(self) -> int:
-        """How many pixels the rays allow, or the fewest that are looked at."""
+        """How many pixels the rays allow; 64 at least, whatever rays they need."""
+        # A ray counts once for each sample of an area light.
         return max(
-            _FEWEST,
+            64,
             self.rays
             // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1)),
         )
@@ -187,38 +198,35 @@ class Seen:
         )
 
     def _with_partners(self, pixels: Index) -> Index:
-        """Return pixels, and those to the right of them that can take part too."""
+        """Return pixels, and their partners to the right that can take part too."""
+        # A partner must be in the same row: numbers go on in the next one.
         width, partners = self.reference.width, pixels + self.apart
         partners = partners[(pixels % width + self.apart < width) & (partners < len(self.used))]
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
 
 
 def stopped(values: Array) -> Bools:
-    """Return which values stop, with seven others at least, at the largest one, as those
-    do that are cut off there.
-    """
+    """Return which values are cut off: eight values or more are equal to the largest one."""
     most = values[np.isfinite(values)].max(initial=0.0)
-    found = values == most
+    largest = values == most
     return np.asarray(
-        found if most > 0 and np.count_nonzero(found) >= _STOPPED else np.zeros_like(found)
+        largest if most > 0 and np.count_nonzero(largest) >= 8 else np.zeros_like(largest)
     )
 
 
 def _evenly(count: int, fraction: float) -> Index:
-    """Return that fraction of so many numbers, and `_FEW` at least, spread evenly."""
-    return np.linspace(0, count - 1, min(count, max(_FEW, round(count * fraction)))).astype(
-        np.int64
-    )
+    """Return a fraction of `count` numbers from 0 on, four at least, spread evenly."""
+    return np.linspace(0, count - 1, min(count, max(4, round(count * fraction)))).astype(np.int64)
 
 
 def seen_image(
     image: Image, judged: JudgedLayer, scene: Any, *, mask: Bools | None = None
 ) -> tuple[Seen, tuple[str, ...]]:
-    """Return a layer of an image as what is to be explained, and what is wrong with the
-    file: pixels not finite.
+    """Return a layer of an image that is to be explained, and the faults of the file: pixels
+    that are not finite.
 
-    Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes: pixels
-    that show one take no part, nor do those beside it, nor those that a file does not hold or a
+    Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes. Pixels
+    that show one take no part, nor do their neighbours, nor pixels that the file does not hold or a
     mask leaves out.
     """
     if mask is not None and np.shape(mask) != judged.values.shape[:2]:
@@ -240,16 +248,19 @@ def seen_image(
             "know; expected "
             "lights of type 'point', 'spot', 'directional' or 'area'"
         )
+    # Pixels row by row; a grey layer has the same value in all channels.
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(
         values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)
     ).copy()
+    # A pixel that a mask leaves out, or that the file does not hold, is no fault of the file.
     finite: Bools = np.asarray(np.isfinite(values).all(axis=1))
     used: Bools = finite.copy()
     chosen = image.with_data(None if mask is None else np.asarray(mask) != 0)
     if chosen is not None:
         used &= np.asarray(chosen).ravel()
         finite |= ~np.asarray(chosen).ravel()
+    # Only an image of all light shows the lights themselves. `lit` are the pixels that show one.
     if (
         (reference.area or reference.background is not None)
         and judged.holds == TOTAL
@@ -272,8 +283,8 @@ def seen_image(
 def layers_of(
     image: Image, path: str, name: str | None, holds: str | None
 ) -> tuple[JudgedLayer, ...]:
-    """Return the layers to explain: the one that is named, or airlight and surface
-    where an image has both.
+    """Return the layers to explain: the named layer, or airlight and surface where an image
+    has both.
     """
     if name is None and holds is None and {AIRLIGHT, SURFACE} <= image.layers.keys():
         return tuple(judged_layer(image, path, name=each) for each in (AIRLIGHT, SURFACE))
@@ -286,9 +297,10 @@ def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
     """
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"pixel: got {pixel}, expected 'centre' or 'area'")
-    said = pixel or image.attributes.get("airlight:pixel")
-    if said in PIXELS:
-        return (str(said),)
+    kind = pixel or image.attributes.get("airlight:pixel")
+    if kind in PIXELS:
+        return (str(kind),)
+    # Images of ours without that word: methods render pixel centres, path tracing means over areas.
     if "airlight:method" in image.attributes:
         return ("centre",)
     return ("area",) if "airlight:spp" in image.attributes else PIXELS
@@ -299,7 +311,7 @@ class PixelKind:
     """Whether the pixels of an image are centres or areas."""
 
     pixel: str  #: 'centre' or 'area'
-    #: mean relative ones by kind, if several were compared
+    #: mean relative errors by kind, if several kinds were compared
     errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -308,6 +320,7 @@ class PixelKind:
         names = {"centre": "centres", "area": "means over the area"}
         if not self.errors:
             return f"judged by {names[self.pixel]}"
+        # The kind that fits comes first: it is the one for which `!=` is false.
         own, other = (
             f"{100 * self.errors[kind]:.3g} % off" for kind in sorted(PIXELS, key=self.pixel.__ne__)
         )
@@ -323,18 +336,18 @@ def decide_pixel(
 ) -> tuple[PixelKind, Found]:
     """Return the kind of an image's pixels, and the attempt for this kind.
 
-    `kinds`: what they may be, see `pixel_kinds`; `errors`: what is left by attempts, which are
-    compared where there are several; `exact`: whether one leaves so little that no other can leave
-    less.
+    `kinds`: the possible kinds, see `pixel_kinds`; `errors`: the errors of attempts, which are
+    compared where there are several; `exact`: whether the error of an attempt is so small that no
+    other attempt can have a smaller one.
     """
-    found: list[Found] = []
+    attempts: list[Found] = []
     for kind in kinds:
-        found.append(attempt(kind))
-        if len(kinds) == 1 or exact(found[-1]):
-            return PixelKind(kind), found[-1]
-    left = dict(zip(kinds, errors(found), strict=True))
-    pixel = min(left, key=left.__getitem__)
-    return PixelKind(pixel, left), found[kinds.index(pixel)]
+        attempts.append(attempt(kind))
+        if len(kinds) == 1 or exact(attempts[-1]):
+            return PixelKind(kind), attempts[-1]
+    by_kind = dict(zip(kinds, errors(attempts), strict=True))
+    pixel = min(by_kind, key=by_kind.__getitem__)
+    return PixelKind(pixel, by_kind), attempts[kinds.index(pixel)]
 
 
 def relative_errors(predicted: Array, shown: Array, floor: float) -> Array:
@@ -352,16 +365,15 @@ def needed_samples(reference: ReferenceScene) -> int:
     """Return how many samples stand for an area light: twice as many until
     the image hardly changes.
 
-    A window before pillars needs 128 where a lamp above an edge needs 16: each
-    sample has its own shadows.
+    A window before pillars needs 128 samples where a lamp above an edge needs 16: each sample has
+    its own shadows.
     """
     samples, fog = SAMPLES, scene_fog(reference)
     if not reference.area:
         return samples
+    # 48 pixels, spread evenly, say how many samples are enough.
     count = reference.width * reference.height
-    view = view_of(
-        reference, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64))
-    )
+    view = view_of(reference, np.unique(np.linspace(0, count - 1, min(count, 48)).astype(np.int64)))
 
     def image(samples: int) -> Array:
         return FogModel(view, scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
@@ -369,8 +381,9 @@ def needed_samples(reference: ReferenceScene) -> int:
     values = image(samples)
     while samples < _MOST_SAMPLES:
         finer = image(2 * samples)
+        # Enough: twice the samples change the image by less than 0.5 % in the mean.
         change = np.abs(finer - values) / np.maximum(finer, 0.01 * finer.mean())
-        if float(change.mean()) < _SETTLED:
+        if float(change.mean()) < 0.005:
             break
         samples, values = 2 * samples, finer
     return samples
@@ -378,6 +391,7 @@ def needed_samples(reference: ReferenceScene) -> int:
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
     """Return a scene at the size of an image of it."""
+    # The shape of the image must be that of the scene, to a pixel in either direction.
     loaded = load_scene(scene)
     width, height = (
         (int(n) for n in loaded.scene.sensors()[0].film().size())

@@ -39,19 +39,6 @@ from airlight.validation.fit.unknowns import Unknown, read_unknowns
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.loading import LoadedScene
 
-_MOVES = 12  # rounds in which lit intervals are found again
-_STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
-_STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
-# a standard error that is always there: scenes are read, and images written, in float32
-_KNOWN = 1e-6
-_EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
-_MANY_RAYS = 20_000  # that are looked at: more say nothing new of few numbers
-_FEW_RAYS = 3000  # on which starts are compared
-_FEWER = 4
-_FEWEST = 16  # pixels
-_MANY = 0.1  # fraction of the pixels: if more are left out, the reader should look why
-_BAD = 0.99  # fraction of the variance: an image that is explained less is not understood
-
 
 @dataclass(frozen=True)
 class Fitted:
@@ -89,18 +76,23 @@ class Fit:
     def lines(self) -> list[str]:
         """The lines that `airlight compare --fit` prints beside the table of parameters."""
         holds = "airlight + surface" if self.holds == "total" else self.holds
-        left = f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and are left out"
+        outliers = (
+            f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and "
+            "are left out"
+        )
         lines = [
             f"{self.path} as {holds} of {self.scene}, {PIXEL_WORDS[self.pixel]}: "
             f"{100 * self.explained:.6g} % of its "
             f"variance is explained; the relative rmse left is {self.residual:.3g}, the usual "
             "error of a value "
             f"{self.noise:.2g}.",
-            left
-            + (": look where, by airlight compare" if self.left_out > _MANY * self.pixels else "")
+            # If more than a tenth of the pixels are left out, the reader should look why.
+            outliers
+            + (": look where, by airlight compare" if self.left_out > 0.1 * self.pixels else "")
             + ".",
         ]
-        if self.explained < _BAD:
+        # An image of whose variance less than 99 % is explained is not understood.
+        if self.explained < 0.99:
             lines.append("That is no explanation: something that was not looked for is different.")
         held = {name for group in self.confounded for name in group.parameters}
         lines += [
@@ -129,26 +121,49 @@ def fit_image(
 ) -> Fit:
     """Find the parameters that explain an image.
 
-    `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it,
-    and what is not looked for; `parameters`, `starts`: what is looked for, see
-    `validation.fit.unknowns`, and values to begin with; the scene's own by default; `layer`,
-    `holds`: which layer, and what it holds, see `validation.engine.seen.judged_layer`; `pixel`:
-    'centre' or 'area'; by default what the image says of itself, or what fits better; `mask`: which
-    pixels may take part, (height, width); all by default.
-
     Valid for single scattering: homogeneous media and height fog, point and spot lights,
     directional ones where media have bounds or density falls with height; area lights are 16 to 128
     samples here, which leaves some 0.5 % in a pixel. The intervals count pixels as independent of
     one another.
+
+    Parameters
+    ----------
+    image, path
+        The image, and its name in messages.
+    loaded
+        The scene at the size of the image: it says the geometry, the camera, the lights, and all
+        parameters that are not looked for.
+    parameters
+        The names of the parameters that are looked for, see `validation.fit.unknowns`.
+    layer, holds
+        The layer, and what it holds, see `validation.engine.seen.judged_layer`.
+    pixel
+        'centre' or 'area'; by default what the image says of itself, or what fits better.
+    mask
+        Which pixels may take part, (height, width); all by default.
+    starts
+        Values to begin with, by the name of the parameter; by default the values of the scene.
+    progress
+        Called with (fraction done, what).
+
+    Raises
+    ------
+    InputError
+        If too few pixels say something, the scene has no parameter of a name, or fits do not
+        predict the scene.
     """
+    # The layer that is fitted, the pixels that take part, and the numbers that are looked for.
     took = stopwatch()
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
     unknowns = read_unknowns(parameters, seen.reference, starts or {})
+    # Pixels that are cut off at the brightest value say only that they are brighter. 20 000 rays
+    # are looked at, each pixel by itself: more say nothing new of few numbers.
     stops = stopped(np.where(seen.used[:, None], seen.values, np.nan)).any(axis=1)
-    seen = replace(seen, used=seen.used & ~stops, rays=_MANY_RAYS, apart=0)
-    fewest = max(_FEWEST, 4 * len(unknowns))
+    seen = replace(seen, used=seen.used & ~stops, rays=20_000, apart=0)
+    # Four pixels for each number, sixteen at least.
+    fewest = max(16, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
         raise InputError(
             f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; "
@@ -160,13 +175,15 @@ def fit_image(
         tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
         return _solved(_predictor(replace(seen, area=kind == "area")), unknowns, tell)
 
-    kind, found = decide_pixel(
+    # Each kind of pixels is solved for by itself, and the kind that leaves less is right; at a mean
+    # relative error of 1e-5 the first kind is right beyond doubt.
+    kind, best = decide_pixel(
         kinds,
         solved,
-        lambda found: [_wrong(each.solution) for each in found],
-        lambda each: _wrong(each.solution) < _EXACT,
+        lambda several: [_wrong(each.solution) for each in several],
+        lambda each: _wrong(each.solution) < 1e-5,
     )
-    fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, found)
+    fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, best)
     return replace(
         fit, seconds=took().seconds, failures=wrong, note=str(image.attributes.get(NOTE, ""))
     )
@@ -196,12 +213,13 @@ def _solved(
     model = Model.of(predictor, unknowns)
     if progress is not None:
         progress(0.5, "lit intervals")
-    # Paths cost more than what is done with them: starts have some of their own
-    # where these are far fewer.
-    few = _predictor(replace(predictor.seen, rays=_FEW_RAYS))
+    # Starts are compared on 3000 rays. Paths cost more than the sums over them: these rays have
+    # paths of their own only where they are less than a quarter of all.
+    few = _predictor(replace(predictor.seen, rays=3000))
     start = best_start(
-        Model.of(few, unknowns) if len(model.image) > _FEWER * few.seen.most_pixels else model
+        Model.of(few, unknowns) if len(model.image) > 4 * few.seen.most_pixels else model
     )
+    # Some of the parameters that the image does not tell apart are held from here on.
     groups = confounded_groups(
         (model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns))
     )
@@ -209,15 +227,20 @@ def _solved(
     model, inner = model.holding(free, model.at), start[free]
     if not free.any():
         return _Solved(model, free, groups, no_solution(model))
+    # Lit intervals are held while the parameters are solved for. Where a light moves, they are
+    # found again at each solution, up to twelve times.
     inner = robust_fit(model, inner)
-    turns = _MOVES if any(unknown.held for unknown in model.unknowns) else 1
+    most_turns = 12
+    turns = most_turns if any(unknown.held for unknown in model.unknowns) else 1
     for turn in range(turns):
         solution = weighted_fit(model, inner)
         step, inner = np.abs(solution.inner - inner), solution.inner
         if progress is not None:
-            progress(0.5 + 0.5 * (turn + 1) / _MOVES, "fit")
+            progress(0.5 + 0.5 * (turn + 1) / most_turns, "fit")
+        # A light does not move any more where its step is less than a millionth of its distance
+        # from the camera, or a fiftieth of a standard error, which the interval would not show.
         error = np.sqrt(np.maximum(np.diag(solution.covariance), 0))
-        still = np.maximum(_STILL * _size(predictor.reference), _STILL_IN_NOISE * error)
+        still = np.maximum(1e-6 * _size(predictor.reference), 0.02 * error)
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
         model = replace(model, at=inner, predictor=_predictor(predictor.seen))
@@ -225,20 +248,23 @@ def _solved(
 
 
 def _size(reference: ReferenceScene) -> float:
+    """Return the distance from the camera to the farthest point or spot light [m]."""
     return max(
         (float(np.linalg.norm(light.position - reference.origin)) for light in reference.lights),
         default=1.0,
     )
 
 
-def _left(solution: Solution) -> Array:
+def _relative_residual(solution: Solution) -> Array:
     """Return the relative residual of lit values, (n,)."""
     lit = solution.radiance > 1e-3 * solution.radiance.mean()
     return np.asarray(np.abs(solution.residual[lit]) / solution.radiance[lit])
 
 
 def _wrong(solution: Solution) -> float:
-    """Return how far values are off, as `validation.engine.judge` does: no single one decides."""
+    """Return the mean relative error of the values, as `validation.engine.judge` does: no single
+    value decides it.
+    """
     floor, image = (
         FLOOR * float(np.abs(solution.radiance).mean()),
         solution.radiance + solution.residual,
@@ -250,23 +276,34 @@ def _wrong(solution: Solution) -> float:
     )
 
 
-def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], found: _Solved) -> Fit:
-    model, solution, groups = found.model, found.solution, found.groups
+def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], solved: _Solved) -> Fit:
+    """Return a solution as values with intervals.
+
+    `what`: the scene, the path, what the layer holds, and the kind of its pixels.
+    """
+    # On the whole line: held parameters stay where they begin.
+    model, solution, groups = solved.model, solved.solution, solved.groups
     doubtful = {number for group in groups for number in group.members}
     inner = Model.of(model.predictor, unknowns).at
-    inner[found.free] = solution.inner
+    inner[solved.free] = solution.inner
+    # Halves of intervals, with a standard error of 1e-6 that is always there: scenes are read, and
+    # images written, in float32.
     reach = interval_ends(model, solution) - solution.inner[:, None]
     lengths = np.full((len(unknowns), 2), np.nan)
-    lengths[found.free] = np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1])
+    lengths[solved.free] = np.copysign(np.hypot(reach, SIGMAS * 1e-6), [-1, 1])
     rows = []
     for number, unknown in enumerate(unknowns):
         value, low, high = (
             unknown.number.outward(inner[number] + part) for part in (0.0, *lengths[number])
         )
+        # A parameter of a group has no interval of its own, even if it was free.
         ends = (None, None) if number in doubtful else (_finite(low), _finite(high))
         rows.append(Fitted(unknown.name, value, *ends, unknown.unit, unknown.scene))
-    kept = solution.kept
-    image, residual = model.image[kept], solution.residual[kept]
+    # Residual and variance are those of the pixels without outliers; an image of one value has no
+    # variance to explain.
+    mask = solution.kept
+    image, residual = model.image[mask], solution.residual[mask]
+    relative = _relative_residual(solution)
     mean = float(np.abs(image).mean()) if image.size else math.nan
     spread = float(np.sum((image - image.mean(axis=0)) ** 2)) if image.size else math.nan
     return Fit(
@@ -274,9 +311,9 @@ def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], found: 
         tuple(rows),
         float(np.sqrt(np.mean(residual**2))) / mean if mean > 0 else math.nan,
         1 - float(np.sum(residual**2)) / spread if spread > 0 else math.nan,
-        len(kept),
-        int((~kept).sum()),
-        1.4826 * float(np.median(_left(solution))) if _left(solution).size else math.nan,
+        len(mask),
+        int((~mask).sum()),
+        1.4826 * float(np.median(relative)) if relative.size else math.nan,
         tuple(confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
         math.nan,
     )

@@ -5,20 +5,20 @@ disagree, with intervals.
 1. Starts are tried over three decades of extinction and the whole range of g, each with the factor
    on the image that fits best, by a loss of relative errors that no single pixel decides
    (Cauchy's).
-2. From the best of them the same loss is minimised, on few pixels first. 3. The residuals
-   tell the noise of the image:
-least squares with the weights 1/sigma^2, without outliers, until neither changes. Weights that
-depend on the model, not on the values, stay unbiased even if the noise is skewed.
+2. The same loss is minimised from the best of the starts, on few pixels first.
+3. The residuals say how large the noise of the image is. Least squares with the weights 1/sigma^2
+   and without outliers follow, until neither changes. The weights depend on the model, not on the
+   values: so the fit stays unbiased even if the noise is skewed.
 
 Noise of renderers has a constant part and a part that grows with the radiance f, so
 
     sigma^2 = a^2 + b^2 f^2,    a, b >= 0,
 
 is fitted to the scatter of the residuals in groups of like radiance. The scatter of a group is
-1.4826 times the median of |residual|, the standard deviation of a normal distribution, which pixels
-that are wrong by any amount do not move as long as they are less than half. Values that are off by
-more than six sigma are outliers, which not one of a million normal values is. They are left out,
-with all of their pixel.
+1.4826 times the median of |residual|, which is the standard deviation of a normal distribution.
+Pixels that are wrong by any amount hardly move it as long as they are fewer than half. Values that
+are off by more than six sigma are outliers: not one of a million normal values is. A pixel with an
+outlier is left out.
 
 The covariance is the sandwich
 
@@ -30,15 +30,15 @@ Zeger 1986, Biometrika 73, 13).
 
 An ellipse of the covariance is right where the image is linear in the parameters. With 20 % of
 noise an extinction may be known to a factor of two, and the intervals of the ellipse held the value
-in 83 to 89 % of cases. The profile of the sum of squares Q depends on no choice of parameters: with
-Q_k(t) the least one with parameter k held at t, and at its least Q,
+in 83 to 89 % of cases. The profile of the sum of squares depends on no choice of parameters: with
+Q_k(t) the least sum with the parameter k held at t, and Q the least sum of all,
 
     (Q_k(t) - Q) / a_k
 
 has the distribution of chi squared with one degree of freedom, where a_k is the variance of the
-sandwich over that of independent values of these weights (Venzon and Moolgavkar 1988, Appl.
-Statist. 37, 87; with the factor: Rotnitzky and Jewell 1990, Biometrika 77, 485). Where the image is
-linear, these are the ends of the ellipse.
+sandwich over the variance that independent values of these weights have (Venzon and Moolgavkar
+1988, Appl. Statist. 37, 87; with the factor: Rotnitzky and Jewell 1990, Biometrika 77, 485). Where
+the image is linear, these are the ends of the ellipse.
 """
 
 import math
@@ -63,20 +63,7 @@ _STEP = 1e-4
 _SIGMA_STARTS = (1.0, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0)
 _G_STARTS = (0.0, -0.6, 0.5, 0.85)
 _FACTORS = ("intensity", "exposure", "albedo")
-_SEARCHES, _SHORT, _LONG = 5, 20, 60  # of starts that are followed, and steps
-_USUAL = 0.05  # relative error that a start may well have
 _DIM = 0.01  # of the mean of the image: below it a value need not be right relative to itself
-_ROUNDS = 6
-_LEAST_KEPT = 0.5  # fraction of the pixels that must agree with one another
-_OUTLIER = 6.0  # standard deviations beyond which a value is left out with its pixel
-_GROUPS = 24
-_ROUNDING = 2e-7  # of the radiance: values are float32
-_LINEAR = 1e-3  # of a number on the whole line: in so short a step the image is linear in it
-_CLOSE = 0.02  # of half an interval
-_TURNS = 10  # where so many do not reach an end, there is none
-_GROWTH = 3.0  # of a step, at most
-_FARTHEST = 10.0  # a factor of 22 000, or an artanh g of 10
-_UNBOUNDED = 30.0  # a factor of 10^13: where an image allows it, there is no end
 
 
 @dataclass(frozen=True)
@@ -132,12 +119,12 @@ class Model:
         )
 
     def holding(self, free: Bools, place: Array) -> "Model":
-        """Return the model with the parameters that are not free held where they are at a place."""
-        free_ones, held_ones = (
+        """Return the model of the free parameters; the others are held at their place."""
+        free_model, held_model = (
             replace(self, unknowns=tuple(compress(self.unknowns, chosen)), at=self.at[chosen])
             for chosen in (free, ~free)
         )
-        return replace(free_ones, guess=held_ones.guess_at(place[~free]))
+        return replace(free_model, guess=held_model.guess_at(place[~free]))
 
     @property
     def relative(self) -> Array:
@@ -166,23 +153,27 @@ def best_start(model: Model) -> Array:
     Thin fog of a large albedo looks much like thick fog from afar, so that the best start
     may lead to a worse end.
     """
-    trials = sorted(_trials(model), key=lambda trial: trial[0])[:_SEARCHES]
-    ends = [_search(model, trial, _SHORT) for _, trial in trials]
+    # Five starts are followed, over 20 steps each.
+    trials = sorted(_trials(model), key=lambda trial: trial[0])[:5]
+    ends = [_search(model, trial, 20) for _, trial in trials]
     return min(ends, key=lambda end: _loss(model, model.values(end)))
 
 
 def robust_fit(model: Model, start: Array) -> Array:
-    """Return the parameters with the least Cauchy loss of relative errors, its
-    scale that of what is left.
+    """Return the parameters with the least Cauchy loss of relative errors, whose scale is the
+    size of the residual.
     """
+    # Twice, since the scale of the first search is the residual at its start. 60 steps at most.
     for _ in range(2):
-        start = _search(model, start, _LONG)
+        start = _search(model, start, 60)
     return start
 
 
 def _search(model: Model, start: Array, steps: int) -> Array:
     """Return the end of a search for the least Cauchy loss of relative errors."""
     residual, slopes = _weighted(model, 1 / model.relative, np.ones(len(model.image), dtype=bool))
+    # Errors beyond two usual ones, 1.4826 medians each, count less and less. The scale is 1e-7 at
+    # least: an image may have no error at all.
     unit = max(2 * 1.4826 * float(np.median(np.abs(residual(start)))), 1e-7)
     how: dict[str, Any] = {"loss": "cauchy", "f_scale": unit, "max_nfev": steps}
     return _least(residual, slopes, model.numbers, start, **how)
@@ -198,10 +189,10 @@ def _least(
     """Return the place with the least sum of squares, or of another loss of SciPy's, in
     the ranges of the numbers.
 
-    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image
-    that needs more tells nothing, and an unbounded step may overflow.
+    A logarithm, or an artanh, does not go farther than 10 from where it starts, a factor of 22 000:
+    an image that needs more says nothing of it, and an unbounded step may overflow.
     """
-    reach = np.array([math.inf if number.scale == "plain" else _FARTHEST for number in numbers])
+    reach = np.array([math.inf if number.scale == "plain" else 10.0 for number in numbers])
     low, high = (
         inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high")
     )
@@ -216,24 +207,28 @@ def _trials(model: Model) -> list[tuple[float, Array]]:
     The extinctions are those to begin with and, where these differ from one another, their mean:
     channels whose starts lie decades apart lead to no common end.
     """
-    given, unknowns = model.at, model.unknowns
+    begin, unknowns = model.at, model.unknowns
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]
     # If several parameters multiply the same, such as albedo and exposure, only the
     # first kind takes the factor.
     chosen = [n for n in factors if unknowns[n].kind == unknowns[factors[0]].kind]
+    # `grey` has one extinction in all channels, media and layers: the mean of the logarithms.
     trials = []
-    grey = given.copy()
-    grey[sigmas] = given[sigmas].mean() if sigmas else 0.0
-    bases = (given,) if np.array_equal(grey, given) else (given, grey)
+    grey = begin.copy()
+    grey[sigmas] = begin[sigmas].mean() if sigmas else 0.0
+    bases = (begin,) if np.array_equal(grey, begin) else (begin, grey)
     for base, times, g in product(
         bases, _SIGMA_STARTS if sigmas else (1.0,), (None, *_G_STARTS) if gs else (None,)
     ):
         trial = base.copy()
         trial[sigmas] += math.log(times)
-        trial[gs] = given[gs] if g is None else math.atanh(g)
+        # None is the value to begin with.
+        trial[gs] = begin[gs] if g is None else math.atanh(g)
         radiance = model.values(trial)
+        # Without the right factor no extinction fits: the median of image over model is one that
+        # few pixels, such as those beside a light, do not decide.
         if factors:
             lit = (radiance > _DIM * radiance.mean()) & (model.image > 0)
             usual = float(np.median(model.image[lit] / radiance[lit])) if lit.any() else 1.0
@@ -244,71 +239,80 @@ def _trials(model: Model) -> list[tuple[float, Array]]:
 
 
 def _loss(model: Model, radiance: Array) -> float:
-    return float(np.mean(np.log1p(((model.image - radiance) / model.relative / _USUAL) ** 2)))
+    # A start may well have relative errors of 5 %: only larger ones say that it is a bad one.
+    return float(np.mean(np.log1p(((model.image - radiance) / model.relative / 0.05) ** 2)))
 
 
 def weighted_fit(model: Model, start: Array) -> Solution:
     """Return the solution of least squares with the weights that the noise asks
     for, and without outliers.
     """
-    inner, kept = start, np.ones(len(model.image), dtype=bool)
-    for _ in range(_ROUNDS):
+    # Rounds of three steps: the noise that the residuals show, the outliers by this noise, and the
+    # parameters by both. `mask` are the pixels without an outlier. Six rounds at most.
+    inner, mask = start, np.ones(len(model.image), dtype=bool)
+    for _ in range(6):
         radiance = model.values(inner)
         residual = model.image - radiance
         sigma = noise_of(radiance.ravel(), residual.ravel()).reshape(radiance.shape)
-        before, kept = kept, np.all(np.abs(residual) <= _OUTLIER * sigma, axis=1)
+        old_mask, mask = mask, np.all(np.abs(residual) <= 6.0 * sigma, axis=1)
         weights = 1 / sigma
-        if kept.mean() < _LEAST_KEPT:
-            # Nothing explains most of the image: what is left is no noise. All pixels
-            # count, relative to themselves.
-            weights, kept = 1 / model.relative, np.ones_like(kept)
+        if mask.mean() < 0.5:
+            # Nothing explains most of the image: the residual is no noise. All pixels count,
+            # relative to themselves.
+            weights, mask = 1 / model.relative, np.ones_like(mask)
             break
-        last, inner = (
+        old_inner, inner = (
             inner,
-            _least(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40),
+            _least(*_weighted(model, weights, mask), model.numbers, inner, max_nfev=40),
         )
-        moved = float(np.max(np.abs(inner - last), initial=0.0))
-        if moved < 1e-9 and np.array_equal(before, kept):
+        step = float(np.max(np.abs(inner - old_inner), initial=0.0))
+        if step < 1e-9 and np.array_equal(old_mask, mask):
             break
+    # The last step moved the parameters: residual and derivatives are found once more.
     radiance = model.values(inner)
     residual = model.image - radiance
-    covariance, stretch = _sandwich(model.slopes(inner), residual, weights, kept)
-    return Solution(inner, covariance, residual, radiance, kept, weights, stretch)
+    covariance, stretch = _sandwich(model.slopes(inner), residual, weights, mask)
+    return Solution(inner, covariance, residual, radiance, mask, weights, stretch)
 
 
 def no_solution(model: Model) -> Solution:
     """Return the solution where no parameter is free."""
     radiance, empty = model.values(np.empty(0)), np.empty(0)
-    residual, kept = model.image - radiance, np.ones(len(model.image), dtype=bool)
+    residual, mask = model.image - radiance, np.ones(len(model.image), dtype=bool)
     return Solution(
-        empty, np.empty((0, 0)), residual, radiance, kept, np.ones_like(radiance), empty
+        empty, np.empty((0, 0)), residual, radiance, mask, np.ones_like(radiance), empty
     )
 
 
 def _weighted(
-    model: Model, weights: Array, kept: Bools
+    model: Model, weights: Array, mask: Bools
 ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
     """Return the function whose squares are summed, of the parameters,
     (values,), and its derivatives.
     """
     return (
-        lambda inner: ((model.image - model.values(inner)) * weights)[kept].ravel(),
-        lambda inner: -(model.slopes(inner) * weights[:, :, None])[kept].reshape(-1, len(inner)),
+        lambda inner: ((model.image - model.values(inner)) * weights)[mask].ravel(),
+        lambda inner: -(model.slopes(inner) * weights[:, :, None])[mask].reshape(-1, len(inner)),
     )
 
 
 def _sandwich(
-    derivatives: Array, residual: Array, weights: Array, kept: Bools
+    derivatives: Array, residual: Array, weights: Array, mask: Bools
 ) -> tuple[Array, Array]:
-    """Return the covariance, and its variances over those of independent
-    values of these weights.
+    """Return the covariance, and its variances over the variances that independent
+    values of these weights would have.
     """
-    slopes, count = (derivatives * weights[:, :, None])[kept], derivatives.shape[2]
+    # `slopes` and `residual * weights` are in units of sigma, (pixels, 3, parameters) and
+    # (pixels, 3). `scores` are the s of the module: a row for each pixel, summed over its channels.
+    slopes, count = (derivatives * weights[:, :, None])[mask], derivatives.shape[2]
     flat = slopes.reshape(-1, count)
-    scores = np.einsum("pck,pc->pk", slopes, (residual * weights)[kept])
+    scores = np.einsum("pck,pc->pk", slopes, (residual * weights)[mask])
+    # B is inverted for columns of the length 1, and the covariance scaled back at the end:
+    # parameters of very different size would leave no digits.
     size = np.linalg.norm(flat, axis=0)
     size = np.where(size > 0, size, 1.0)
     bread = np.linalg.pinv((flat / size).T @ (flat / size), rcond=1e-14)
+    # n pixels leave n - p degrees of freedom to the residuals of a fit with p parameters.
     freedom = len(scores) / max(len(scores) - count, 1)
     meat = (scores / size).T @ (scores / size) * freedom
     covariance = bread @ meat @ bread
@@ -321,17 +325,20 @@ def noise_of(radiance: Array, residual: Array) -> Array:
 
     `radiance`, `residual`: of the model, and image minus model, (n,) each [W/(m^2 sr)].
     """
-    usual = float(np.mean(np.abs(radiance + residual)))  # of the image
-    least = _ROUNDING * (np.abs(radiance) + 1e-3 * usual) + 1e-140
+    # An image without noise has the rounding of float32 at least, 2e-7 of the radiance.
+    mean = float(np.mean(np.abs(radiance + residual)))  # of the image
+    least = 2e-7 * (np.abs(radiance) + 1e-3 * mean) + 1e-140
+    # At most 24 groups of values of like radiance, with eight values in each at least.
     order = np.argsort(radiance)
     groups = [
-        group
-        for group in np.array_split(order, min(_GROUPS, max(1, len(order) // 8)))
-        if len(group)
+        group for group in np.array_split(order, min(24, max(1, len(order) // 8))) if len(group)
     ]
+    # Scatter of each group, and f^2 in it.
     scatter = np.array([1.4826 * np.median(np.abs(residual[group])) for group in groups])
     scatter = np.maximum(scatter, [np.median(least[group]) for group in groups])
     squares = np.array([np.median(radiance[group] ** 2) for group in groups])
+    # sigma^2 = a^2 + b^2 f^2 by least squares of relative errors: each row is divided by the square
+    # of its scatter, and should be 1. Neither a^2 nor b^2 may be negative.
     scale = max(float(squares.max()), 1e-280)
     rows = np.stack([np.ones_like(squares), squares / scale], axis=1) / scatter[:, None] ** 2
     (constant, relative), _ = nnls(rows, np.ones(len(rows)))
@@ -356,19 +363,23 @@ def interval_ends(model: Model, solution: Solution) -> Array:
 
 
 def _end(model: Model, solution: Solution, number: int, step: float) -> float:
-    """Return one end; `step` leads to that of the ellipse."""
+    """Return one end of an interval; `step` leads to the end by the ellipse."""
+    close = 0.02  # of half an interval
     best = float(solution.inner[number])
-    if not _LINEAR < abs(step) < math.inf:
+    # In a step of less than 1e-3 on the whole line the image is linear: the ellipse is right.
+    if not 1e-3 < abs(step) < math.inf:
         return best + step
-    # how the others go with it
+    # `way` says how the other parameters go with this one; the best ones of each turn correct it.
     way = solution.covariance[:, number] / solution.covariance[number, number]
-    # distances, and standard errors beyond the end there
+    # Two places with the end between them: the distance from the best parameters, and how many
+    # standard errors the profile there is beyond the end. `above` is not found yet.
     below, above = (0.0, -SIGMAS), (math.nan, math.nan)
     distance = step
-    for _ in range(_TURNS):
+    # Where ten turns find no place beyond the end, there is none.
+    for _ in range(10):
         place, errors = _profile(model, solution, number, solution.inner + distance * way)
         way, beyond = (place - solution.inner) / distance, errors - SIGMAS
-        if abs(beyond) < _CLOSE * SIGMAS or abs(above[0] - below[0]) < _CLOSE * abs(above[0]):
+        if abs(beyond) < close * SIGMAS or abs(above[0] - below[0]) < close * abs(above[0]):
             return best + distance
         # The root of a profile is nearly a line. An end that stays counts half each time
         # (the Illinois algorithm).
@@ -380,9 +391,11 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
         else:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
-            if abs(distance) > _UNBOUNDED:
+            # No end yet: a step a little beyond where a line through the profile reaches it, three
+            # times as far at most. Where an image allows 30, a factor of 10^13, there is no end.
+            if abs(distance) > 30.0:
                 break
-            distance *= min(1.1 * SIGMAS / max(errors, 1e-9), _GROWTH)
+            distance *= min(1.1 * SIGMAS / max(errors, 1e-9), 3.0)
         else:
             distance = below[0] - below[1] * (above[0] - below[0]) / (above[1] - below[1])
     return best + distance if math.isfinite(above[0]) else math.copysign(math.inf, step)
@@ -392,6 +405,7 @@ def _profile(model: Model, solution: Solution, number: int, place: Array) -> tup
     """Return the best place with one parameter held, and how many standard errors it is
     away from the best of all.
     """
+    # Q_k(t) of the module: all other parameters are fitted with the weights of the solution.
     free = np.arange(len(place)) != number
     best = place.copy()
     if free.any():
@@ -400,6 +414,7 @@ def _profile(model: Model, solution: Solution, number: int, place: Array) -> tup
         how: dict[str, Any] = {"ftol": 1e-5, "max_nfev": 20}
         weighted = _weighted(others, solution.weights, solution.kept)
         best[free] = _least(*weighted, others.numbers, place[free], **how)
+    # The root of (Q_k(t) - Q)/a_k is a number of standard errors. Rounding may make it negative.
     residual, _ = _weighted(model, solution.weights, solution.kept)
     least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
     return best, math.sqrt(

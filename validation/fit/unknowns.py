@@ -97,6 +97,7 @@ def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> 
     scene, path = float(places[light][axis]), ("moved", light, axis)
 
     def change(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        # Coordinates of a light are looked for one by one: those that an earlier one moved stay.
         moved = np.zeros((len(places), 3))
         moved[: len(guess.scenery.moved)] = guess.scenery.moved
         moved[light, axis] = p[0] - scene
@@ -105,6 +106,7 @@ def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> 
         )
 
     def held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
+        # Paths belong to the light at `at`; the fog model moves it from there without new shadows.
         guess = change(predictor, guess, at)
         return replace(guess, fog=guess.fog.put(path, p[0] - at[0]))
 
@@ -132,22 +134,25 @@ def read_unknowns(
     if not names:
         raise InputError(f"fit: got none, expected some of {', '.join(NAMES)}")
     unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog))
-    seen: set[Path] = set()
+    # Two names may stand for one number, such as sigma_t and sigma_t.r.
+    paths: set[Path] = set()
     for unknown in unknowns:
-        if seen & set(unknown.paths):
+        if paths & set(unknown.paths):
             raise InputError(f"fit: '{unknown.name}' is there twice; name each parameter once")
-        seen |= set(unknown.paths)
+        paths |= set(unknown.paths)
     for name in starts:
         if name not in {unknown.name for unknown in unknowns}:
-            known = [unknown.name for unknown in unknowns]
+            expected = [unknown.name for unknown in unknowns]
             raise InputError(
-                f"start: '{name}' is not looked for; expected one of {', '.join(known)}"
-                + nearest(name, known)
+                f"start: '{name}' is not looked for; expected one of {', '.join(expected)}"
+                + nearest(name, expected)
             )
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
 
 def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
+    # A name has up to three parts, 'sigma_t.r:fog': the kind, a channel, and a medium or light.
+    # phase.g has a dot that is no channel.
     word, _, place = name.partition(":")
     base, _, letter = word.rpartition(".")
     alone = base in ("sigma_t", "albedo", "exposure") and letter in CHANNELS
@@ -157,6 +162,7 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
             f"fit: got '{name}'; the scene has no height fog: write it as such, or look for "
             "'sigma_t'"
         )
+    # In height fog the numbers of its layers take the place of sigma_t.
     names = NAMES if fog.height is None else (*_layers_of(fog.height), *NAMES[1:])
     if kind not in names:
         raise InputError(
@@ -164,6 +170,7 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
         )
     if kind in LAYERS:
         assert fog.height is not None
+        # sigma_0 is the constant part of the density, which is no layer.
         part, layer = _PARTS[kind[:-2]], int(kind[-1]) - 1
         if layer < 0:
             return [_unknown(kind, kind, (("height", "constant"),), fog.height.constant)]
@@ -175,27 +182,36 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
                 getattr(fog.height.layers[layer], part),
             )
         ]
+    # The exposure belongs to the image; all other kinds belong to a medium or a light, and without
+    # a place there is an unknown for each.
     if kind == "exposure":
         if place:
             raise InputError(
                 f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'"
             )
         return [_unknown(name, kind, tuple((kind, channel) for channel in channels), 1.0)]
-    found = []
-    for number, own in _chosen(name, place, kind, reference, fog):
+    unknowns = []
+    for number, ending in _chosen(name, place, kind, reference, fog):
         if kind in _OF_MEDIA:
-            found += _of_medium(kind, channels, number, own, reference, fog)
+            unknowns += _of_medium(kind, channels, number, ending, reference, fog)
         elif kind == "intensity":
-            found.append(_unknown(kind + own, kind, ((kind, number),), 1.0))
+            unknowns.append(_unknown(kind + ending, kind, ((kind, number),), 1.0))
         else:
-            found.append(_coordinate(kind + own, kind, number, reference))
-    return found
+            unknowns.append(_coordinate(kind + ending, kind, number, reference))
+    return unknowns
 
 
 def _of_medium(
-    kind: str, channels: tuple[int, ...], number: int, own: str, reference: ReferenceScene, fog: Fog
+    kind: str,
+    channels: tuple[int, ...],
+    number: int,
+    ending: str,
+    reference: ReferenceScene,
+    fog: Fog,
 ) -> list[Unknown]:
+    """Return the unknowns of a medium; `ending`: of their names, where there are several media."""
     if kind == "phase.g":
+        # An isotropic medium has no lobe, and begins with g = 0.
         phase, g = (reference.medium, *reference.media)[number].phase, fog.phase[number]
         if not phase.is_constant and phase.name != "hg":
             raise InputError(
@@ -203,8 +219,9 @@ def _of_medium(
                 f"'{phase.name}'"
             )
         return [
-            _unknown(kind + own, kind, (("phase", number),), g if isinstance(g, float) else 0.0)
+            _unknown(kind + ending, kind, (("phase", number),), g if isinstance(g, float) else 0.0)
         ]
+    # Channels that are all equal in the scene are one unknown; otherwise each of them is one.
     values = getattr(fog, kind)[number]
     groups = (
         [channels]
@@ -213,7 +230,7 @@ def _of_medium(
     )
     return [
         _unknown(
-            kind + (f".{CHANNELS[group[0]]}" if len(group) == 1 else "") + own,
+            kind + (f".{CHANNELS[group[0]]}" if len(group) == 1 else "") + ending,
             kind,
             tuple((kind, number, channel) for channel in group),
             values[group[0]],
@@ -240,24 +257,27 @@ def _chosen(
         # The medium without bounds is the camera's: its id in the file is another name of it.
         around = reference.scene.sensors()[0].get_medium()
         place = "medium" if around is not None and place and place == around.id() else place
+        # A vacuum has no parameters.
         numbers = [number for number, sigma_t in enumerate(fog.sigma_t) if max(sigma_t) > 0]
         several = len(numbers) > 1
     else:
+        # Every light has an intensity; only point and spot lights, which come first, have a place.
         what, names = "light", [source.name for source in light_sources(reference)]
         several = len(names) > 1
         numbers = list(range(len(names) if kind == "intensity" else len(reference.lights)))
     names = [names[number] for number in numbers]
     if not numbers:
         raise InputError(f"fit: got '{name}'; the scene has no {what} of this kind")
-    found = [
-        (number, f":{own}" if several else "") for number, own in zip(numbers, names, strict=True)
+    choices = [
+        (number, f":{each}" if several else "") for number, each in zip(numbers, names, strict=True)
     ]
     if not place:
-        return found
+        return choices
+    # A name wins over a number: a light may be called '2'.
     if place in names:
-        return [found[names.index(place)]]
-    if place.isdigit() and 1 <= int(place) <= len(found):
-        return [found[int(place) - 1]]
+        return [choices[names.index(place)]]
+    if place.isdigit() and 1 <= int(place) <= len(choices):
+        return [choices[int(place) - 1]]
     raise InputError(
         f"fit: got '{name}', expected a {what} of the scene, {', '.join(names)}, or its number"
         + nearest(place, names)
@@ -265,6 +285,7 @@ def _chosen(
 
 
 def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
+    # The logarithm of a parameter that is 0 in the scene has no place to begin.
     value = float(starts.get(unknown.name, unknown.scene))
     scale = unknown.number.scale
     if scale == "log" and unknown.name not in starts and value <= 0:

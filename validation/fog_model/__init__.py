@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The single scattering of an image as a function of what describes the fog.
 
-Where light passes and where it is hidden is found once, by the reference's own lit intervals. The
-rest is a sum over nodes on them in which extinction, albedo, phase function and intensities are
+The lit intervals of the reference say once where light passes and where it is hidden. An image is
+then a sum over nodes on them. In this sum extinction, albedo, phase function and intensities are
 free, and so are the laws that an engine may get wrong: `airlight compare --fit` and `airlight
-compare --diagnose` search among these for what explains an image.
+compare --diagnose` search among these for the explanation of an image.
 
 Read in this order:
 

@@ -9,16 +9,17 @@ and everything in the integrand of the airlight has its singularities at |Im w| 
 the phase function (`reference.quadrature.homogeneous` says why). With half a panel of the width 1.2
 the ellipse of regularity has rho = 1.31 + sqrt(1 + 1.31^2) = 2.96, so eight Gauss-Legendre nodes
 err by about rho^-16 = 3e-8, and four nodes on a panel of the width 0.6 (rho = 10.6) by 6e-9. The
-extinction adds exp(-sigma_t height e^w), entire in w; a panel over which it falls by many orders is
-the only hard one, and what is left beyond it is small.
+extinction adds exp(-sigma_t height e^w), entire in w. Only a panel over which this factor falls by
+many orders is hard, and the light beyond such a panel is small.
 
 The path from a directional light is unbounded, so that only media with bounds attenuate it; between
 the kinks of its lengths (`reference.quadrature.segments`) the integrand is an exponential of a
 linear function, and eight nodes are exact to rounding over up to four optical depths.
 
 In height fog pieces end where the density has kinks too, and panels span four scale heights at
-most, two under a sun: over these the density changes smoothly. A light path out of the fog has the
-length 0 here, as in homogeneous fog; its optical depth is that of a column, which the fog knows.
+most, two under a directional light: over these the density changes smoothly. A light path out of
+the fog has the length 0 here, as in homogeneous fog; its optical depth is the depth of a column,
+which the fog knows.
 """
 
 from collections.abc import Sequence
@@ -43,17 +44,10 @@ from airlight.validation.arrays import Array, Bools, Index
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
 
-_NOTHING_LEFT = 40.0  # optical depth after which e^-40 = 4e-18 of the light is left
-# fraction of the scene's extinction down to which unbounded rays are long enough
-_THINNEST = 1 / 30
-_AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
-# height over distance below which a light beside a piece may as well be at this height
-_NEAR_ZERO = 1e-15
+# Widest panel, and widest interval that few nodes serve: in w before a light at a place, in optical
+# depths of the scene's own extinction before a directional light.
 _PANEL, _SHORT = 2.4, 0.6
-_DEEP, _SHALLOW = 4.0, 0.5  # the same in optical depths, at the scene's own extinction
-_SCALE_HEIGHTS = 4.0  # that a panel spans at most
-# times that a stretch before a sun is halved towards its beginning: dense fog ends within the first
-_HALVES = 8
+_DEEP, _SHALLOW = 4.0, 0.5
 _MOST = 64  # panels of a piece
 # nodes on a panel and on a short one: of a light, of a sample of an area light
 _OF_ONE, _OF_MANY = (8, 4), (4, 2)
@@ -120,6 +114,7 @@ def point_nodes(
     `reach`: which parts of the rays it reaches; `ends`: distances between which rays have nodes,
     (rays,) each [m]; all by default.
     """
+    # Lit stretches are cut where the medium changes, so that a piece lies in one medium.
     rays = reach.rays
     stretches = _within(lit_stretches(light, rays, reach.lit), ends)
     if reference.media:
@@ -130,27 +125,33 @@ def point_nodes(
         pieces = _unbounded(reference, stretches, light.position)
     # The reference counts media with bounds from 0 and calls what surrounds them -1.
     ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
+    # `foot_gap` is the distance between a piece and the foot point of the light, 0 where the piece
+    # contains it.
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
-    beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
-    height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
+    foot_gap = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+    # A height of 0 has no w. A light beside a piece may as well be 1e-15 of its distance above the
+    # ray; a ray below 1e-290 m meets the light.
+    height = np.maximum(rays.height[ray], np.maximum(1e-15 * foot_gap, 1e-290))
     start = np.arcsinh(s0 / height)
     width = np.arcsinh(s1 / height) - start
     if isinstance(reference.medium, HeightMedium):
+        # In height fog the integrand has to be smooth in w and in the density: pieces become panels
+        # in w first, and then parts of panels that span four of the least scale heights at most.
         piece, start, width = equal_panels(
             np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1)
         )
         low, high = (foot[piece] + height[piece] * np.sinh(w) for w in (start, start + width))
-        span = (
-            _scale_heights(reference.medium, *_heights(reference, ray[piece], low, high))
-            / _SCALE_HEIGHTS
-        )
+        span = _scale_heights(reference.medium, *_heights(reference, ray[piece], low, high)) / 4.0
         number, start, width = equal_panels(
             np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST)
         )
         piece = piece[number]
         ray, foot, height, medium = ray[piece], foot[piece], height[piece], medium[piece]
+    # A light whose profile is a cosine is one of many samples of an area light.
     orders = _OF_MANY if light.cosine else _OF_ONE
     owner, w, weight = panel_nodes(start, width, orders=orders)
+    # tanh w is the cosine of the angle between light path and ray, and minus that of scattering;
+    # a node stands for the length of ray dx = height cosh w dw = r dw.
     ray, foot, height = ray[owner], foot[owner], height[owner]
     sine, r = np.tanh(w), height * np.cosh(w)
     x = foot + height * np.sinh(w)
@@ -183,11 +184,14 @@ def parallel_nodes(
             reference, rays, camera_segments(reference, reach.distance), stretches
         )
         depth = (pieces.x1 - pieces.x0) * by_medium(reference, "sigma_t", pieces.medium).max(axis=1)
+    # The depth of a piece says how many panels it has; in x these panels are equally long.
     width, depth = pieces.x1 - pieces.x0, np.maximum(depth, 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
     x, direction = pieces.x0[owner] + width[owner] * place, reference.direction[ray]
     point, unbounded = reference.origin + x[:, None] * direction, np.full(len(x), np.inf)
+    # The light path goes from the node against the light without end; a distance of 1 and no
+    # direction from the light stand in the record for what a directional light does not have.
     segment = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), unbounded)
     camera, medium = lengths(reference, reference.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
@@ -208,14 +212,17 @@ def surface_points(
     `distance`: of the surfaces along the rays, (rays,) [m]; `reflected`: f cos, (rays, 3) [1/sr];
     `lit`: which of them the light reaches, (rays,).
     """
+    # Points that reflect nothing towards the camera cost paths and add nothing.
     ray = np.flatnonzero(lit & np.any(reflected > 0, axis=1))
     direction, x = reference.direction[ray], distance[ray]
     point = reference.origin + x[:, None] * direction
     if isinstance(light, DirectionalLight):
+        # Irradiance does not fall with the distance, which is 1 by convention.
         r, towards, value = np.ones(len(ray)), np.zeros_like(point), reflected[ray]
         way = np.broadcast_to(-light.direction, point.shape)
         segment = lengths(reference, point, way, np.full(len(ray), np.inf))
     else:
+        # A surface that touches the light has no direction from it; `tiny` keeps the vector finite.
         way = point - light.position
         r = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
         towards = way / r[:, None]
@@ -244,6 +251,8 @@ def panel_nodes(
     owner, place, weight
         Number of the interval, variable and weight of each node, (nodes,) each; sorted by interval.
     """
+    # Short intervals first, then all others: `chosen` are the numbers of the intervals of either
+    # kind. Both orders of nodes are in the result.
     few = width <= short
     owners, places, weights = [], [], []
     for chosen, order in ((np.flatnonzero(few), orders[1]), (np.flatnonzero(~few), orders[0])):
@@ -253,33 +262,36 @@ def panel_nodes(
         owners.append(np.repeat(owner, order))
         places.append((begin[:, None] + 0.5 * size[:, None] * (1 + node)).ravel())
         weights.append((0.5 * size[:, None] * weight).ravel())
+    # A stable order keeps the nodes of an interval ascending.
     owner = np.concatenate(owners)
     by_owner = np.argsort(owner, kind="stable")
     return owner[by_owner], np.concatenate(places)[by_owner], np.concatenate(weights)[by_owner]
 
 
 def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
-    """Return how much of straight lines lies in each medium, that without
-    bounds first, (n, media) [m].
+    """Return the length of straight lines in each medium, the medium without bounds first,
+    (n, media) [m].
 
     `origin`, `direction`: of the lines, (3,) or (n, 3) [m], and (n, 3); `reach`: how long they are,
-    (n,) [m]; infinite where nothing surrounds the media, whose length is then given as 0.
+    (n,) [m]; for an unbounded line the length in the medium without bounds is given as 0.
     """
+    # The medium without bounds has what the media with bounds leave of the line.
     inside = []
     for medium in reference.media:
         enter, leave = crossings(medium.bounds, origin, direction)
         inside.append(np.maximum(np.minimum(leave, reach) - np.maximum(enter, 0.0), 0.0))
     around = np.where(np.isfinite(reach), reach, 0.0) - sum(inside)
+    # For an unbounded line the rest is negative, and 0 by the same maximum.
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
 def _within(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches:
-    """Return what lies of lit stretches between the ends of their rays."""
+    """Return the parts of lit stretches between the ends of their rays."""
     ray, x0, x1 = stretches
     if ends is not None:
         x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
-    used = x1 > x0
-    return ray[used], x0[used], x1[used]
+    inside = x1 > x0
+    return ray[inside], x0[inside], x1[inside]
 
 
 def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) -> Pieces:
@@ -288,6 +300,8 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
 
     `place`: an unbounded ray is followed from its foot point from there until little light is left.
     """
+    # `sigma_t` [1/m] decides how far an unbounded ray is followed: in height fog the largest
+    # density at the heights of light, camera and bases of layers; elsewhere the extinction itself.
     medium, (ray, x0, x1), direction = reference.medium, stretches, reference.direction
     kinks = np.empty(0, np.int64), np.empty(0)
     if not isinstance(medium, HeightMedium):
@@ -300,11 +314,14 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
             *(layer.base for layer in fog.layers),
         ]
         sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])
+        # Where rays pass the heights of kinks: a horizontal ray never does, and divides by 0.
         with np.errstate(divide="ignore", invalid="ignore"):
             x = (np.array(fog.kinks)[:, None] - reference.origin @ up) / (direction @ up)
         number, row = np.nonzero(np.isfinite(x) & (x > 0))
         kinks = row, x[number, row]
-    far = _NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min()) if np.any(sigma_t > 0) else 0.0
+    # After the optical depth 40, e^-40 = 4e-18 of the light is left. The fog that is tried may be
+    # thinner than the scene's: rays are long enough down to a thirtieth of its extinction.
+    far = 40.0 / (1 / 30 * sigma_t[sigma_t > 0].min()) if np.any(sigma_t > 0) else 0.0
     foot = np.sum((place - reference.origin) * direction[ray], axis=1)
     pieces = whole((ray, x0, np.where(np.isinf(x1), np.maximum(x0, foot) + far, x1)))
     return cut(pieces, kinks) if len(ray) and len(kinks[0]) else pieces
@@ -333,15 +350,21 @@ def _before_sun(
     """
     medium = reference.medium
     assert isinstance(medium, HeightMedium)
+    # `mu` is the sine of the light's height over the horizon.
     fog, mu = fog_of(medium), float(-light.direction @ medium.up)
     pieces = _unbounded(reference, stretches, reference.origin)
-    for _ in range(_HALVES):
+    # The first piece of every stretch is halved towards its beginning eight times: dense fog ends
+    # within the first part.
+    for _ in range(8):
         first = pieces.first
         middle = 0.5 * (pieces.x0 + pieces.x1)[first]
         pieces = cut(pieces, (pieces.ray[first], middle))
+    # Pieces above or below the fog have no density and need no nodes.
     (middle,) = _heights(reference, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
     pieces = pieces[np.isfinite(fog.log_density(middle))]
     low, high = _heights(reference, pieces.ray, pieces.x0, pieces.x1)
+    # Where the ray climbs by dz, the light path to it changes by dz/mu: the exponent of a node
+    # changes with the depth of both paths. A panel of four depths spans two scale heights at most.
     steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
     return pieces, np.minimum(
@@ -355,6 +378,8 @@ def _profile(light: ReferenceLight, direction: Array) -> Array:
     """
     if light.axis is None:
         return np.ones(len(direction))
+    # The fall-off of a spot is a function of the angle along a ray. A ray from the light along the
+    # direction itself has its points at the angle pi/2.
     inside = np.arccos(np.clip(direction @ light.axis, -1.0, 1.0)) <= light.cutoff
     straight = np.full((len(direction), 1), 0.5 * np.pi)
     return (

@@ -5,9 +5,10 @@ With the lengths c_k to the camera and l_k to the light in the medium k, a node 
 
     albedo_m sigma_m I p_m(cos) / (4 pi)  weight / r^2  exp(-sum_k sigma_k (a c_k + b l_k)),
 
-a and b the fractions of the extinction that attenuate either segment, 1 if correct. A surface point
-adds its radiance times the same exponential. Visibility is fixed. Where a light is moved by d from
-where the paths begin, a node at r v from it (v of unit length, w along the ray) has
+where a and b are the fractions of the extinction that attenuate the segment to the camera and the
+segment to the light, 1 if correct. A surface point adds its radiance times the same exponential.
+Visibility is fixed. Where a light is moved by d and its paths are not, a node at r v from the place
+where the paths begin (v of unit length, w along the ray) has
 
     r' = |r v - d|,    cos = -(r v - d) . w / r',
 
@@ -37,10 +38,9 @@ Path = tuple[str | int, ...]  #: of a number in a fog: fields, and places in tup
 #: of the cosine of the scattering angle, of mean 1 over the sphere
 PhaseLaw = Callable[[Array], Array]
 
-_LARGEST = 1e100  # whose square is a number too
-
 
 def _put(whole: Any, path: Path, value: Any) -> Any:
+    # Records are copied from the number at the end of the path outwards: none of them is changed.
     if not path:
         return value
     first, rest = path[0], path[1:]
@@ -51,7 +51,7 @@ def _put(whole: Any, path: Path, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Fog:
-    """Media, lights and laws. Tuples have an entry for each medium, that without bounds
+    """Media, lights and laws. Tuples have an entry for each medium, the medium without bounds
     first, or for each light.
     """
 
@@ -92,20 +92,21 @@ class Fog:
 
     @property
     def ends(self) -> Ends | None:
-        """Between what along the rays it is; None where all of them are in it."""
+        """Between which distances rays are in the fog; None where all of every ray is in it."""
         if "ends" in self.planar:
             return 0.0, np.inf, "depth"
-        some = self.near > 0 or np.isfinite(self.far)
-        return (self.near, self.far, "spheres" if self.spherical else "planes") if some else None
+        bounded = self.near > 0 or np.isfinite(self.far)
+        return (self.near, self.far, "spheres" if self.spherical else "planes") if bounded else None
 
     @property
     def without_factors(self) -> "Fog":
-        """The fog without what multiplies the light of each source, see `combined`."""
+        """The fog without the factors that multiply the light of each source, see `combined`."""
         one = (1.0,) * len(self.intensity)
         return replace(self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
 
     def combined(self, by_light: Array) -> Array:
         """Return airlight and surfaces, (2, m, 3), from what `FogModel.by_light` returns."""
+        # Axes of the sum: k the layer, l the light, p the pixel, c the channel.
         factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
         return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
@@ -118,6 +119,8 @@ def scene_fog(reference: ReferenceScene) -> Fog:
         if isinstance(medium, HeightMedium)
         else (None, (0.0, 0.0, 1.0))
     )
+    # Lights are counted as in `view.light_sources`. In height fog the density carries the
+    # extinction, so that 1 stands in its place.
     one = (1.0,) * (len(reference.lights) + len(reference.directional) + len(reference.area))
     return Fog(
         sigma_t=tuple(colour(each.sigma_t) for each in media)
@@ -169,6 +172,9 @@ class FogModel:
         """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)];
         no number is out of range.
         """
+        # Extreme parameters of a search overflow: values out of range become a number whose square
+        # is a number too, so that its loss can be computed.
+        largest = 1e100
         view = self.view
         radiance = np.zeros((2, len(self.lights), len(view.pixels), 3))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -176,19 +182,25 @@ class FogModel:
                 for layer, places in enumerate((light.nodes, light.surface)):
                     if len(places.r):
                         radiance[layer, number] = self._sums(places, fog, number) * light.intensity
+        # Each pixel has the sum over its rays so far: the mean is this sum over their number.
         radiance *= len(view.pixels) / len(view.ray_pixel)
-        return np.nan_to_num(radiance, nan=_LARGEST, posinf=_LARGEST, neginf=-_LARGEST)
+        return np.nan_to_num(radiance, nan=largest, posinf=largest, neginf=-largest)
 
     def transmittance(self, fog: Fog) -> Array:
-        """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
+        """Return the transmittance of the rays up to their ends, the mean over each pixel,
+        (m, 3) [1].
+        """
         view = self.view
         length = _between_ends(view.length, fog, 1 / (view.reference.direction @ view.axis))
         if fog.height is not None:
+            # In height fog the length becomes the optical depth of the ray. A horizontal ray stays
+            # at its height, even if it is unbounded: 0 times infinity is not a number.
             origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
             length[:, AROUND] = fog.height.along(origin, end, length[:, AROUND], rise)
-        some = np.any(np.array(fog.sigma_t) > 0, axis=1)
-        depth = length[:, some] @ np.array(fog.sigma_t)[some]
+        # A vacuum attenuates nothing over any length, even an infinite one: it is left out.
+        attenuating = np.any(np.array(fog.sigma_t) > 0, axis=1)
+        depth = length[:, attenuating] @ np.array(fog.sigma_t)[attenuating]
         count = np.bincount(view.ray_pixel)
         return np.stack(
             [np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1
@@ -196,6 +208,8 @@ class FogModel:
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:
         """Return the light from the places to each pixel, for intensity 1, (m, 3)."""
+        # `slant` is the length of a ray over its depth along the axis of the camera; `away` leads
+        # from the light to the places [m].
         view = self.view
         layer = int(places.is_surface)
         direction, pixel = view.reference.direction[places.ray], view.ray_pixel[places.ray]
@@ -206,11 +220,16 @@ class FogModel:
             places.light,
             places.towards * places.r[:, None],
         )
+        # A light that is moved by d with its paths held: r' = |r v - d| and
+        # cos = -(r v - d) . w / r' of the module, and its path grows with r'/r in every medium.
         if any(fog.moved[number]):
             away = away - np.array(fog.moved[number])
             r = np.linalg.norm(away, axis=1)
             cosine = -np.sum(away * direction, axis=1) / r if len(cosine) else cosine
             light = light * (r / places.r)[:, None]
+        # The radiance of surface points contains 1/r^2, which is taken out for the law of the fog;
+        # the weight of nodes has no distance in it. A march that takes steps of depth for steps of
+        # distance makes the nodes' lengths of ray shorter by `slant`.
         strength = _falls(r, fog)
         if places.is_surface:
             strength = strength * places.r**2
@@ -220,6 +239,8 @@ class FogModel:
                 * places.value[:, 0]
                 / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
             )
+        # The lengths to the camera, or the depths that are taken for them, within the near and far
+        # ends of the medium without bounds.
         flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
         camera = _between_ends(
             places.camera / slant[:, None] if flat else places.camera, fog, slant
@@ -232,21 +253,26 @@ class FogModel:
             np.array(fog.sigma_t),
             len(view.pixels),
         )
+        # One exponential serves all channels of the same extinction. A node whose exponent is no
+        # number, such as 0 times an infinite length, sends nothing.
         for channels in _alike(fog):
             depth = (
                 fog.camera_segment[layer] * camera + fog.light_segment[layer] * light
             ) @ sigma_t[:, channels[0]]
-            left = strength * np.exp(
+            attenuated = strength * np.exp(
                 np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf)
             )
             if places.is_surface:
                 for channel in channels:
-                    total[:, channel] = np.bincount(pixel, left * places.value[:, channel], count)
+                    total[:, channel] = np.bincount(
+                        pixel, attenuated * places.value[:, channel], count
+                    )
                 continue
+            # Albedo and extinction of a medium multiply the sum over the nodes in it.
             for medium in range(len(sigma_t)):
-                here = slice(None) if len(sigma_t) == 1 else places.medium == medium
-                scattered = left[here] * self._phase(places, number, medium, fog, cosine)[here]
-                summed = np.bincount(pixel[here], scattered, count)
+                nodes = slice(None) if len(sigma_t) == 1 else places.medium == medium
+                phase = self._phase(places, number, medium, fog, cosine)[nodes]
+                summed = np.bincount(pixel[nodes], attenuated[nodes] * phase, count)
                 for channel in channels:
                     total[:, channel] += (
                         fog.albedo[medium][channel] * sigma_t[medium, channel] * summed
@@ -265,9 +291,12 @@ class FogModel:
         assert density is not None
         origin = reference.origin @ fog.up
         z = origin + places.x * (reference.direction[places.ray] @ fog.up)
+        # Lights count point and spot lights first, then directional ones: `sun` is the number of a
+        # directional light, and outside the range of these for all others.
         camera, light, sun = camera.copy(), light.copy(), number - len(reference.lights)
         camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
         if 0 <= sun < len(reference.directional):
+            # The column above a place over the sine of the light's height over the horizon.
             light[:, AROUND] = density.column(z) / max(
                 float(-reference.directional[sun].direction @ fog.up), 1e-300
             )
@@ -281,23 +310,26 @@ class FogModel:
             return henyey_greenstein(law)(cosine)
         if law is not None:
             return law(cosine)
-        # the scene's own does not change, not even where a light moves a little
+        # The scene's own phase function is evaluated once, at the scattering angles of the paths:
+        # it does not change, not even where a light moves a little.
         key = number, medium
         if key not in self._phases:
             reference = self.view.reference
-            own = (reference.medium, *reference.media)[medium].phase
+            phase = (reference.medium, *reference.media)[medium].phase
             self._phases[key] = (
-                np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
+                np.ones(len(cosine)) if phase.is_constant else phase(np.clip(places.cosine, -1, 1))
             )
         return self._phases[key]
 
 
 def _between_ends(length: Array, fog: Fog, slant: Array) -> Array:
-    """Return a copy of lengths from the camera in each medium, (n, media), where one begins
-    and ends as the fog says.
+    """Return a copy of lengths from the camera in each medium, (n, media), in which the medium
+    without bounds begins and ends as the fog says.
 
     `slant`: lengths of rays over their depth along the camera's axis, (n,).
     """
+    # Only the medium without bounds begins and ends. Lengths are measured along the ray: a plane at
+    # the depth z is at the distance z times `slant`.
     ends, length = (1.0 if fog.spherical else slant), length.copy()
     length[:, AROUND] = np.maximum(
         np.minimum(length[:, AROUND], fog.far * ends) - fog.near * ends, 0.0

@@ -2,8 +2,8 @@
 """The rays of some pixels, their lit intervals, and from both all
 single-scattering paths of a scene.
 
-The lit intervals depend on the place of a light and the width of its cone, not on its fall-off, the
-fog or the values: a view finds them once.
+The lit intervals depend on the place of a light and on the width of its cone. They do not depend on
+its fall-off, the fog or the values: a view finds them once.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -44,8 +44,6 @@ Light = ReferenceLight | DirectionalLight
 Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
-_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light
-_BEFORE = 1 - 1e-4  # fraction of the way to a light that a shadow ray goes
 
 
 @dataclass(frozen=True)
@@ -56,14 +54,14 @@ class Scenery:
 
     shadows: bool = True
     unshadowed: tuple[int, ...] = ()  #: numbers of lights of which nothing casts a shadow
-    offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
+    offset: tuple[float, float] = (0.0, 0.0)  #: shift of all rays, to the right and down [pixels]
     zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
-    #: of the first point and spot lights [m]
+    #: by how much the first point and spot lights are moved [m]
     moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     cone: float = 1.0  #: factor on the angles of spots
-    #: of spots: 'hard', 'smooth' from the axis on, or one of `EDGES`; the scene's own
+    #: how spots fall off: 'hard', 'smooth' from the axis on, one of `EDGES`, or '' as in the scene
     edge: str = ""
-    radius: float = 0.0  #: of spheres in the place of point lights [m]
+    radius: float = 0.0  #: radius of the spheres that take the place of point lights [m]
     #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
     blend: float = 0.0
 
@@ -71,13 +69,17 @@ class Scenery:
         """Return the point and spot lights of a scene as this scenery has them."""
         lights = []
         for number, light in enumerate(reference.lights):
+            # `moved` may be shorter than the list of lights: the others stay.
             if number < len(self.moved):
                 light = replace(light, position=light.position + np.array(self.moved[number]))
+            # Beam and cut-off are angles to the axis: a spot stays below a hemisphere.
             if light.axis is not None and self.cone != 1:
                 cutoff, beam = (
                     min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam)
                 )
                 light = replace(light, cutoff=cutoff, beam=beam)
+            # Mitsuba's spot falls off between beam and cut-off: a hard edge has no room for that, a
+            # smooth one has all of the cone. The other edges are factors, see `_edged`.
             if light.axis is not None and self.edge in ("hard", "smooth"):
                 light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
             lights.append(light)
@@ -86,8 +88,8 @@ class Scenery:
 
 SCENERY = Scenery()  #: as the scene has it
 
-#: How spots fall off, by the fraction of the way from the cosine of the cut-off to
-#: that of the beam's edge.
+#: How spots fall off, by the fraction of the way from the cosine of the cut-off to the cosine of
+#: the beam's edge.
 EDGES: Mapping[str, Callable[[Array], Array]] = {
     "linear": lambda part: part,
     "square": lambda part: part**2,
@@ -113,6 +115,7 @@ class View:
 
     def ends(self, ends: Ends) -> tuple[Array, Array]:
         """Return the distances along the rays between which a fog is (rays,) each [m]."""
+        # Planes cut a ray at their depth over the cosine to the camera's axis.
         near, far, word = ends
         cosine = self.reference.direction @ self.axis
         if word == "depth":
@@ -128,7 +131,9 @@ class View:
         does not shadow its samples.
         """
 
-        def found() -> Any:
+        def lit_parts() -> Any:
+            # The shapes that can stand in the light: none without shadows; for the samples of an
+            # area light neither its own shape nor what lies behind it.
             reference, shapes = self.reference, self.shapes
             empty = self._once("empty", lambda: mi.load_dict({"type": "scene"}))
             if not shadows:
@@ -137,24 +142,28 @@ class View:
                 reference, shapes = self._once(
                     ("before", area.name), lambda: before_light(reference, area)
                 )
+            # Where exact intervals cost too much, shadow rays test the cone of the light.
             if self.steps and shadows and not isinstance(light, DirectionalLight):
                 whole = lit_rays(
                     replace(reference, occluders=empty), light, self.distance, checks=0
                 )
                 return self._tested(whole, light, reference.occluders)
-            # Intervals by geometry are what they are: random checks only say how far to trust them.
-            known = None
-            # shapes are searched once for all samples
+            # Obstacles near the light paths of an area light are searched once for all its samples.
+            near_shapes = None
             if area is not None and not isinstance(light, DirectionalLight):
                 ball = Ball(area.centre, area.radius)
-                known = self._once(
+                near_shapes = self._once(
                     ("near", area.name, shadows),
                     lambda: obstacles(reference, ball, self.distance, shapes),
                 )
-            return lit_rays(reference, light, self.distance, shapes=shapes, known=known, checks=0)
+            # Intervals by geometry stay as they are: random checks would only say how far to trust
+            # them.
+            return lit_rays(
+                reference, light, self.distance, shapes=shapes, known=near_shapes, checks=0
+            )
 
         return self._once(
-            ("reach", _place_of(light), shadows, None if area is None else area.name), found
+            ("reach", _place_of(light), shadows, None if area is None else area.name), lit_parts
         )
 
     def _tested(self, reach: LitRays, light: ReferenceLight, occluders: Any) -> LitRays:
@@ -164,11 +173,14 @@ class View:
         rays, ray = reach.rays, reach.lit.ray
         if not len(ray):
             return reach
+        # Every interval is divided into `steps` equal angles at the light. Shadow rays test their
+        # middles, the odd ones of the 2 steps + 1 places; the even places are their ends.
+        # A light with a cosine is one of many samples, which smooth its shadows together.
         low, high = (rays.theta(x, ray)[:, None] for x in (reach.lit.low, reach.lit.high))
-        # many samples of a light smooth its shadows
         steps = self.steps // 4 if light.cosine else self.steps
         theta = low + (high - low) * np.arange(2 * steps + 1) / (2 * steps)
         x = rays.distance(theta, ray[:, None])
+        # The ends of an interval keep all their digits.
         x[:, 0], x[:, -1] = reach.lit.low, reach.lit.high
         place = rays.origin + x[:, 1::2, None] * rays.direction[ray, None]
         way = (light.position - place).reshape(-1, 3)
@@ -177,8 +189,11 @@ class View:
         shadow_ray = mi.Ray3f(
             vectors(mi.Point3f, place.reshape(-1, 3)), vectors(mi.Vector3f, towards)
         )
-        shadow_ray.maxt = on_device(mi.Float, _BEFORE * far)
+        # The shadow ray ends a ten-thousandth of the way before the light.
+        shadow_ray.maxt = on_device(mi.Float, (1 - 1e-4) * far)
         lit = ~np.array(occluders.ray_test(shadow_ray), dtype=bool).reshape(-1, steps)
+        # A run of lit steps begins where the step before it is dark, and ends where the next one
+        # is; beginnings and ends have the same order.
         beside = np.pad(lit, ((0, 0), (1, 1)))
         row, first = np.nonzero(lit & ~beside[:, :-2])
         last = np.nonzero(lit & ~beside[:, 2:])[1]
@@ -189,7 +204,8 @@ class View:
         them it reaches, (rays,).
         """
 
-        def found() -> tuple[Array, Bools]:
+        def reflection() -> tuple[Array, Bools]:
+            # A ray that meets nothing has its point at the camera, and is never lit.
             visible = np.isfinite(self.distance)
             point = (
                 self.reference.origin
@@ -208,6 +224,7 @@ class View:
                 # light would compile again.
                 place = np.broadcast_to(light.position, point.shape)
                 shadow_ray = self.interaction.spawn_ray_to(vectors(mi.Point3f, place))
+            # Mitsuba's BSDFs contain the cosine of the incident light.
             local = self.interaction.to_local(vectors(mi.Vector3f, towards))
             reflected = as_rows(
                 self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing)
@@ -217,11 +234,11 @@ class View:
                 lit &= ~np.array(self.reference.occluders.ray_test(shadow_ray, facing), dtype=bool)
             return reflected, lit
 
-        return self._once(("surface", _place_of(light)[:2], shadows), found)
+        return self._once(("surface", _place_of(light)[:2], shadows), reflection)
 
-    def _once(self, key: Any, found: Callable[[], Any]) -> Any:
+    def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
         if key not in self._found:
-            self._found[key] = found()
+            self._found[key] = compute()
         return self._found[key]
 
 
@@ -253,6 +270,8 @@ def view_of(
     """
     size = reference.width, reference.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
+    # Places on the film [pixels], zoomed about its middle and shifted: the camera's rays through
+    # them take the place of the scene's.
     positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
     positions = middle + scenery.zoom * (positions - middle) + np.asarray(scenery.offset)
     rays = replace(
@@ -260,6 +279,7 @@ def view_of(
     )
     shapes, hits = read_shapes(reference.occluders), surface_hits(rays)
     distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
+    # `lengths` gives an unbounded line the length 0 in the medium without bounds.
     length = lengths(rays, reference.origin, rays.direction, distance)
     length[~np.isfinite(distance), 0] = np.inf
     owner = np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2)
@@ -268,13 +288,13 @@ def view_of(
 
 
 def _positions(centres: Array, rays_per_side: int) -> Array:
-    """Return places on the film, those of a pixel one after another."""
+    """Return places on the film, the places of one pixel after another."""
     if not rays_per_side:
         return centres
     row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
     cells = np.stack([column, row], axis=1)
-    # The middles: where the image is smooth, random places would err by its
-    # slope, these by its curvature.
+    # Rays go through the middles of cells: where the image is smooth, random places would err by
+    # its slope, the middles err by its curvature.
     return (centres[:, None, :] - 0.5 + (cells + 0.5) / rays_per_side).reshape(-1, 2)
 
 
@@ -308,6 +328,7 @@ def scattering_paths(
     far = bool(reference.media) or isinstance(reference.medium, HeightMedium)
     edge = EDGES.get("smoothstep" if scenery.blend else scenery.edge)
     paths = []
+    # A source is one light of the scene; `source.lights` are the light points that stand for it.
     for number, source in enumerate(light_sources(reference, samples, scenery.radius)):
         shadows = scenery.shadows and number not in scenery.unshadowed
         nodes, points = (
@@ -316,6 +337,7 @@ def scattering_paths(
         for given in source.lights:
             light = _whole_within(given, scenery.blend) if scenery.blend else given
             is_far = isinstance(light, DirectionalLight)
+            # Which parts of rays a light reaches, their nodes, and another edge of a spot on these.
             if 0 in layers and (far or not is_far):
                 reach = view.reach(light, shadows=shadows, area=source.area)
                 make: Any = parallel_nodes if is_far else point_nodes
@@ -350,14 +372,17 @@ def light_sources(
     `samples`: how many stand for an area light; `radius`: of spheres that take the
     place of point lights [m].
     """
+    # Names are read from Mitsuba's emitters; the reference lists the lights in the same order, but
+    # each kind by itself.
     emitters = reference.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
     near_names = [
         emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)
     ]
+    # A sphere in the place of a point light has 32 samples at least. Spots stay points.
     plan = PointPlan(most=samples)
     near = [
-        _as_sphere(name, light, PointPlan(most=max(samples, _SPHERE_SAMPLES)), radius)
+        _as_sphere(name, light, PointPlan(most=max(samples, 32)), radius)
         if radius > 0 and light.axis is None
         else Source(name, light.intensity, (light,))
         for name, light in zip(near_names, reference.lights, strict=True)
@@ -366,6 +391,7 @@ def light_sources(
         Source(name, light.irradiance, (light,))
         for name, light in zip(far_names, reference.directional, strict=True)
     ]
+    # Each of N samples of an area light stands for radiance times area over N.
     wide = [
         Source(
             light.name,
@@ -396,13 +422,14 @@ def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float)
 def _edged(
     places: Places, light: Light, source: Source, edge: Callable[[Array], Array] | None
 ) -> Places:
-    """Return places with another edge of a spot, and as a sphere lights
-    them that samples stand for.
+    """Return places with another edge of a spot, and scaled so that the samples of a sphere
+    send as much light as the sphere.
     """
     factor = _over_own_edge(edge, places.towards, light) if edge else 1.0
     if source.centre is not None and isinstance(light, ReferenceLight):
+        # All samples together send `level` times the light of the sphere: it is divided out. Where
+        # no sample sends, it is 0.
         level = _level(places, light, source, source.centre)
-        # no sample sends to the others
         factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)
     return (
         places
@@ -421,18 +448,23 @@ def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array)
     and give 4 pi R^2 L/N sum max(n_i.v_i, 0)/d_i^2, each times the cosine to the way from the
     centre on such an area. Sixteen samples are 10 % off.
     """
-    own = [each for each in sphere.lights if isinstance(each, ReferenceLight)]
+    # `place` is relative to the centre of the sphere, (n, 3); `starts` and `normals` are those of
+    # the samples, (N, 3); d are the distances between places and samples, (n, N).
+    samples = [each for each in sphere.lights if isinstance(each, ReferenceLight)]
     place = light.position - centre + places.r[:, None] * places.towards
     radius, r = float(np.linalg.norm(light.position - centre)), np.linalg.norm(place, axis=1)
     starts, normals = (
         np.stack(rows)
-        for rows in ([e.position - centre for e in own], [np.asarray(e.axis) for e in own])
+        for rows in ([e.position - centre for e in samples], [np.asarray(e.axis) for e in samples])
     )
     d = np.sqrt(
         np.maximum(r[:, None] ** 2 - 2 * place @ starts.T + radius**2, np.finfo(float).tiny)
     )
+    # max(n_i.v_i, 0)/d_i^2 for every place and sample; v_i is (place - start)/d_i.
     sent = np.maximum(place @ normals.T - (starts * normals).sum(axis=1), 0) / d**3
     if places.is_surface:
+        # An area that faces the centre sees each sample under the cosine between v_i and the way
+        # from the centre; the sphere's irradiance over pi R^2 L is 1/r^2.
         whole = 1 / r**2
         sent *= (r[:, None] - (place / r[:, None]) @ starts.T) / d
     else:
@@ -444,8 +476,8 @@ def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array)
 
 
 def _whole_within(light: Light, blend: float) -> Light:
-    """Return a spot that ends its full intensity where that of Blender's
-    `spot_blend` ends, a kink.
+    """Return a spot whose full intensity ends where a spot of Blender's with this `spot_blend`
+    begins to fall off: the nodes have a kink there.
     """
     if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
         return light
@@ -455,7 +487,9 @@ def _whole_within(light: Light, blend: float) -> Light:
 
 
 def _over_own_edge(edge: Callable[[Array], Array], towards: Array, light: Light) -> Array:
-    """Return an edge over that of a spot with the same ends, which is linear in the angle, (n,)."""
+    """Return an edge over the scene's own edge between the same angles, which is linear in the
+    angle, (n,).
+    """
     if (
         isinstance(light, DirectionalLight)
         or light.axis is None
@@ -463,6 +497,8 @@ def _over_own_edge(edge: Callable[[Array], Array], towards: Array, light: Light)
         or light.beam == light.cutoff
     ):
         return np.ones(len(towards))
+    # `part` goes from 0 at the cut-off to 1 at the beam's edge, linear in the cosine; `linear` is
+    # the fall-off that the places already have. Beyond the cut-off both are 0.
     cosine = np.clip(towards @ light.axis, -1.0, 1.0)
     part = np.clip(
         (cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0
