@@ -145,6 +145,4 @@ def told_apart(matrix: Array) -> bool:
     """Return whether the products of columns tell their coefficients apart."""
     # The determinant of the correlations of the columns is at most 1; below 1e-10 it is rounding.
     scale = np.sqrt(np.diag(matrix))
-    return bool((scale > 0).all()) and bool(
-        np.linalg.det(matrix / np.outer(scale, scale)) > 1e-10
-    )
+    return bool((scale > 0).all()) and bool(np.linalg.det(matrix / np.outer(scale, scale)) > 1e-10)
