@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The file `frames.json`: what each frame of a renderer shows, and which of its files has it.
+"""The file `frames.json`: the state of the scene in each frame of a renderer, and the file of each.
 
 ```json
 {"schema": "airlight-frames/1", "scene": "hall", "first": 1, "frames": 2, "fps": 60, "exposure": 0,
@@ -31,8 +31,6 @@ SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
 _number = partial(read_number, least=-1e30, most=1e30, whole=False)
-# that rays are jittered [pixels]: what is more is in other units, of the film or of its half
-_FARTHEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -93,12 +91,14 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
         )
     if "frames" not in given:
         raise InputError(f'{path}: the number of frames is missing; expected such as "frames": 60')
+    # Each key has a reader of its kind of value; `null` stands for the default.
     read = {
         name: _KINDS[name](f"{path}: {name}", value)
         for name, value in given.items()
         if value is not None
     }
     record = FramesRecord(**read)
+    # Every list by frame must have a value for each frame: a shorter one would shift the rest.
     lists: dict[str, Any] = {**record.changes, **record.objects}
     lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
     lists |= {"jitter": record.jitter} if record.jitter is not None else {}
@@ -126,6 +126,7 @@ def frame_paths(
     and a frame without a file.
     """
     text = str(pattern)
+    # The marks must be in one place: `a#b#` says no number.
     start, digits = text.find(_MARK), text.count(_MARK)
     if not digits or _MARK * digits not in text:
         raise InputError(
@@ -160,22 +161,21 @@ def _values(what: str, value: Any) -> tuple[float, ...]:
 
 
 def _offset(what: str, value: Any) -> tuple[float, ...]:
-    found = _by_frame(_number)(what, value)
-    if len(found) != 2 or max(map(abs, found)) > _FARTHEST:
-        raise InputError(
-            f"{what}: got {value!r}, expected right and down [pixels], each at most {_FARTHEST:g}"
-        )
-    return tuple(found)
+    offset = _by_frame(_number)(what, value)
+    # A jitter of more than a pixel is in other units: of the film, or of half of it.
+    if len(offset) != 2 or max(map(abs, offset)) > 1.0:
+        raise InputError(f"{what}: got {value!r}, expected right and down [pixels], each at most 1")
+    return tuple(offset)
 
 
 def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
-    wanted = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
+    expected = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
     rows = [
         [_number(what, each) for each in read_list(what, row, 0)]
         for row in read_list(what, value, 0)
     ]
     if [len(row) for row in rows] != [4] * 4 or rows[3] != [0, 0, 0, 1]:
-        raise InputError(f"{what}: got {value!r}, expected {wanted}")
+        raise InputError(f"{what}: got {value!r}, expected {expected}")
     turn = np.array(rows)[:3, :3]
     # A scale by axis would make other shapes of spheres, a mirror would turn them inside out.
     scale = np.cbrt(np.linalg.det(turn))
@@ -183,7 +183,7 @@ def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
         turn @ turn.T, scale**2 * np.eye(3), atol=1e-5 * scale**2, rtol=0
     ):
         raise InputError(
-            f"{what}: got axes that are not a rotation times a scale, expected {wanted}"
+            f"{what}: got axes that are not a rotation times a scale, expected {expected}"
         )
     return tuple(map(tuple, rows))
 

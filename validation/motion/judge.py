@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames that another renderer made of a scene, against the reference of each frame,
-and what is said of them.
+"""Frames that another renderer made of a scene, compared with the reference of each frame, and the
+verdict on them.
 
-**Masks.** Every measure is taken of all pixels, of those that were disoccluded up to eight frames
-ago, of the others, and of those within a pixel of a lamp. A surface point was disoccluded where it
-lay outside the frame before, or was hidden there: what stood in its pixel was nearer by more than 5
-%. Shadows that move are no disocclusion.
+**Masks.** Every measure is taken over four sets of pixels: all pixels, pixels that were disoccluded
+up to eight frames ago, the remaining pixels, and pixels within one pixel of a lamp. A surface point
+was disoccluded where it lay outside the frame before, or was hidden there: the surface in its pixel
+was nearer by more than 5 %. Shadows that move are no disocclusion.
 
 **Verdict.** A lag is reported where its error is known and below a quarter of a frame, and where
-the second-best delay is worse by more than four errors. Frames are late, or early, where only a
-delay is left: nothing persists within four errors, and the delay describes 95 % of what an impulse
-response does. They lag where a lag describes 90 %; what is less is not one lag, and a ghost where
-light that left is still there by more than four errors. Without any of these the error is noise, a
-factor and an offset. A number without an error decides nothing: the verdict then says why.
+the second-best delay is worse by more than four errors. Frames are late, or early, where the
+filter is a delay alone: the persistence is zero within four errors, and the delay describes 95 %
+of the improvement by an impulse response. Frames lag where the lag describes 90 % of it. A lag that
+describes less is not one lag; the verdict is a ghost where the light that left a place is still
+there by more than four errors. Without any of these the error is noise, a factor and an offset. A
+number without an error decides nothing: the verdict then says why.
 """
 
 import math
@@ -55,14 +56,7 @@ from airlight.validation.statistics.estimate import Answer, Estimate, fact
 from airlight.validation.statistics.samples import UNTOLD_SERIES
 
 _ROUNDING = 1e-6  # relative error of exact frames in files of float32
-_FACTOR = 1e-5  # relative: a gain nearer to 1 is not worth a word
-# of a lag that is reported [frames]: half of one is the distance to the next whole delay
-_LARGEST_ERROR = 0.25
-_ONE_LAG, _ONE_DELAY = 0.9, 0.95  # of what an impulse response describes
-_HIDDEN = 0.95  # of the distance of a point: what stood before it by less hid it
-_POP = 3.0  # times the median change of the error
 _RECENT = 8  # frames since a point was disoccluded
-_BESIDE = 1.0  # of a lamp [pixels]
 
 
 @dataclass(frozen=True)
@@ -96,34 +90,36 @@ class MotionComparison:
 
     @property
     def measures(self) -> Measures:
-        """Those of all pixels."""
+        """The measures of all pixels."""
         return self.masks["all"]
 
     @property
     def lines(self) -> list[str]:
         """Return the numbers as text, a line for each group."""
-        found, lag = self.measures, self.measures.lag
+        # All pixels come first; `validation.motion.measures` says what each number is.
+        measures, lag = self.measures, self.measures.lag
         width, height = self.size
         lines = [
             f"scene            {self.scene}, {width} x {height}, {self.frames} frames; reference: "
             f"{self.expected}, pixel {self.pixel}, {known_words(self.known)}",
-            f"values           {found.values}, {found.nonfinite} not finite; the reference changes "
-            "by "
-            f"{_percent(found.reference_change)} a frame",
-            f"relative RMSE    {found.relative_rmse.percent()}, relative bias "
-            f"{found.bias.percent()}",
-            f"flicker          {found.flicker.percent()} a frame, "
-            f"{found.flicker_beside_lag.percent()} beside the lag",
+            f"values           {measures.values}, {measures.nonfinite} not finite; the reference "
+            f"changes by {_percent(measures.reference_change)} a frame",
+            f"relative RMSE    {measures.relative_rmse.percent()}, relative bias "
+            f"{measures.bias.percent()}",
+            f"flicker          {measures.flicker.percent()} a frame, "
+            f"{measures.flicker_beside_lag.percent()} beside the lag",
             f"lag              {lag.lag.words()} frames: delay {_delay_words(lag)}, persistence "
             f"{lag.persistence.words()}, gain {lag.gain.words()}",
-            f"ghost            {found.ghost.percent()} of the light that left in {AGES} frames",
+            f"ghost            {measures.ghost.percent()} of the light that left in {AGES} frames",
         ]
-        if found.pop is not None:
-            words = "a pop" if found.pop >= _POP else "no pop"
+        if measures.pop is not None:
+            # It is a pop where the error changes by three times the median change or more.
+            words = "a pop" if measures.pop >= 3.0 else "no pop"
             lines.append(
-                f"largest change   of the error in frame {found.pop_frame}, {found.pop:.3g} times "
-                f"the median: {words}"
+                f"largest change   of the error in frame {measures.pop_frame}, "
+                f"{measures.pop:.3g} times the median: {words}"
             )
+        # A mask without measures (no pixel, or dark) has no entry, and so no line.
         for name, each in self.masks.items():
             if name != "all":
                 lines.append(
@@ -159,6 +155,8 @@ def compare_frames(
     InputError for what cannot be read, frames of two sizes, and changes that the scene does not
     have.
     """
+    # The first file says which layer is judged and what a pixel of it is. All other files must
+    # agree with it. A size that the scene cannot have is refused before anything is computed.
     record = read_frames(about)
     paths = frame_paths(pattern, record, str(about))
     first = read_exr(paths[0])
@@ -166,6 +164,9 @@ def compare_frames(
     kinds = pixel_kinds(first, pixel or record.pixel)
     scene_of_size(scene, judged.size, paths[0])
     with temporary_folder() as folder:
+        # The measures read each frame and each reference several times. They lie in a folder, so
+        # that memory holds one frame at a time. All frames are read before the first reference,
+        # which takes the time: a frame of another size is refused at once.
         frames = _Frames(folder, scene, record, judged, kinds[0])
         for n, path in enumerate(paths):
             frames.take(n, path)
@@ -177,6 +178,7 @@ def compare_frames(
             raise InputError(f"{pattern}: no frame has a finite value: all are NaN or infinite")
         if progress is not None:
             progress(0.8, "measures")
+        # A mask whose references are all dark has no measures, and is left out.
         masks = {
             name: measured
             for name in frames.masks
@@ -187,6 +189,7 @@ def compare_frames(
                 f"{pattern}: the reference of every frame is dark: nothing is relative to it"
             )
         shifts = _shifts(frames.sequence("all"))
+    # Notes are what a reader of the numbers must know; they fail nothing.
     notes: tuple[str, ...] = ()
     if len(kinds) > 1:
         notes += (
@@ -195,13 +198,16 @@ def compare_frames(
         )
     if repeated := masks["all"].repeated:
         notes += (
-            f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",
+            f"frames {_listed(repeated)} repeat the frame before them, though the reference "
+            "changed",
         )
     if NOTE in first.attributes:
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
-    found = masks["all"]
-    lag = found.lag.lag.value
-    verdict = motion_verdict(found, relative_error(frames.known))
+    measures = masks["all"]
+    lag = measures.lag.lag.value
+    verdict = motion_verdict(measures, relative_error(frames.known))
+    # Two things fail a comparison: values that are not finite, which no measure counts, and a
+    # bias that is not shown to keep the margin. A bias whose error is unknown shows nothing.
     failures = []
     if any(frames.nonfinite):
         wrong = [f"{n} ({path.name})" for n, path in enumerate(paths) if frames.nonfinite[n]]
@@ -211,9 +217,9 @@ def compare_frames(
     if (
         margin is not None
         and verdict.kind != "exact"
-        and found.bias.within(margin) is not Answer.YES
+        and measures.bias.within(margin) is not Answer.YES
     ):
-        why = "" if found.bias.error is not None else f": {UNTOLD_SERIES}"
+        why = "" if measures.bias.error is not None else f": {UNTOLD_SERIES}"
         failures.append(f"the relative bias is not shown to be within +-{margin:.3g}{why}")
     return MotionComparison(
         scene=scene,
@@ -254,9 +260,11 @@ class _Frames:
         self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
         # of the last frame, since a point was disoccluded
         self._ages = np.full(shape[1:], math.inf)
-        self._seen: ReferenceScene | None = None  # in the last frame
-        self._distance = np.zeros(shape[1:])
-        self._shown: list[int] = []  # the frame that has the same reference first
+        # Camera rays of the last frame, and the distance along each to its surface [m].
+        self._last_scene: ReferenceScene | None = None
+        self._last_distance = np.zeros(shape[1:])
+        # For each frame the first frame of the same state, whose reference both share.
+        self._same_as: list[int] = []
 
     def take(self, n: int, path: Path) -> None:
         """Keep a frame, which must have the size of the first."""
@@ -270,6 +278,7 @@ class _Frames:
             ]
             raise InputError(f"frame {n}: {path} has {sizes[0]} pixels, the first frame {sizes[1]}")
         self.nonfinite.append(int((~np.isfinite(values)).sum()))
+        # Exposure is undone here: all that follows is in W/(m^2 sr), as the references are.
         np.save(
             self._folder / f"frame-{n}.npy", values.astype(np.float64) / 2 ** self._record.stops(n)
         )
@@ -280,10 +289,14 @@ class _Frames:
         """
         record = self._record
         if n and record.shown(n) == record.shown(n - 1):
-            self._shown.append(self._shown[-1])
+            # Nothing changed: the frame shares the reference of the frame before, and every point
+            # has been visible for one frame more.
+            self._same_as.append(self._same_as[-1])
             self._ages = self._ages + 1
             self._beside[n] = self._beside[n - 1]
         else:
+            # Each frame starts from the scene as it is in its file: `frames.json` says all that
+            # differs from it, not what differs from the frame before.
             try:
                 changes, moves, jitter = record.shown(n)
                 loaded = load_scene(self._scene, self._judged.size, changes)
@@ -292,10 +305,11 @@ class _Frames:
                 image = reference_image(loaded.scene, pixel=self._pixel)
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
-            self._shown.append(n)
+            self._same_as.append(n)
+            # One error stands for the references of all frames: the largest relative one.
             self.known = max(self.known, known_to(image, self._judged.holds), key=_doubt)
             np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
-            self._beside[n] = lamp_distance(loaded, image) <= _BESIDE
+            self._beside[n] = lamp_distance(loaded, image) <= 1.0  # [pixels]
             self._uncover(image.distance, read_reference(loaded.scene))
         self._uncovered[n] = self._ages <= _RECENT
 
@@ -323,7 +337,7 @@ class _Frames:
         return Sequence(
             self._record.frames,
             lambda n: read(f"frame-{n}.npy"),
-            lambda n: read(f"reference-{self._shown[n]}.npy"),
+            lambda n: read(f"reference-{self._same_as[n]}.npy"),
             lambda n: selected[n, rows, columns],
             self._record.resets,
         )
@@ -332,28 +346,35 @@ class _Frames:
         """Tell how many frames ago the point of each pixel was disoccluded; this frame
         differs from the one before.
         """
-        before, self._seen = self._seen, here
-        there, self._distance = self._distance, distance
+        before, self._last_scene = self._last_scene, here
+        distance_before, self._last_distance = self._last_distance, distance
+        # Only a camera or an object that moves uncovers points: a light that moves uncovers none.
         moving = self._record.objects or any(
             name.startswith("camera.") for name in self._record.changes
         )
         if before is None or not moving:
             return
+        # The surface point of each pixel of this frame [m]. Where a ray meets no surface, the
+        # point is so far away that its direction alone decides.
         far = 1e6 * (1.0 + float(np.abs(here.origin).max()))
         points = (
             here.origin
             + np.where(np.isfinite(distance), distance, far).reshape(-1, 1) * here.direction
         )
+        # Each point is looked up in the frame before. It was hidden there if the surface in that
+        # pixel was nearer by more than 5 %. A point that was visible is one frame older than the
+        # pixel that showed it.
         row, column, inside = _pixel_of(before, points)
-        hidden = there[row, column] < _HIDDEN * np.linalg.norm(points - before.origin, axis=1)
+        reach = np.linalg.norm(points - before.origin, axis=1)
+        hidden = distance_before[row, column] < 0.95 * reach
         self._ages = np.where(~inside | hidden, 0.0, self._ages[row, column] + 1).reshape(
             distance.shape
         )
 
 
 def _doubt(known: Estimate) -> float:
-    """Return the relative error of a reference; infinite where it is not known, and
-    below any where all is dark.
+    """Return the relative error of a reference: infinite where it is not known, and -1, less than
+    any other, where all is dark.
     """
     relative = relative_error(known)
     return relative if relative is not None else math.inf if known.value else -1.0
@@ -375,8 +396,8 @@ def _pixel_of(reference: ReferenceScene, points: Array) -> tuple[Index, Index, B
 
 
 def _shifts(sequence: Sequence) -> dict[int, float]:
-    """Return the relative RMSE of frames against the reference so many frames
-    before, of the same frames.
+    """Return the relative RMSE of frames against the reference of an earlier frame, by how many
+    frames earlier. All shifts are judged by the same frames: those that have each reference.
     """
     shifts = range(-2, 4)
     frames = range(max(shifts), sequence.frames + min(shifts))
@@ -418,17 +439,19 @@ def motion_verdict(measures: Measures, reference_error: float | None = None) -> 
     if reason := _undecided(measures):
         return MotionVerdict("cannot be told", f"no lag can be told: {reason}; {noise}")
 
-    # One filter explains the frames: a delay, or a delay and a history.
+    # One filter explains the frames: a delay, or a delay and a history. The limits are fractions
+    # of the improvement that an impulse response makes.
+    one_lag, one_delay = 0.9, 0.95
     persists = persistence.within(_ROUNDING, SURE) is Answer.NO
     filtered = persists or bool(delay)
     apart = measures.lag.delay_margin.exceeds(0.0, SURE) is Answer.YES
     # Frames that are early have light that no response to earlier light explains.
     described = 1.0 if delay is not None and delay < 0 else measures.lag.described
     if filtered and apart and described is not None:
-        if delay and not persists and described > _ONE_DELAY:
+        if delay and not persists and described > one_delay:
             words = "late" if delay > 0 else "early"
             return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay))}")
-        if described >= _ONE_LAG:
+        if described >= one_lag:
             constant = measures.lag.time_constant.value
             after = (
                 ""
@@ -445,24 +468,25 @@ def motion_verdict(measures: Measures, reference_error: float | None = None) -> 
             "there; the impulse "
             f"response is largest {_oldest(measures)} after it",
         )
-    if filtered and described is not None and described < _ONE_LAG:
+    if filtered and described is not None and described < one_lag:
         return MotionVerdict(
             "not one lag",
             f"not one lag: it describes {_percent(described)} of what the frames keep of earlier "
             "ones; see the impulse "
             "response",
         )
+    # A filter is left that no sentence above names, or no delay stands out from the second best.
     if filtered or not apart:
         reason = f"the delay is not told from the second best: {_delay_words(measures.lag)}"
         if apart:
             reason = "what the frames hold of earlier ones is rounding"
         return MotionVerdict("cannot be told", f"no lag can be told: {reason}; {noise}")
 
-    # The rest is noise and a factor.
+    # The rest is noise and a factor. A gain nearer to 1 than 1e-5 is not worth a word.
     gain, factor = measures.lag.gain, ""
     if (
         gain.value is not None
-        and Estimate(gain.value - 1, gain.error).within(_FACTOR, SURE) is Answer.NO
+        and Estimate(gain.value - 1, gain.error).within(1e-5, SURE) is Answer.NO
     ):
         factor = f", and a factor of {gain.value:.5g}"
     return MotionVerdict("noise", f"no lag: {noise}{factor}")
@@ -474,9 +498,17 @@ def _undecided(measures: Measures) -> str:
     if lag.lag.value is None:
         return f"the reference changes by {_percent(measures.reference_change)} a frame"
     if lag.lag.error is None or lag.persistence.error is None:
-        return f"all light is in one block of {BLOCK} x {BLOCK} pixels, so that nothing says how sure its numbers are"
-    if lag.lag.error > _LARGEST_ERROR:
-        return f"its error is {_frames(lag.lag.error)}, the reference changes by {_percent(measures.reference_change)}"
+        return (
+            f"all light is in one block of {BLOCK} x {BLOCK} pixels, so that nothing says how sure "
+            "its numbers are"
+        )
+    # Half a frame is the distance to the next whole delay. An error of half of that is the largest
+    # with which a lag is reported [frames].
+    if lag.lag.error > 0.25:
+        return (
+            f"its error is {_frames(lag.lag.error)}, the reference changes by "
+            f"{_percent(measures.reference_change)}"
+        )
     return ""
 
 
@@ -510,5 +542,5 @@ def _percent(value: float) -> str:
 
 
 def _listed(each: Several[object]) -> str:
-    shown = ", ".join(map(str, each[:5]))
-    return shown if len(each) <= 5 else f"{shown} and {len(each) - 5} more"
+    words = ", ".join(map(str, each[:5]))
+    return words if len(each) <= 5 else f"{words} and {len(each) - 5} more"

@@ -39,7 +39,6 @@ from airlight.validation.statistics.samples import mean_of_runs, mean_of_series
 _Record = TypeVar("_Record", "Measures", Lag)
 
 AGES = 12  #: of light that left [frames]
-STARTING = 16  #: frames that only start the filter of a sequence without a first reset
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,9 @@ class Sequence:
 
     def counts(self, n: int) -> bool:
         """Return whether a frame counts, or only starts the filter."""
-        return self.start[n] in self.resets or n >= STARTING
+        # A sequence without a reset at its first frame has an earlier history, which nobody knows:
+        # 16 frames only start the filter.
+        return self.start[n] in self.resets or n >= 16
 
     def pair_counts(self, n: int) -> bool:
         """Return whether the change from the frame before counts."""
@@ -153,62 +154,76 @@ class _FirstPass:
 
 
 def _first_pass(sequence: Sequence) -> _FirstPass:
-    found: _FirstPass | None = None
+    sums: _FirstPass | None = None
     error = reference = frame = np.zeros(())
     for n in range(sequence.frames):
-        before, last, shown = error, reference, frame
+        error_before, reference_before, frame_before = error, reference, frame
         reference, frame = sequence.reference(n), sequence.frame(n)
-        if found is None:
-            found = _FirstPass(sequence.selected(n).shape, sequence.frames)
+        if sums is None:
+            sums = _FirstPass(sequence.selected(n).shape, sequence.frames)
+        # A value that is not finite is counted, and taken for the reference: no sum holds NaN.
         selected = sequence.selected(n)[..., None] & np.ones(3, dtype=bool)
         finite = np.isfinite(frame)
-        found.nonfinite += int((selected & ~finite).sum())
+        sums.nonfinite += int((selected & ~finite).sum())
         frame = np.where(finite, frame, reference)
         selected &= finite
         error = frame - reference
-        found.brightness += reference / sequence.frames
-        found.reference[n], found.test[n] = _cell_means(reference), _cell_means(frame)
+        # The fit of a lag needs every frame, since the filter runs through all of them; the
+        # measures only need the frames that count.
+        sums.brightness += reference / sequence.frames
+        sums.reference[n], sums.test[n] = _cell_means(reference), _cell_means(frame)
         if not sequence.counts(n):
             continue
-        found.fraction[n] = _cell_means(selected.astype(np.float64)).mean(axis=2, keepdims=True)
+        sums.fraction[n] = _cell_means(selected.astype(np.float64)).mean(axis=2, keepdims=True)
+        # `pair`: 1 where the change from the frame before counts. No pair crosses the beginning of
+        # a history.
         pair = np.where(selected, float(sequence.pair_counts(n)), 0.0)
-        change = (error - before) * pair if n else np.zeros_like(error)
-        moved = (reference - last) * pair if n else np.zeros_like(error)
+        change = (error - error_before) * pair if n else np.zeros_like(error)
+        moved = (reference - reference_before) * pair if n else np.zeros_like(error)
+        # Columns 0 to 5: every mean square and every ratio is made of their products.
         one = selected.astype(np.float64)
-        sums = products(np.stack([one, error * one, reference * one, pair, change, moved]))
-        found.sums = found.sums + sums
-        found.frame_sums.append(sums.sum(axis=0))
-        if n and sequence.pair_counts(n) and moved.any() and np.array_equal(frame, shown):
-            found.repeated.append(n)
-    assert found is not None
-    return found
+        by_group = products(np.stack([one, error * one, reference * one, pair, change, moved]))
+        sums.sums = sums.sums + by_group
+        sums.frame_sums.append(by_group.sum(axis=0))
+        if n and sequence.pair_counts(n) and moved.any() and np.array_equal(frame, frame_before):
+            sums.repeated.append(n)
+    assert sums is not None
+    return sums
 
 
 def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
-    """Return the measures: those that need the mean in time, and the lag, are summed here."""
+    """Return all measures; flicker beside the lag and ghosts, which need the mean in time and the
+    lag, are summed here.
+    """
     mean = first.mean
+    # As in the fit of a lag, squares count with 1/(r + 0.1 m)^2: few bright pixels do not rule.
     scale = 1 / (first.brightness + DARK * mean)
+    # The references through the filter that fits: y_n of `validation.motion.lag`.
     offset, gain, persistence, delay = lag.filter
-    shown_light = filtered_frames(
+    filtered = filtered_frames(
         sequence.reference, sequence.frames, sequence.start, min(max(persistence, 0.0), 1.0), delay
     )
-    window: deque[Array] = deque(maxlen=AGES + 1)
-    left: Array = np.zeros(())
+    window: deque[Array] = deque(maxlen=AGES + 1)  # references of this history, this frame last
+    residual: Array = np.zeros(())
     ghosts: Array = np.zeros(())
     beside: Array = np.zeros(())
-    for n, light in enumerate(shown_light):
+    for n, light in enumerate(filtered):
         if n == sequence.start[n]:
             window.clear()
         reference, frame = sequence.reference(n), sequence.frame(n)
-        # what ghosts are sums of: half of the memory and time
+        # Ghosts are summed in float32, which takes half of the memory and time.
         window.append(reference.astype(np.float32))
         frame = np.where(np.isfinite(frame), frame, reference)
-        before, left = left, frame - offset * mean - gain * light
+        # t - c m - g y: no lag explains its change from frame to frame.
+        residual_before, residual = residual, frame - offset * mean - gain * light
         if not sequence.counts(n):
             continue
         one = np.where(sequence.selected(n)[..., None], 1.0, 0.0) + np.zeros(3)
         if sequence.pair_counts(n):
-            beside = beside + products(np.stack([one, (left - before) * one, reference * one]))
+            change = (residual - residual_before) * one
+            beside = beside + products(np.stack([one, change, reference * one]))
+        # The columns m, r, w, w by age 1 to `AGES`, and e. A history that is shorter than an age
+        # has its first reference there.
         here, count = window[-1], len(window)
         columns = np.empty((AGES + 4, *here.shape), np.float32)
         columns[0], columns[1], columns[-1] = mean, here, frame - reference
@@ -217,10 +232,13 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         columns[2] = columns[3:-1].max(axis=0)
         columns *= one * scale
         ghosts = ghosts + products(columns).astype(np.float64)
+    # Products of the columns 1, e, r, pair, e_n - e_(n-1) and r_n - r_(n-1) of the first pass:
+    # [4, 4] over [3, 3], for one, is the mean square change of the error over pairs of frames.
     total = first.sums.sum(axis=0)
     by_frame = np.array(first.frame_sums)
     pairs = by_frame[:, 3, 3] > 0
     jumps = np.sqrt(by_frame[pairs, 4, 4] / by_frame[pairs, 3, 3])
+    # `by_frame` has rows of the frames that count alone: `counted` has their numbers.
     counted = [n for n in range(sequence.frames) if sequence.counts(n)]
     places = np.flatnonzero(pairs)
     rmse = np.sqrt(by_frame[:, 1, 1] / np.maximum(by_frame[:, 0, 0], 1)) / mean

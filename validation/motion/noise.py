@@ -68,17 +68,9 @@ from airlight.validation.statistics.samples import (
     student_quantile,
 )
 
-RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
-GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is reported
-_LOW = 0.125  # cycles a pixel
-# correlation of two runs: ten that share as much are worth five, as 10/(1 + 9/10) is 5.3
-_SHARED = 0.1
-# of the sum of squares: a single value from which on the interval may not hold, see the module
-_DOUBTFUL = 0.01
 _NO_NOISE = fact(0.0)
 _NAMED = 5  # files that a sentence names
-_POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,8 +120,10 @@ class Noise:
                 "them have another "
                 "error; expected renders with different seeds and no history"
             )
+        # A value of more than 1 % of the sum of squares: the interval may not hold, see the
+        # module. A bias towards that value stands nevertheless.
         if (
-            self.largest_fraction > _DOUBTFUL
+            self.largest_fraction > 0.01
             and not min(low * self.largest_deviation, high * self.largest_deviation) > 0
         ):
             kind = "brighter" if self.largest_deviation > 0 else "darker"
@@ -138,15 +132,20 @@ class Noise:
                 f"{100 * self.largest_fraction:.2g} % of the "
                 f"variance of {self.runs} runs, so still {kind} ones may be missing; add runs"
             )
+        # The mean may be right while parts of the image are too bright and parts too dark: the
+        # squared bias sees that.
         if low <= 0 <= high and self.root_bias is None:
-            return f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would have been found"
+            return (
+                f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would "
+                "have been found"
+            )
         if low <= 0 <= high and self.root_bias is not None:
             return f"a bias that changes its sign over the image: {100 * self.root_bias:.3g} %"
         return f"a bias of {(low + high) / 2:+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
 
     def time_to(self, error: float) -> float | None:
         """Return the time until averaged runs have an error [s]; infinite
-        where the bias is larger.
+        where the bias is larger. N runs have the error sqrt(b^2 + V/N).
         """
         if self.seconds is None or self.variance.value is None or self.correlated:
             return None
@@ -173,6 +172,7 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     are the same count once. Raises InputError for a dark reference, and where all runs are the
     same.
     """
+    # Images that are the same bit by bit are one run, of one seed.
     given, runs = runs, [runs[number] for number in sorted(set(first_equal(runs)))]
     if len(runs) == 1 < len(given):
         raise InputError(
@@ -184,7 +184,8 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     errors = np.array([(run - reference) / mean for run in runs])
     blurred = [_blurred(errors, blur) for blur in BLURS]
     bias, square = float(errors.mean()), float(np.mean(errors**2))
-    known = Noise(
+    # A single image has no random numbers: its whole error is bias, and a fact.
+    noise = Noise(
         runs=count,
         bias=fact(bias),
         bias_ci=(bias, bias),
@@ -193,35 +194,43 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
         seconds=seconds,
     )
-    known = known if count == 1 else _with_spread(known, errors, blurred)
-    squared_bias, variance = known.squared_bias, known.variance.value
+    noise = noise if count == 1 else _with_spread(noise, errors, blurred)
+
+    # The estimate of the squared bias may be negative by chance: a root is taken only of one that
+    # is above zero by two errors.
+    squared_bias, variance = noise.squared_bias, noise.variance.value
     root_bias = None
     if squared_bias.value is not None and squared_bias.exceeds(0.0) is Answer.YES:
         root_bias = math.sqrt(squared_bias.value)
-    known = replace(
-        known,
+    noise = replace(
+        noise,
         root_bias=root_bias,
         efficiency=1 / (variance * seconds) if variance and seconds else None,
     )
+    # The times and the verdict are read from the finished numbers.
+    goals = (0.05, 0.01, 0.002)  # relative errors
     return replace(
-        known, seconds_to={goal: known.time_to(goal) for goal in GOALS}, verdict=known.words()
+        noise, seconds_to={goal: noise.time_to(goal) for goal in goals}, verdict=noise.words()
     )
 
 
 def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
-    """Return the noise with what several runs tell, from their relative errors
-    as they are and blurred.
+    """Return the noise with all numbers that need several runs, from their relative errors as
+    they are and blurred.
     """
     count = len(errors)
+    # G_ij of the module, the mean products of the errors of two runs.
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
     biases = flat.mean(axis=1)
     bias, half = student(biases)
     deviation = float(biases.std(ddof=1))
+    # n_i of the module: the factor makes up for the mean over the runs, which is taken away.
     noise = (errors - errors.mean(axis=0)) * math.sqrt(count / (count - 1))
     square = float(np.mean(noise**2))
     largest = float(noise.flat[np.argmax(np.abs(noise))])
     spectrum, low = _spectrum(noise)
+    # A Gaussian of deviation s divides the root mean square of white noise by 2 sqrt(pi) s.
     gains = []
     for blur, values in zip(BLURS, blurred, strict=True):
         apart = (values - values.mean(axis=0)) * math.sqrt(count / (count - 1))
@@ -243,14 +252,15 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
 
 
 def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
-    """Return the pairs of runs that are no independent ones, see the module.
+    """Return the pairs of runs that are not independent, see the module.
 
-    `noise`: deviations from the mean over the runs, (runs, height, width, channels); of two runs,
-    each of which is the other's negative, nothing can be said.
+    `noise`: deviations from the mean over the runs, (runs, height, width, channels). Two runs say
+    nothing of their independence: the deviations of one are the negatives of the other's.
     """
     count = len(noise)
     if count < 3:
         return ()
+    # Products of each pair of runs, by group of blocks of pixels.
     groups = products(noise)
     total = groups.sum(axis=0)
     pairs = np.triu_indices(count, 1)
@@ -261,11 +271,13 @@ def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
         scale = deviations[..., pairs[0]] * deviations[..., pairs[1]]
         return np.asarray(sums[..., pairs[0], pairs[1]] / scale + 1 / (count - 1))
 
+    # The errors come from leaving out a group that has noise at all. The limit is a correlation of
+    # a tenth: ten runs that share as much are worth five, as 10/(1 + 9/10) is 5.3.
     lit = groups[np.trace(groups, axis1=1, axis2=2) > 0]
-    found = estimates(
+    excesses = estimates(
         excess(total), excess(total - lit) if len(lit) > 1 else np.empty((0, len(pairs[0])))
     )
-    shared = [each.exceeds(_SHARED, SURE) is Answer.YES for each in found]
+    shared = [each.exceeds(0.1, SURE) is Answer.YES for each in excesses]
     return tuple((int(i), int(j)) for i, j, same in zip(*pairs, shared, strict=True) if same)
 
 
@@ -279,13 +291,15 @@ def detectable(runs: int) -> float:
     """Return the bias, in deviations of one run, that a test of Student at 5 %
     finds nine times of ten.
     """
-    limit = student_quantile(1 - _LEVEL / 2, runs - 1)
+    level, power = 0.05, 0.9
+    limit = student_quantile(1 - level / 2, runs - 1)
     root = math.sqrt(runs)
 
     def lacking(bias: float) -> float:
-        # on its side: the other is rarer than 1e-6
-        found = float(nct.sf(limit, runs - 1, bias * root))
-        return (1.0 if math.isnan(found) else found) - _POWER
+        # The statistic has the non-central law of Student. Only the tail on the side of the bias
+        # counts: the other is rarer than 1e-6. A NaN of SciPy is taken for 1.
+        detected = float(nct.sf(limit, runs - 1, bias * root))
+        return (1.0 if math.isnan(detected) else detected) - power
 
     return float(brentq(lacking, 0.0, 10 * limit / root))
 
@@ -294,17 +308,21 @@ def _spectrum(noise: Array) -> tuple[tuple[float, ...], float]:
     """Return the error spectrum by ring, and its mean at low frequencies; NaN for
     rings without a frequency.
     """
+    # The periodogram, divided so that white noise is 1 at every frequency (Parseval).
     power = np.mean(np.abs(np.fft.fft2(noise, axes=(1, 2))) ** 2, axis=(0, 3)) / (
         noise.shape[1] * noise.shape[2]
     )
     power /= np.mean(noise**2)
+    # Eight rings reach from 0 to 1/2 cycle a pixel. The corners of the spectrum, beyond 1/2, and
+    # the mean, at 0, are in no ring.
+    rings = 8
     rows, columns = (np.fft.fftfreq(side) for side in noise.shape[1:3])
     frequency = np.hypot(rows[:, None], columns)
-    ring = np.minimum((frequency * 2 * RINGS).astype(int), RINGS)  # the corners apart
-    ring[0, 0] = RINGS
-    known = [power[ring == each] for each in range(RINGS)]
-    low = power[(frequency > 0) & (frequency < _LOW)]
-    return tuple(float(each.mean()) if each.size else math.nan for each in known), float(
+    ring = np.minimum((frequency * 2 * rings).astype(int), rings)
+    ring[0, 0] = rings
+    powers = [power[ring == each] for each in range(rings)]
+    low = power[(frequency > 0) & (frequency < 1 / 8)]
+    return tuple(float(each.mean()) if each.size else math.nan for each in powers), float(
         low.mean()
     ) if low.size else math.nan
 
@@ -398,13 +416,16 @@ def compare_runs(
                 f"{path} has {each.size[0]} x {each.size[1]} pixels, {paths[0]} {first.size[0]} x "
                 f"{first.size[1]}"
             )
+    # References are computed when a kind of pixel is asked for; runs that do not count go first.
     loaded = scene_of_size(scene, first.size, paths[0])
     reference_of = references(loaded, progress)
     runs, names, notes, failures = _distinct(
         [each.values.astype(np.float64) for each in layers], paths
     )
+    # A value that is not finite in some run is left out of all: it is taken for the reference.
     finite = np.isfinite(runs).all(axis=0)
 
+    # The mean over the runs has the least noise: it tells pixel centres from means over areas.
     mean = replace(first, values=np.where(finite, runs, np.nan).mean(axis=0))
     kind, _ = fitting_kind(mean, reference_of, pixel_kinds(images[0], pixel))
     fitting = reference_of(kind.pixel)
@@ -451,6 +472,7 @@ def _distinct(
     A run without a finite value, and one that is the same as one before it, do not count.
     """
     notes, failures = list[str](), list[str]()
+    # A run of NaN alone is a failure, but the others are judged.
     blank = [path.name for run, path in zip(runs, paths, strict=True) if not np.isfinite(run).any()]
     if blank:
         failures.append(f"no value is finite in {', '.join(blank)}: left out")
@@ -459,6 +481,7 @@ def _distinct(
     named = [
         (run, path.name) for run, path in zip(runs, paths, strict=True) if np.isfinite(run).any()
     ]
+    # `firsts`: for each run the number of the first that is the same, itself if there is none.
     firsts = first_equal([run for run, _ in named])
     counting = [named[number] for number in sorted(set(firsts))]
     same = [f"{named[n][1]} is {named[first][1]}" for n, first in enumerate(firsts) if first < n]

@@ -90,7 +90,6 @@ FLOORS = {
 }
 SHORTEST = 0.05  #: differences below this are launches and the clock, not work [ms]
 
-_FEW = 3  # repetitions without which quartiles say nothing
 _WITNESSES = {
     "airlight": ("frame", "light_moved", "objects_moved"),
     "frame": ("sum", "light_moved", "objects_moved"),
@@ -115,6 +114,7 @@ def error_band(
         return 0.0
     if name == "negative":
         return tolerance * old + 1e-3 * pixels
+    # A bias may be zero by cancellation: it counts as at least a tenth of the RMSE.
     size = abs(old)
     if name == "relative_bias":
         size = max(size, 0.1 * rmse)
@@ -125,11 +125,12 @@ def spread(times: Iterable[Times]) -> float:
     """Return the geometric mean of upper over lower quartile of all timings [1]; 1
     where none has quartiles.
     """
+    # With fewer than three repetitions quartiles say nothing.
     ratios = [
         timing.high_ms / timing.low_ms
         for stages in times
         for timing in stages.values()
-        if timing.repetitions >= _FEW and timing.median_ms >= SHORTEST and timing.low_ms > 0
+        if timing.repetitions >= 3 and timing.median_ms >= SHORTEST and timing.low_ms > 0
     ]
     return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
 
@@ -205,6 +206,9 @@ def slower_stages(
     was, now = _medians(before), {stage: ms / scale for stage, ms in _medians(after).items()}
     slow = []
     for stage in (each for each in shared if each in _WITNESSES):
+        # A stage got slower where the ratio means something, where the times that contain the
+        # stage grew by at least half as much, and where chance explains it too rarely: the level
+        # is for all stages that are tested.
         growth = now[stage] - was[stage]
         witnesses = [name for name in _WITNESSES[stage] if name in was]
         longer = growth >= SHORTEST and now[stage] >= least * was[stage]

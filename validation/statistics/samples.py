@@ -27,8 +27,6 @@ LEAST = 8
 UNTOLD_SERIES = (
     f"its error is unknown with fewer than {LEAST} frames, or frames that are all off by the same"
 )
-# relative: values that differ by less differ by rounding of float64 alone, of sums of 1e4 of them
-_SAME = 1e-12
 # persistence that is reckoned with: a history that keeps more is a bias to
 # anyone who sees 128 frames
 _MOST = 0.95
@@ -125,13 +123,16 @@ def mean_of_series(values: Array) -> Estimate:
     count, mean = len(values), float(np.mean(values))
     apart = values - mean
     square = float(apart @ apart)
-    if count < LEAST or np.abs(apart).max() <= _SAME * abs(mean):
+    # Values that differ by less than 1e-12 differ by rounding of float64 alone, of sums of 1e4.
+    if count < LEAST or np.abs(apart).max() <= 1e-12 * abs(mean):
         return Estimate(mean)
+    # phi = (n r + 1)/(n - 4) makes up for the mean of r; n^(-1/2) is one standard error of it.
     correlation = float(apart[1:] @ apart[:-1]) / square
     persistence = (count * correlation + 1) / (count - 4) + count**-0.5
     distance = np.arange(1, count)
     powers = min(max(persistence, 0.0), _MOST) ** distance
     inflation = 1 + 2 * float((1 - distance / count) @ powers)
+    # s^2 = square/(n - 1) and sigma^2 = s^2 (n - 1)/(n - f): the n - 1 cancel.
     variance = square / (count - inflation) * inflation / count
     return Estimate(mean, float(widened(math.sqrt(variance), max(count / inflation - 1, 1.0))))
 

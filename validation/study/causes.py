@@ -63,23 +63,27 @@ def decompose(
     The reference is that at pixel centres, (height, width, 3) [W/(m^2 sr)]; `airlight` renders a
     configuration in the scene to such an image.
     """
+    # R_0 to R_n: each image is without one more cause. A last cause without a configuration is the
+    # name of the rest.
     images, named = [airlight(chosen)], [("whole", "reference")]
-    left, last = REST, chosen
+    rest, last = REST, chosen
     for cause, without in _configurations(chosen, (scene.camera.width, scene.camera.height)):
         if without is None:
-            left = cause
+            rest = cause
             break
         named.append((cause, _changes(last, without)))
         images.append(airlight(without))
         last = without
+    # E and T: where there is no area light, the light samples are no cause, and T stands for both.
     if scene.area_lights:
         points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
-        named.append((left, "exact sum"))
+        named.append((rest, "exact sum"))
         images.append(
             airlight(Configuration("shadow-planes", "exact", tuple(values(points).items())))
         )
-    named.append((POINTS if scene.area_lights else left, "reference"))
+    named.append((POINTS if scene.area_lights else rest, "reference"))
     images = [np.asarray(image, dtype=np.float64) for image in (*images, reference)]
+    # The parts are differences of neighbours, and add up to the whole pixel by pixel.
     whole = images[0] - images[-1]
     parts = [whole, *(before - after for before, after in pairwise(images))]
     return [

@@ -6,7 +6,7 @@ The costs are those of one processor thread, measured on two threads of an AMD E
 2026 and rounded; a scene can be some times cheaper or costlier, and a machine faster or slower.
 That is enough to share a progress bar out among its parts, and for a note where a command may take
 minutes. A command is refused for its time only where the least that it needs takes longer than an
-hour on threads that are `_FASTER` times as fast, too. Whether one frame keeps a limit is another
+hour on threads that are ten times as fast, too. Whether one frame keeps a limit is another
 question: the code of a user's method cannot be counted, and `validation.study.run` times a small
 frame instead.
 """
@@ -22,22 +22,7 @@ from airlight.errors import InputError
 from airlight.realtime.memory import usable_memory
 from airlight.reference.quadrature.image import light_samples_of_ray, rays_of_pixel
 
-LONGEST = 3600.0  #: seconds that a command may take at least without being forced
-_NOTED = 60.0  # seconds from which on a user would rather know before than wait
-
-_STEP = 40e-9  # of a marched ray [s]
-_RAY = 2e-6  # of any other method, by light [s]
-_REFERENCE = 100e-6  # of the quadrature, by ray and light at a place or in a direction [s]
-# by ray and sample of an area light: 6 to 19 in four scenes on 29 November 2026 [s]
-_LIGHT_SAMPLE = 10e-6
-_SAMPLE = 1e-6  # of single-scatter and volpath [s]
-_PATH = 20e-6  # of a path through a cloud [s]
-_GPU = 100.0  # threads that a GPU replaces
-#: The fastest thread against the measured one, with twice its clock, twice the width of its
-#: vectors, and a scene that is two and a half times cheaper than most.
-_FASTER = 10.0
 TIMED = 8  #: frames that timing takes where they are slow
-_FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
 
 
 @dataclass(frozen=True)
@@ -57,7 +42,9 @@ def frame_work(
     many steps, or with none.
     """
     pixels = float(size[0]) * size[1]
-    return Work(frames * pixels * max(lights, 1) * max(steps * _STEP, _RAY), pixels * _FRAME_BYTES)
+    # A step of a marched ray; a ray of any other method, by light [s]; memory by pixel [bytes].
+    step, ray, frame_bytes = 40e-9, 2e-6, 200
+    return Work(frames * pixels * max(lights, 1) * max(steps * step, ray), pixels * frame_bytes)
 
 
 def reference_work(
@@ -67,11 +54,15 @@ def reference_work(
     means over areas of pixels.
     """
     pixels = float(size[0]) * size[1]
+    # By ray and light at a place or in a direction, and by ray and sample of an area light: 6 to
+    # 19 us in four scenes on 29 November 2026 [s]. Errors decide how many rays and samples there
+    # are: the least and the most.
+    of_light, of_sample, reference_bytes = 100e-6, 10e-6, 1500
     least, most = (
-        pixels * rays * (max(lights, 1) * _REFERENCE + area_lights * samples * _LIGHT_SAMPLE)
+        pixels * rays * (max(lights, 1) * of_light + area_lights * samples * of_sample)
         for rays, samples in zip(rays_of_pixel(pixel), light_samples_of_ray(pixel))
     )
-    return Work(least, pixels * _REFERENCE_BYTES, most)
+    return Work(least, pixels * reference_bytes, most)
 
 
 def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:
@@ -79,7 +70,9 @@ def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False)
     through clouds or one step.
     """
     pixels = float(size[0]) * size[1]
-    return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
+    # A sample of single-scatter and volpath, and a path through a cloud [s].
+    of_sample, of_path, sampled_bytes = 1e-6, 20e-6, 500
+    return Work(pixels * samples * (of_path if clouds else of_sample), pixels * sampled_bytes)
 
 
 def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
@@ -90,18 +83,24 @@ def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
     to do. Returns notes for the user: how long the command may take, if that is more than a minute.
     """
     works = list(works)
-    threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
+    # A GPU replaces a hundred threads. Works follow one another: times add up, and the memory is
+    # the largest of them.
+    gpu = 100.0
+    threads = gpu if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
     least = sum(work.seconds for work in works) / threads
     most = sum(work.seconds if work.most is None else work.most for work in works) / threads
     memory = max((work.memory for work in works), default=0.0)
     usable = usable_memory()
     forced = os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0")
+    # The fastest thread against the measured one: twice its clock, twice the width of its vectors,
+    # and a scene that is two and a half times cheaper than most. A command that takes more than an
+    # hour on that one, too, must be forced [s].
+    faster, longest = 10.0, 3600.0
     reasons = []
-    if least > LONGEST * _FASTER and not forced:
+    if least > longest * faster and not forced:
         reasons.append(
             f"would take about {_duration(least)} at the speed of one machine, and more than an "
-            f"hour at {_FASTER:g} "
-            "times that speed"
+            f"hour at {faster:g} times that speed"
         )
     if usable is not None and memory > usable.size and not forced:
         reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which {usable}")
@@ -109,14 +108,18 @@ def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
         raise InputError(
             f"{what}: {' and '.join(reasons)}; ask for less, or set AIRLIGHT_FORCE=1 to start it"
         )
-    if most <= _NOTED:
+    # From a minute on a user would rather know before than wait.
+    if most <= 60.0:
         return ()
     time = (
         f"about {_duration(most)}"
         if most < 1.1 * least
         else f"between {_duration(least)} and {_duration(most)}"
     )
-    words = "by its rays and samples and the speed of one machine; another machine or scene may take several times that"
+    words = (
+        "by its rays and samples and the speed of one machine; another machine or scene may take "
+        "several times that"
+    )
     return (f"{what}: {time} {words}",)
 
 

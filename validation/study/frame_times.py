@@ -36,9 +36,6 @@ from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.clock import timed, timing_of
 from airlight.validation.timing import FrameTimes, TimingRun
 
-# of a slower frame the airlight is not timed by itself where times are brief [ms]
-_BRIEF_SLOW = 500.0
-
 
 def timed_image(
     renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool
@@ -48,20 +45,24 @@ def timed_image(
     Return the image on the host, what its parts leave to the next frame, and what it took without
     bringing it to the host [ms].
     """
-    in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
+    in_turn, frame, took = next_parts(renderer, scene, caches, **moved), None, 0.0
+    caches_after: list[FrameCache] = []
     while True:
-        found, spent = timed(lambda: next(in_turn, None))
+        # Only rendering a part is timed. Bringing it to the host and putting it in its place
+        # happens between two parts.
+        result, spent = timed(lambda: next(in_turn, None))
         took += spent.ms
-        if found is None:
+        if result is None:
             assert frame is not None
             check_radiance(
                 scene, renderer.method.name, frame.airlight, frame.surface, frame.distance
             )
-            return frame, tuple(kept), took
-        part, stages, cache = found
+            return frame, tuple(caches_after), took
+        part, stages, cache = result
         frame = frame_with_part(frame, part, stages, cache.extra)
-        kept.append(cache)
-        del found, stages, cache
+        caches_after.append(cache)
+        # The device must not hold the images of two parts at once.
+        del result, stages, cache
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
@@ -148,12 +149,15 @@ def staged_turn(renderer: FrameRenderer) -> Turn:
 
     def turn() -> list[FrameSpent]:
         state, prepare = timed(partial(renderer.prepare, renderer.scene))
+        # `surface` casts the camera rays and shades; `shade` alone is for frames in which the
+        # camera stands still.
         surface, shade, airlight = Spent(), Spent(), Spent()
         for part in in_parts:
             (cast, lit), spent = timed(partial(_ready, run_cast_and_shade, part))
             surface += spent
             shade += timed(partial(_ready, run_shade, part, cast))[1]
             airlight += timed(partial(_ready, run_method, part, state, cast, lit))[1]
+        # A frame after a change prepares again if the method's state depends on what changed.
         frame, nothing = surface + airlight, Spent()
         camera_cached = shade + airlight + (prepare if needed & {"light", "look"} else nothing)
         colours = shade + airlight + (prepare if "look" in needed else nothing)
@@ -168,8 +172,9 @@ def brief_turn(renderer: FrameRenderer) -> Turn:
     def turn() -> list[FrameSpent]:
         state, prepare = timed(lambda: renderer.prepare(renderer.scene))
         frame = timed(lambda: run_stages(renderer, state))[1]
-        # camera rays and surfaces take little of it, and it takes too long to ask
-        if frame.ms >= _BRIEF_SLOW:
+        # Camera rays and surfaces take little of a frame of half a second, and timing them would
+        # take too long [ms].
+        if frame.ms >= 500.0:
             return [FrameSpent(frame, frame, prepare=prepare)]
         cast, lit = run_cast_and_shade(renderer)
         dr.eval(cast, lit)
@@ -217,6 +222,8 @@ def times_of(spent: Sequence[FrameSpent], moves: Sequence[Spent], run: TimingRun
         ]
         if values and each.name != "prepare":
             timings[each.name] = timing_of(values)
+    # A frame after objects moved is a frame after the light moved, and the move: the median one
+    # is added to each. A scene without an object that moves has the frame alone.
     lights = [one.light_moved for one in spent if one.light_moved is not None]
     if lights and moves:
         move = sorted(moves, key=lambda one: one.seconds)[len(moves) // 2]

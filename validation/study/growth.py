@@ -34,8 +34,8 @@ may grow at most as
 | lights | 1 | 1 | 1 | one after the other |
 | texels on a side of a map | 1 | 2 | 2 | a ray crosses a row of texels; the map has their square |
 
-A step that is steeper by more than `CLIFF` is a cliff, where it takes longer than `_SHORT`:
-something overflows there.
+A step that is steeper by more than 0.6 is a cliff, where it takes longer than 5 ms: something
+overflows there.
 """
 
 import math
@@ -69,9 +69,6 @@ from airlight.validation.study.turns import time_cells
 from airlight.validation.timing import Scaling, TimeGrowth, TimingRun, joined
 
 TIMES = ("frame", "light_moved", "objects_moved")
-#: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
-CLIFF = 0.6
-_SHORT = 5.0  # a time below which launches and clocks decide [ms]
 #: By kind of work, the exponents of `TIMES`.
 USUAL = {
     "size": (1.0, 1.0, 1.0),
@@ -79,15 +76,6 @@ USUAL = {
     "lights": (1.0, 1.0, 1.0),
     "map": (1.0, 2.0, 2.0),
 }
-MOST_TRIANGLES = 5_300_000  #: a mesh of so many takes some gigabytes with what is made of it
-_SIDES = (0.5, 1, 2, 4)  # of the image
-_COPIES = (1, 2, 4, 8)  # of each light
-_MAPS = (128, 256, 512, 1024, 2048)
-_ASIDE = 0.07  # between the copies of a light, as a fraction of its distance from the camera
-# along the size of the scene
-_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))
-_STEEPNESS = 0.15
-_TURN = 2.3  # between the copies of a light from infinity [degrees]
 
 
 @dataclass(frozen=True)
@@ -116,7 +104,8 @@ def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
 
 def _sizes(name: str, size: tuple[int, int]) -> list[Step]:
     width, height = size
-    sizes = [(max(1, round(width * factor)), max(1, round(height * factor))) for factor in _SIDES]
+    factors = (0.5, 1, 2, 4)  # of each side
+    sizes = [(max(1, round(width * factor)), max(1, round(height * factor))) for factor in factors]
     return [Step(at[0] * at[1], partial(_read, name, at)) for at in sizes]
 
 
@@ -125,13 +114,15 @@ def _read(name: str, size: tuple[int, int]) -> Scene:
 
 
 def _triangles(name: str, size: tuple[int, int]) -> list[Step]:
+    # Each level has four times the triangles of the one before; one step shows no growth.
     count = triangles_of(load_scene(name, size).scene)
-    levels = [level for level in range(10) if 0 < count * 4**level <= MOST_TRIANGLES]
+    most = 5_300_000  # a mesh of so many takes some gigabytes with what is made of it
+    levels = [level for level in range(10) if 0 < count * 4**level <= most]
     if len(levels) < 2:
         raise InputError(
             f"scaling triangles: {name} has {count} triangles of opaque meshes; expected some, and "
             "four times as many "
-            f"not more than {MOST_TRIANGLES}; use another scene"
+            f"not more than {most}; use another scene"
         )
     return [Step(count * 4**level, partial(_finer, name, size, level)) for level in levels]
 
@@ -148,7 +139,7 @@ def _lights(name: str, size: tuple[int, int]) -> list[Step]:
             f"scaling lights: {name} has area lights only; expected a point, spot or directional "
             "one"
         )
-    return [Step(count * copies, partial(with_copies, scene, copies)) for copies in _COPIES]
+    return [Step(count * copies, partial(with_copies, scene, copies)) for copies in (1, 2, 4, 8)]
 
 
 def with_copies(scene: Scene, copies: int) -> Scene:
@@ -167,9 +158,13 @@ def _copy(light: Light, number: int, copies: int, camera) -> Light:
     if number == 0:
         return light
     position = np.array(light.position, dtype=np.float64).ravel()
+    # Copies of a light from infinity are 2.3 degrees from one another, about an arbitrary axis.
     if light.extent is not None:
-        return turned_light(light, position, rotation((0.31, 0.53, 0.79), _TURN * number))
-    step = _ASIDE * np.linalg.norm(position - camera)
+        return turned_light(light, position, rotation((0.31, 0.53, 0.79), 2.3 * number))
+    # Copies of a light at a place stand on a spiral: 2.4 rad is the golden angle, and the root of
+    # the number keeps neighbours about equally far apart. The step is a fraction of the distance
+    # from the camera.
+    step = 0.07 * np.linalg.norm(position - camera)
     aside = (
         step
         * number**0.5
@@ -179,7 +174,8 @@ def _copy(light: Light, number: int, copies: int, camera) -> Light:
 
 
 def _maps(name: str, size: tuple[int, int]) -> list[Step]:
-    return [Step(side, partial(_read, name, size), {"map": side}) for side in _MAPS]
+    sides = (128, 256, 512, 1024, 2048)
+    return [Step(side, partial(_read, name, size), {"map": side}) for side in sides]
 
 
 def triangles_of(scene) -> int:
@@ -230,9 +226,12 @@ def bumpy(points: Array, corner: Array, size: float) -> Array:
     `size` from a `corner` on [m].
     """
     moved = points.copy()
-    for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):
+    # How many waves there are along the size of the scene, by axis: k_i of the module.
+    waves = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))
+    for number, wave in enumerate(np.asarray(waves) * (2 * np.pi / size), 1):
+        # A displacement across the wave, a_i with |a_i| |k_i| = 0.15.
         across = np.cross(wave, (0.31, 0.53, 0.79))
-        height = _STEEPNESS / np.linalg.norm(wave)
+        height = 0.15 / np.linalg.norm(wave)
         moved += (
             height
             * across
@@ -255,6 +254,7 @@ def study_growth(
     loaded together. The anchor of all steps says whether the machine changed between them. A method
     ends at the first step that it refuses.
     """
+    # `rows`: for each configuration a row of each step, until it refuses one.
     name, rows, runs = (
         study.scenes[0],
         list[list[Row]]([] for _ in study.configurations),
@@ -266,32 +266,38 @@ def study_growth(
         # Steps are compared with one another: the camera rays of the first are the anchor of all.
         anchor = anchor or camera_rays(scene)
         size = scene.camera.width, scene.camera.height
+        # The step is rendered once by each method that has not refused a smaller one: a row says
+        # what it needs, or why it refuses.
         cells: list[Cell | None] = []
-        for place, (chosen, own) in enumerate(zip(study.configurations, rows, strict=True)):
+        for place, (chosen, steps_done) in enumerate(zip(study.configurations, rows, strict=True)):
             cell = None
-            if all(row.status == "done" for row in own):
-                asked = replace(
+            if all(row.status == "done" for row in steps_done):
+                of_step = replace(
                     chosen,
                     parameters=tuple((dict(chosen.parameters) | dict(step.parameters)).items()),
                 )
-                cell = Cell(name, size, (), asked, study.measure, (kind, step.work))
-                own.append(run(cell, scene, None)[0])
-            cells.append(cell if cell is not None and own[-1].status == "done" else None)
+                cell = Cell(name, size, (), of_step, study.measure, (kind, step.work))
+                steps_done.append(run(cell, scene, None)[0])
+            cells.append(cell if cell is not None and steps_done[-1].status == "done" else None)
             if progress is not None:
                 done = number * len(rows) + place + 1
                 progress(done, len(steps) * len(rows), f"{kind} {step.work:g}, {chosen.label}")
+        # Camera rays alone are timed at each step as well: the least that a frame of it can take.
         timings = time_cells(cells, partial(_same, scene), anchor=anchor)
         rays = time_repeated(camera_rays(scene), seconds=0.5 * study.measure.seconds, least=3)
-        for own, cell, timed in zip(rows, cells, timings, strict=True):
+        for of_method, cell, timed in zip(rows, cells, timings, strict=True):
             if cell is not None:
-                own[-1] = replace(with_times(own[-1], timed), work=Growth(kind, step.work, rays))
+                work = Growth(kind, step.work, rays)
+                of_method[-1] = replace(with_times(of_method[-1], timed), work=work)
+        # All methods of a step are of one run: the first says all there is to say of it.
         runs += [
             each.times.run
             for each in timings
             if each.times is not None and each.times.run is not None
         ][:1]
-    found = []
-    for chosen, own in zip(study.configurations, rows):
+    # A record for each configuration, of the steps that were timed.
+    scalings = []
+    for chosen, of_method in zip(study.configurations, rows):
         costs: list[dict[str, Any]] = [
             {
                 **row.times.measured,
@@ -299,7 +305,7 @@ def study_growth(
                 "rays": row.work.rays,
                 "memory": row.memory,
             }
-            for row in own
+            for row in of_method
             if row.times is not None and row.work is not None
         ]
         works = [cost["work"] for cost in costs]
@@ -311,11 +317,11 @@ def study_growth(
             "kind": kind,
             "costs": costs,
             "growth": {each: growth(kind, each, works, values) for each, values in times.items()},
-            "refused": own[-1].reason,
+            "refused": of_method[-1].reason,
             "run": joined(runs) if runs else None,
         }
-        found.append(record_of(scaling, Scaling))
-    return found
+        scalings.append(record_of(scaling, Scaling))
+    return scalings
 
 
 def _same(scene: Scene, cell: Cell) -> Scene:
@@ -327,24 +333,26 @@ def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float])
     first, grows with the work.
     """
     exponent, standard_error = fitted_exponent(works, times)
+    # The exponent of each step by itself, with the work at its end: a cliff hides in the mean
+    # exponent of all steps.
     steps = list(pairwise(zip(works, times)))
     local = [
         (math.log(after / before) / math.log(second / first), second)
         for (first, before), (second, after) in steps
     ]
     steepest, at = max(local, default=(None, None))
-    most = USUAL[kind][TIMES.index(name)] + CLIFF
-    cliff = any(
-        slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps)
-    )
-    found = {
+    # Steeper by 0.6, 4 times the work takes 2.3 times as long as it may. Below 5 ms launches and
+    # clocks decide a time [ms].
+    most, short = USUAL[kind][TIMES.index(name)] + 0.6, 5.0
+    cliff = any(slope > most and after > short for (slope, _), (_, (_, after)) in zip(local, steps))
+    values = {
         "exponent": exponent,
         "standard_error": standard_error,
         "steepest": steepest,
         "at": at,
         "cliff": cliff,
     }
-    return record_of(found, TimeGrowth)
+    return record_of(values, TimeGrowth)
 
 
 def fitted_exponent(works: ArrayLike, values: ArrayLike) -> tuple[float, float]:

@@ -32,12 +32,7 @@ from airlight.validation.study.study import Cell
 # are left out.
 _PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
-_FRACTION = 16  # one pixel in so many has a reference where lights have an extent
-
-_LEAST = 64  # pixels that have one
-_SEED = 20261123  # of their choice
 _UNKNOWN = Spent()
-_STANDARD_ERRORS = 3.0  # that a bound has of an area light
 
 
 @dataclass(frozen=True)
@@ -59,8 +54,9 @@ class Reference:
     @cached_property
     def own_error(self) -> ReferenceError:
         """The error that the reference states for itself."""
-        kept = np.ones(self.airlight.shape[:2], dtype=bool) if self.mask is None else self.mask
-        airlight, bound = self.airlight[kept], self.bound[kept]
+        mask = np.ones(self.airlight.shape[:2], dtype=bool) if self.mask is None else self.mask
+        airlight, bound = self.airlight[mask], self.bound[mask]
+        # A dark reference has no relative error.
         mean = float(airlight.mean())
         known = mean > 0
         return ReferenceError(
@@ -76,10 +72,10 @@ class Reference:
 
 def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
-    drawn = 0.0 if image.airlight_se is None else _STANDARD_ERRORS * image.airlight_se
-    return Reference(
-        image.airlight, image.airlight_bound + drawn, image.surface, None, image.transitions, spent
-    )
+    # The light samples of area lights add three standard errors to the bound.
+    by_chance = 0.0 if image.airlight_se is None else 3.0 * image.airlight_se
+    bound = image.airlight_bound + by_chance
+    return Reference(image.airlight, bound, image.surface, None, image.transitions, spent)
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -108,11 +104,11 @@ class SampledInputs(Inputs):
 
 def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
+    # One pixel of sixteen has a reference, but at least 64. The seed is fixed: all methods, and all
+    # studies, are judged at the same pixels.
     width, height = scene.sensors()[0].film().size()
     count = int(width * height)
-    pixels = np.sort(
-        np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)]
-    )
+    pixels = np.sort(np.random.default_rng(20261123).permutation(count)[: max(64, count // 16)])
     some = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
     airlight, bound, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
     airlight[pixels], bound[pixels], mask[pixels] = some.airlight[0], some.bound[0], True

@@ -26,7 +26,6 @@ ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"
 PICTURES = 12
 _WORST_BY = ("error.relative_rmse", "error.p99", "error.max")
 
-_BATCH = 4096  # rows that the Parquet is written in at once
 _TABLE = (
     "CREATE TABLE IF NOT EXISTS rows (key TEXT PRIMARY KEY, status TEXT, data TEXT, picture BLOB)"
 )
@@ -43,6 +42,8 @@ class RowStore:
         self.folder = ensure_folder(folder)
         self.path = self.folder / ROWS
         self._rows = sqlite3.connect(self.path, timeout=0.0, isolation_level=None)
+        # An exclusive lock from the first transaction on: a second run into the same folder is
+        # refused at once, not at its first row.
         try:
             self._rows.execute("PRAGMA locking_mode = EXCLUSIVE")
             self._rows.execute("BEGIN EXCLUSIVE")
@@ -115,7 +116,8 @@ class RowStore:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        shown = worst_rows(self.rows())
+        # Rows are read three times, one by one: for the worst, for the columns, and to be written.
+        pictured = worst_rows(self.rows())
         schema = arrow_schema(property_names(self.rows()))
         target = self.folder / PARQUET
         with (
@@ -126,8 +128,8 @@ class RowStore:
         ):
             batch: list[dict[str, Any]] = []
             for row in self.rows():
-                batch.append(row if row["key"] in shown else row | {"picture": None})
-                if len(batch) == _BATCH:
+                batch.append(row if row["key"] in pictured else row | {"picture": None})
+                if len(batch) == 4096:  # written at once: memory holds no more rows
                     writer.write_table(pa.Table.from_pylist(batch, schema=schema))
                     batch = []
             writer.write_table(pa.Table.from_pylist(batch, schema=schema))
@@ -156,6 +158,7 @@ def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
     for row in rows:
         for measure in _WORST_BY:
             if row.get(measure) is not None and row.get("picture") is not None:
+                # A heap whose root is the least bad of the worst: the next worse one replaces it.
                 best = worst.setdefault((row["label"], measure), [])
                 heapq.heappush(best, (row[measure], row["key"]))
                 if len(best) > PICTURES:

@@ -74,6 +74,8 @@ def run(
     against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
     method in a separate process.
     """
+    # A user's method may crash or hang, so it is rendered in a process of its own, with its further
+    # runs. A refusal is a row as well.
     took = stopwatch()
     runs: list[Array] = []
     try:
@@ -95,14 +97,15 @@ def run(
             row, noise=_runs_error(reference, [np.asarray(frame.airlight, dtype=np.float64), *runs])
         )
     if paint is not None:
-        shown = np.asarray(frame.airlight, dtype=np.float64)
+        airlight = np.asarray(frame.airlight, dtype=np.float64)
         # Pixels without a reference are shown as if they were right.
-        known = (
+        expected = (
             reference.airlight
             if reference.mask is None
-            else np.where(reference.mask[..., None], reference.airlight, shown)
+            else np.where(reference.mask[..., None], reference.airlight, airlight)
         )
-        row = replace(row, picture=paint(known, shown))
+        row = replace(row, picture=paint(expected, airlight))
+    # The work of the row is all that it took, comparison and picture included.
     assert row.cost is not None
     lights, spent = rendered_lights(scene, cell.chosen), took()
     cost = replace(row.cost, lights=lights, work_ms=spent.ms, cpu_ms=spent.cpu_ms)
@@ -142,18 +145,21 @@ def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
     """Render a cell; return its row, not yet compared with anything, and
     its frame, if there is one.
     """
-    chosen, wanted = cell.chosen, cell.measure
+    chosen, measure = cell.chosen, cell.measure
     row_of = partial(cell_row, cell, knows_shadows=knows_shadows(chosen))
+    # Launches and memory are counted from here: what runs already must have ended.
     dr.sync_thread()
     dr.detail.malloc_clear_statistics()
     before = dr.detail.launch_stats()
+    # The first frame is the one that is compared, and its time holds the compilation. A study of
+    # stages refuses a frame that is not finite; others count such pixels.
     try:
         renderer, making = timed(partial(prepared, scene, chosen))
         reason = _too_long(renderer, cell, making.seconds)
         if reason:
             return row_of(status="left out", reason=reason), None
         frame, first = timed(
-            partial(render_frame if wanted.times == "stages" else _unchecked, renderer)
+            partial(render_frame if measure.times == "stages" else _unchecked, renderer)
         )
     except InputError as error:
         return row_of(status="refused", reason=str(error)), None
@@ -161,16 +167,17 @@ def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
     cost = Cost(making.ms + first.ms, None, after[0] - before[0], after[2] - before[2], watermark)
+    # A user's method that cannot be recorded has slow frames for another reason than its work.
     note = None
     if (
-        wanted.times == "stages"
+        measure.times == "stages"
         and chosen.own
         and not is_shader(chosen.method)
         and not find_method(chosen.method).frozen
     ):
         note = "not frozen: its Python runs again for every frame"
     row = row_of(cost=cost, note=note)
-    return with_times(row, brief_times(renderer)) if wanted.times == "with" else row, frame
+    return with_times(row, brief_times(renderer)) if measure.times == "with" else row, frame
 
 
 def with_times(row: Row, found: CellTimes) -> Row:
@@ -204,6 +211,7 @@ def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
 
     Runs that are the same bit by bit count once.
     """
+    # A pixel counts where it has a reference and every run is finite in it.
     runs = [runs[number] for number in sorted(set(first_equal(runs)))]
     counts = np.isfinite(runs).all(axis=(0, 3))
     counts &= True if reference.mask is None else reference.mask
@@ -213,6 +221,8 @@ def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
     if not mean > 0 or len(runs) < 2:
         return None
     errors /= mean
+    # The squared bias without the noise of the mean, from pairs of runs: see
+    # `validation.motion.noise`. Its root is reported only from two errors above zero on.
     products = errors @ errors.T / errors.shape[1]
     squared, _ = parts_of_error(products)
     bias, rmse = (student(each) for each in (errors.mean(axis=1), np.sqrt(np.diag(products))))
@@ -258,6 +268,7 @@ def _errors(
 ) -> dict[str, Any]:
     """Return the errors of a frame by the names of their fields in a row."""
     test, mask = np.asarray(frame.airlight, dtype=np.float64), reference.mask
+    # Surfaces are compared where the scene has some and the reference did not leave them out.
     errors: dict[str, Any] = {"error": error_metrics(reference.airlight, test, mask=mask)}
     surface = np.asarray(frame.surface, dtype=np.float64)
     if scene.features.surfaces and reference.surface is not None:
@@ -274,14 +285,18 @@ def _errors(
     errors["published"] = published_errors(reference.airlight, test, mask=mask)
     errors["normalised"] = published_errors(reference.airlight, test, unit=None, mask=mask)
     errors["colour"] = colour_difference(reference.airlight, test, mask=mask)
+    # Pixels whose error is larger than the method itself allows: the integral relative to the
+    # pixel, with a floor in the dark, and the error of the reference. Pixels that are left may owe
+    # it to the ends of lit intervals.
     bound = stated_bound(cell.chosen, scene)
     if bound is not None and whole is not None:
-        # of all pixels: who states a bound has a reference in each
+        # There is no mask here: scenes in which a method states a bound have no area lights, so
+        # that every pixel has a reference.
         floor = FLOOR * reference.airlight.mean()
         allowed = bound * np.maximum(reference.airlight, floor) + reference.bound
         excess = np.abs(test - reference.airlight).reshape(-1, 3) - allowed.reshape(-1, 3)
         outside = np.flatnonzero(~(excess <= 0).all(axis=1))
-        if len(outside):  # few: what the ends of intervals are worth takes a while
+        if len(outside):  # few pixels: the worth of ends takes a while
             outside = outside[~(excess[outside] <= worth_of_ends(whole, outside)).all(axis=1)]
         errors["stated"] = StatedError(bound, len(outside))
     return errors
@@ -297,9 +312,12 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
+    # First by the time that making the renderer took, which costs nothing more.
     many = len(renderer.groups) > 1
     if limit is None or not (chosen.own or many or took > _DOUBTFUL * limit):
         return None
+    # Then by the preparation. A state of None is a group that is prepared during the frame: it
+    # takes as long as the others.
     if many:
         renderer.prepare(renderer.scene)  # compiles
     states, spent = timed(lambda: renderer.prepare(renderer.scene))
@@ -310,11 +328,13 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return f"not measured: what a frame prepares takes {preparation:.2g} s, {words}"
     if not chosen.own and preparation <= _DOUBTFUL * limit:
         return None
+    # Last by a small frame: its preparation takes as long as that of a full frame, the rest grows
+    # with the pixels.
     small, large = (
         prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen),
         renderer.scene.camera,
     )
-    render_frame(small)
+    render_frame(small)  # compiles
     took = timed(lambda: render_frame(small))[1].seconds
     fraction = (large.width * large.height) / (PROBE[0] * PROBE[1])
     expected = preparation + max(0.0, took - preparation) * fraction

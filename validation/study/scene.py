@@ -2,10 +2,10 @@
 """The study of one scene: its reference, the checks of the reference, every
 configuration, images from elsewhere.
 
-Each part is kept on disk as soon as it is there: a study that was killed goes on where it stopped,
-and one in which nothing changed computes nothing. Errors are kept by configuration. Times are kept
-by scene, those of all of its configurations together: they are compared with one another, and are
-of one run (`validation.study.turns`).
+Each part is stored on disk as soon as it is computed: a study that was killed goes on where it
+stopped, and a study in which nothing changed computes nothing. Errors are stored by configuration.
+Times are stored by scene, for all of its configurations together: they are compared with one
+another, and come from one run (`validation.study.turns`).
 """
 
 import time
@@ -56,9 +56,6 @@ if TYPE_CHECKING:  # what only reports of images need is imported there
 Layer = NDArray[np.floating]  # frames are float32
 
 _MULTIPLE = (64, 48)  # size of the image whose fraction of multiple scattering is measured [pixels]
-_LONG = 25e3  # after a longer first frame, compilation included, no larger frame is timed [ms]
-# that the kernels of a configuration or an estimator take [s], beside its work on one thread
-_COMPILED = 2.0
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ class SceneStudy:
 
     loaded: LoadedScene  #: at the size of the images
     study: Study  #: with one size of images
-    machine: Mapping[str, str]  #: on which times hang
+    machine: Mapping[str, str]  #: facts of the machine, on which times depend
 
     @cached_property
     def scene(self) -> Scene:
@@ -151,26 +148,32 @@ class SceneStudy:
         """
         lights, area_lights = len(self.scene.lights), len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
-        known = is_kept(self.reference_inputs.key)
+        # A part whose inputs have a result on disk is loaded, which takes no time. The names are
+        # those with which `study_scene` calls `progress`.
+        cached = is_kept(self.reference_inputs.key)
         work = reference_work(self.size, lights=lights, area_lights=area_lights)
-        parts["reference"] = 0.0 if known else work.seconds
+        parts["reference"] = 0.0 if cached else work.seconds
+        # Estimators stop when they have decided, or when the patience ends: it is the most that
+        # each takes. A minute stands for checks without an end.
         with self.at(checks.size) as scene:
-            known = is_kept(CheckInputs(scene_content(scene), checks, self.study.points).key)
-        parts["checks"] = 0.0 if known else len(checks.margins) * (checks.patience or 60.0)
+            cached = is_kept(CheckInputs(scene_content(scene), checks, self.study.points).key)
+        parts["checks"] = 0.0 if cached else len(checks.margins) * (checks.patience or 60.0)
         batches, samples = checks.multiple
         with self.at(_MULTIPLE) as scene:
-            known = is_kept(MultipleInputs(scene_content(scene), batches, samples).key)
+            cached = is_kept(MultipleInputs(scene_content(scene), batches, samples).key)
         parts["multiple scattering"] = (
-            0.0 if known else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
+            0.0 if cached else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
         )
+        # A configuration renders one frame for its errors; the frames for its times come last,
+        # with those of all others.
         for chosen in self.configurations:
-            known = is_kept(self.inputs(chosen).key)
+            cached = is_kept(self.inputs(chosen).key)
             parts[chosen.label] = (
-                0.0 if known else _seconds(configuration_work(self.scene, chosen, frames=1))
+                0.0 if cached else _seconds(configuration_work(self.scene, chosen, frames=1))
             )
         works = [configuration_work(self.timed, chosen) for chosen in self.configurations]
-        known = self.times_inputs is None or is_kept(self.times_inputs.key)
-        parts["times"] = 0.0 if known else sum(map(_seconds, works))
+        cached = self.times_inputs is None or is_kept(self.times_inputs.key)
+        parts["times"] = 0.0 if cached else sum(map(_seconds, works))
         return parts
 
     @cached_property
@@ -180,7 +183,8 @@ class SceneStudy:
 
     def inputs(self, chosen: Configuration) -> "CellInputs":
         """Return the inputs of the row and the image of a configuration, without its times."""
-        # How long frames are timed, and at which size, decides no error.
+        # How long frames are timed, and at which size, decides no error. Whether all stages are
+        # timed does: frames that are not finite are refused there, see `run.render`.
         measure = self.study.measure
         times = "stages" if measure.times == "stages" else "none"
         errors = replace(measure, times=times, seconds=0.0, slow=None, timed_size=None)
@@ -267,13 +271,15 @@ class ImageInputs(Inputs):
 
 
 def _seconds(work: Work) -> float:
-    return _COMPILED + work.seconds
+    # The kernels of a configuration or an estimator take two seconds more to compile.
+    return 2.0 + work.seconds
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A row of a scene, and its image; of one of our methods as it is kept, without
-    what it is compared with.
+    """A row of a scene, and its image.
+
+    A row of one of our methods is stored without the reference that it is compared with.
     """
 
     row: Row
@@ -331,6 +337,8 @@ def study_scene(
     other processes trace the batches that check the reference. `workers` is the number of processes
     that compute HDR-FLIP at once, each on one processor.
     """
+    # The reference comes first: every row is compared with it, and its checks say how far it can
+    # be trusted.
     progress("reference")
     reference, checks = study.kept_reference, study.study.checks
     progress("checks")
@@ -339,6 +347,8 @@ def study_scene(
     progress("multiple scattering")
     with study.at(_MULTIPLE) as scene:
         multiple = multiple_scattering(scene, *checks.multiple)
+    # Errors of all configurations, then times of all in one run: only configurations that could be
+    # rendered are timed.
     rows = []
     for chosen in study.configurations:
         progress(chosen.label)
@@ -358,6 +368,7 @@ def study_scene(
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
+    # What each part took when it was computed, whether that was now or in an earlier study.
     methods = [result for row in rows for result in row.results]
     seconds = {
         "reference": reference.seconds,
@@ -381,6 +392,8 @@ def configurations_for(
     bounded media is left out if the scene has none, or if they do not lie in vacuum, and so are
     light samples where there is no area light.
     """
+    # Names of parameters that change nothing here: a configuration that sets one of them renders
+    # the same image as the configuration without it.
     without_effect = set() if scene.features.shadows else {"shadow", "order", "map"}
     without_effect |= set() if scene.medium.clear else {"media"}
     without_effect |= set() if scene.area_lights else {"points", "pattern"}
@@ -424,6 +437,7 @@ def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> K
     inputs = study.inputs(chosen)
 
     def compute() -> Judged:
+        # The key has the identity of the scene; a process that renders the cell loads its path.
         reference = of_image(study.kept_reference.value, study.kept_reference.spent)
         row, frame = run(
             replace(inputs.cell, scene=study.path), study.scene, reference, apart=apart
@@ -458,7 +472,9 @@ def _scene_times(study: SceneStudy, rows: Sequence[Row], apart: Apart | None) ->
     cells = []
     for chosen, row in zip(study.configurations, rows, strict=True):
         cell = study.timed_cell(chosen, study.path)
-        long = row.cost is not None and row.cost.first_ms > _LONG
+        # After a first frame of more than 25 s, compilation included, no larger frame is timed
+        # [ms].
+        long = row.cost is not None and row.cost.first_ms > 25e3
         cells.append(
             None if row.status != "done" else replace(cell, size=study.size) if long else cell
         )
@@ -481,10 +497,12 @@ def _row(
     apart: Apart | None,
     ended: Mapping[Configuration, str],
 ) -> Judged:
+    # A method that ended its process is not called again: its row says how it ended.
     if chosen in ended:
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
         return Judged(row, results=(Kept(row, Spent(), time.time(), False),))
-    # loaded or computed now: it is no part of the time of a configuration
+    # The reference is loaded or computed before the configuration, so that it is no part of the
+    # time of a configuration.
     reference = study.reference
     result = measured(study, chosen, apart)
     # The same scene may have been measured under another path.
@@ -509,6 +527,7 @@ def _with_flip(judged: Judged) -> Judged:
     """
     if judged.whole is None or judged.image is None:
         return judged
+    # FLIP is another program: its version is an input beside both images.
     whole, light = judged.whole, judged.light
     inputs = FlipInputs(whole, light, _flip_version())
     result = stored(inputs, lambda: _flip(whole, light), tuple[Flip, Layer | None])
@@ -530,11 +549,13 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     """Return the row of an image from elsewhere."""
     from airlight.validation.engine.images import image_times
 
+    # The key has the inputs of the reference: another reference gives another row.
     times = image_times(shown.path)
     inputs = ImageInputs(
         study.reference_inputs, study.identity, study.size, shown.label, shown.path, times
     )
     result = stored(inputs, lambda: _measured_image(study, shown, times), Judged)
+    # Whether FLIP is asked for is no input of the row: the image for it is dropped here.
     whole = None if study.study.flip == "none" else result.value.whole
     return replace(
         result.value,
@@ -565,6 +586,8 @@ def _measured_image(
         surface_error=surface,
         times=None if times is None else FrameTimes(times[0]),
     )
+    # FLIP compares all light. An image of the airlight alone has it only where the surfaces are
+    # dark, or where it has a layer of them.
     reference, whole = judged.layers, None
     if judged.expected == TOTAL:
         whole = judged.reference

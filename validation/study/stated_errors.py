@@ -62,7 +62,6 @@ END = 8 * 2.0**-24
 
 _SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
 _RAYS = 1024  # at once: so many take some 100 MB
-_BETWEEN = 1.1  # times the largest of these no place scatters
 
 
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
@@ -71,6 +70,7 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
 
     Points in the place of area lights are an approximation.
     """
+    # All parameters but the side of a shadow map must be the usual ones.
     usual_values = defaults(METHODS[chosen.method]) if chosen.method in METHODS else {}
     usual = all(
         usual_values.get(name, value) == value for name, value in chosen.parameters if name != "map"
@@ -90,6 +90,8 @@ def _kinks(phase: Any) -> float:
         return 0.0
     values = np.array(phase.values, dtype=np.float64)
     neighbours = np.lib.stride_tricks.sliding_window_view(values, min(3, len(values)))
+    # Rule and integral err by an eighth of the second difference each: a fourth of it, over the
+    # least of the three values.
     bends = np.abs(neighbours @ np.array([1, -2, 1])) if len(values) > 2 else np.zeros(1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.nan_to_num(0.25 * bends / neighbours.min(axis=1), posinf=np.inf).max())
@@ -113,6 +115,7 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
     """Return the largest error by uncertain ends of lit intervals of all rays
     of `reference`, (rays, 3).
     """
+    # Lights at a place are sampled at equal angles about them, lights at infinity at equal steps.
     distance = surface_hits(reference).distance
     worth = np.zeros((len(distance), 3))
     sources: list[tuple[Any, ...]] = [
@@ -121,6 +124,8 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
     sources += [(light, _equal_steps, _from_infinity) for light in reference.directional]
     ends, growth = _ends(reference, distance)
     for light, places_of, incident in sources:
+        # The possible ends of rays have their own factor 1/|c|; at all other places a shadow may
+        # end, with a factor of 1. Places that a ray does not have are infinite.
         places = np.concatenate([ends, places_of(reference, light, distance)])
         uncertain = np.concatenate([growth, np.ones_like(places[len(ends) :])]).T
         x = np.clip(places, 0, distance).T
@@ -129,24 +134,28 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
         scattered = uncertain[:, None] * _scattered(
             reference, partial(incident, reference, light), ray, x, distance
         )
+        # One uncertain end for each light: errors of several lights add up.
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
-    return _BETWEEN * END * worth
+    # No place between the samples scatters more than 1.1 times the largest of them.
+    return 1.1 * END * worth
 
 
 def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
-    """Return distances along rays [m], and what divides their certainty, 1/|c|
-    [1], (places, rays) each.
+    """Return distances along rays [m], and the factor of their uncertainty, 1/|c| [1], (places,
+    rays) each.
 
-    They are those of the ends of rays, the middles of segments in media and between them, and
-    where rays cross bounds.
+    The places are the ends of rays, the middles of segments in media and between media, and the
+    points where rays cross bounds.
     """
     places = [np.zeros_like(distance), distance]
     if reference.media:
         segments = camera_segments(reference, distance)
         places += list(0.5 * (segments.start + segments.end))
     growth = [np.ones_like(distance)] * len(places)
+    # A ray that misses a medium, or leaves the scene before it, has an infinite distance there:
+    # all rays have as many places.
     for medium in reference.media:
         enter, leave = crossings(medium.bounds, reference.origin, reference.direction)
         for x in (enter, leave):
@@ -154,7 +163,7 @@ def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
             points = reference.origin + np.where(met, x, 0)[:, None] * reference.direction
             cosine = np.abs(np.sum(normals_at(medium.bounds, points) * reference.direction, axis=1))
             places.append(np.where(met, x, np.inf))
-            # below it nothing is known of x
+            # A ray along the bound itself: with a smaller cosine nothing is known of x.
             growth.append(1 / np.where(met, np.maximum(cosine, END), 1))
     return np.stack(places), np.stack(growth)
 
@@ -162,6 +171,8 @@ def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
 def _angles_about(reference: ReferenceScene, light: ReferenceLight, distance: Array) -> Array:
     """Return distances at equal angles about a light, (places, rays) [m]."""
     toward = light.position - reference.origin
+    # At equal angles samples are dense near the light, where s(x) changes fast. An angle at pi/2
+    # is a place at infinity.
     foot = reference.direction @ toward
     height = np.linalg.norm(toward - foot[:, None] * reference.direction, axis=1)
     first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
@@ -208,11 +219,13 @@ def _scattered(
     direction = reference.direction[ray]
     segment, arriving = incident(reference.origin + x[:, None] * direction)
     from_camera = optical_depth(reference, reference.origin, direction, np.zeros(len(x)), x)
-    kept = arriving * np.exp(-from_camera) / (4 * np.pi)
-    total = np.zeros_like(kept)
+    # Light that arrives, attenuated on the way to the camera; each medium scatters it by its own
+    # phase function, which has the mean 1 over the sphere.
+    radiance = arriving * np.exp(-from_camera) / (4 * np.pi)
+    total = np.zeros_like(radiance)
     for medium, inside in _media(reference, ray, x, distance):
         phase = medium.phase(np.clip(np.sum(segment * -direction, axis=1), -1, 1))
-        total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * kept
+        total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * radiance
     return total
 
 
@@ -222,6 +235,7 @@ def _media(
     """Return media and which places are in them; a place at a bound is on either side of it."""
     if not reference.media:
         return [(homogeneous_around(reference), np.ones(len(x), dtype=bool))]
+    # The slack is the uncertainty of a bound: a place on it is in the media at both sides.
     segments = camera_segments(reference, distance)
     slack = END * x
     inside = [

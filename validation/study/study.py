@@ -79,7 +79,6 @@ _FOLDER = Path(__file__).parent / "studies"
 
 _METHOD_SETS = ("all", "quick", "standard", "growth", "causes", "noise", "motion")
 _LONGEST = 86400.0
-_MOST_RETRIES = 100
 _MOST_SCENES = 10_000_000
 
 
@@ -148,6 +147,7 @@ class Study(Settings):
         """
         if scene not in self.half:
             return self
+        # A quarter of the pixels needs four times the samples for as many paths.
         size, checked = (
             (width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size)
         )
@@ -246,6 +246,8 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     """Return the study that a table describes, as `tomllib` reads it; paths of
     scenes begin at `folder`.
     """
+    # The keys of a study and of its measurements stand beside one another in the file; each reader
+    # skips those of the other.
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
     given, measure = (
         read_named("", data, _STUDY, *_MEASURE, *others),
@@ -275,6 +277,8 @@ def standard_study(name: str) -> Study:
 
 def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     """Return the combinations of methods, kernels, maps and parameters."""
+    # A word stands for a set of configurations that are complete. Together with kernels, maps or
+    # parameters it only names the methods.
     parameters = read_table("parameters", data.get("parameters", {}))
     asked = data.get("methods", "all")
     if isinstance(asked, str):
@@ -290,6 +294,7 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
                 "methods", tuple(read_word("methods", word) for word in read_list("methods", asked))
             )
         )
+    # Every name is checked before anything is combined: the message then says which is wrong.
     for method in names:
         configuration(method)  # refuses unknown names
     stray = [method for method in parameters if method not in names]
@@ -305,6 +310,7 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     for kernel in kernels:
         if kernel is not None:
             find_kernel(kernel)
+    # None stands for a method's default, where the file says nothing.
     sides = read_list("maps", data["maps"]) if "maps" in data else [None]
     for side in sides:
         read_number("maps", 1 if side is None else side, 1, 16384)
@@ -315,6 +321,7 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
             method, kernels, sides, read_table(f"parameters.{method}", parameters.get(method, {}))
         )
     ]
+    # A key that no method has is a mistake of the file, not a study of less.
     if "kernels" in data and not any(each.kernel for each in chosen):
         raise InputError("kernels: none of the methods calls one; leave them out")
     if "maps" in data and not any("map" in dict(each.parameters) for each in chosen):
@@ -345,7 +352,8 @@ def _of_method(
     for combination in itertools.product(*lists.values()):
         settings = dict(zip(lists, combination))
         plain = configuration(method, None, settings)
-        # parameters do without a map
+        # With these parameters the method draws no map: one configuration stands for all sides,
+        # and equal ones are dropped by the caller.
         if "map" in lists and sides != [None] and map_side(plain) is None:
             plain = configuration(
                 method, None, {name: value for name, value in settings.items() if name != "map"}
@@ -464,7 +472,7 @@ _STUDY: Mapping[str, Reader] = {
     "flip": _flip,
     "timed": partial(read_number, least=1, most=_MOST_SCENES),
     "limit": partial(read_number, least=1e-3, most=_LONGEST, whole=False),
-    "retries": partial(read_number, least=0, most=_MOST_RETRIES),
+    "retries": partial(read_number, least=0, most=100),
     "checks": _checks,
     "stability": _count,
     "growth": several(partial(read_one_of, names=GROWTH), 0),

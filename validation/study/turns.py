@@ -56,18 +56,9 @@ Turns = Generator[Any, None, None]
 #: and the usual thirty or more frames would take minutes.
 SLOW = 8.0
 _PATIENCE = 1.5  # approximate time for the turns of a slow method; one is the least [s]
-# times of which `Measure.seconds` is one: frame, surface and airlight, and half
-# as long for each of four
-_SHARE = 5.0
 _BRIEF = 0.2  # on the turns of a method that is timed briefly [s]
-_BRIEF_MOST = 9  # of these turns
 # in a frame that takes less, its recording takes a part of the time that counts [s]
 _RECORDED = 1.0
-_ANCHORS = (
-    # repetitions of an anchor at an end of a round: 24 tell a change from scatter
-    # (`validation.timing.anchored`)
-    25
-)
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,7 @@ class CellTimes:
     memory: float | None = None  #: as of a row [MiB]
     device: str | None = None  #: that draws a shader
     note: str | None = None  #: how they differ from those of others
-    lost: str | None = None  #: why there are no times though the cell was asked for
+    lost: str | None = None  #: why a cell that should be timed has no times
 
 
 @dataclass(frozen=True)
@@ -107,6 +98,7 @@ def time_cells(
     `anchor`: camera rays of the first cell by default; `progress`: called with the fraction of
     methods that are ready.
     """
+    # A method that fails has its reason in its place, and the others are timed.
     times = [CellTimes() for _ in cells]
     with ExitStack() as stack:
         pieces: dict[int, Piece[list[FrameSpent]]] = {}
@@ -114,7 +106,8 @@ def time_cells(
             progress(place / len(cells))
             if cell is None:
                 continue
-            # Every method compiles and records before the first is timed.
+            # Every method compiles and records before the first is timed. The generator of its
+            # turns goes on living: it holds the recorded functions, or the separate process.
             try:
                 turns: Turns
                 if apart is not None and cell.chosen.own:
@@ -127,6 +120,8 @@ def time_cells(
                 continue
             times[place] = CellTimes(memory=ready.memory, device=ready.device)
             pieces[place] = _piece(turns, ready, cell.measure, partial(_lose, times, place))
+        # The anchor and the work of moving all objects are the same for all methods. Moves are
+        # timed only where frames after objects moved are asked for.
         if pieces:
             first = next(cell for cell in cells if cell is not None)
             scene = scene_of(first)
@@ -173,7 +168,7 @@ def brief_times(renderer: FrameRenderer) -> CellTimes:
         seconds = 0.0  # its turn takes them
     else:
         turn = brief_turn(renderer)
-    ((repetitions,),) = in_turns([Piece(turn, seconds)], rounds=1, most=_BRIEF_MOST)
+    ((repetitions,),) = in_turns([Piece(turn, seconds)], rounds=1, most=9)
     return _cell_times(
         CellTimes(device=device), list(chain(*repetitions)), [], TimingRun(started, 1)
     )
@@ -217,10 +212,11 @@ def _turns(renderer: FrameRenderer, measure: Measure) -> Turns:
     memory = peak_memory(frame)
     if took[-1] < slow:
         memory = peak_memory(frame)
+    # A slow frame, and one that does not fit into memory at once, is timed stage by stage.
     recorded = took[-1] < _RECORDED
     in_stages = took[-1] > slow or len(parts(renderer)) > 1
     turn = staged_turn(renderer) if in_stages else whole_turn(renderer)
-    if recorded:
+    if recorded:  # the turn records functions of its own, in a first turn that does not count
         turn()
     yield Ready(took[-1], memory)
     while True:
@@ -242,13 +238,16 @@ def _piece(
             lose(error)
             return []
 
+    # A shader draws for its time by itself, and is asked once a round.
     rounds = int(np.clip(_PATIENCE / max(ready.took, 1e-9), 1, ROUNDS))
     return Piece(turn, 0.0 if ready.device else _seconds(measure), rounds)
 
 
 def _seconds(measure: Measure) -> float:
     """Return the time for all turns of a method [s]."""
-    return _SHARE * measure.seconds if measure.times == "stages" else _BRIEF
+    # `Measure.seconds` is for one time. A turn has five: frame, surface and airlight, and half as
+    # long for each of four.
+    return 5.0 * measure.seconds if measure.times == "stages" else _BRIEF
 
 
 def _lose(times: list[CellTimes], place: int, error: Exception) -> None:
@@ -277,6 +276,7 @@ def _run(
     anchors(), move()
     started, end = date(), Piece(anchors, 0.0)
     turned: list[Piece[Any]] = [end, Piece(move, 0.0), *pieces.values(), end]
+    # The anchor is first and last in each round: a machine that changes within it shows.
     first, moved, *of_pieces, last = in_turns(turned)
     ends = [
         repetition for of_end in (first, last) for of_round in of_end for repetition in of_round
@@ -284,10 +284,11 @@ def _run(
     run = anchored(
         started, ROUNDS, [timing_of(each) for each in ends], timing_of(list(chain(*ends)))
     )
+    # Results are by round and repetition; a turn of a method is a list of frames.
     spent_moving = [spent for of_round in moved for repetition in of_round for spent in repetition]
     for place, rounds in zip(pieces, of_pieces, strict=True):
         spent = [each for of_round in rounds for repetition in of_round for each in repetition]
-        if times[place].lost is None:
+        if times[place].lost is None:  # a method that failed in a turn has its reason there
             times[place] = _cell_times(times[place], spent, spent_moving, run)
 
 

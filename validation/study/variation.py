@@ -36,10 +36,7 @@ from airlight.validation.scenes.registry import Animation
 from airlight.validation.study.configuration import Configuration, prepared
 from airlight.validation.study.frame_times import Turn, brief_turn, timed_image
 
-_SECONDS = 0.2  # for the times of a method [s]
-_SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
 BEFORE = 8  #: frames at rest before a step
-_JUMP = 12  # of a turn, that a step is
 
 
 @dataclass(frozen=True)
@@ -71,6 +68,8 @@ def method_noise(
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
     read, reference = read_scene(scene), reference_image(scene).airlight
+    # All runs of all methods first. A method that draws no random numbers has one run, and so has
+    # one whose runs turn out to be the same.
     rendered, turns = [], list[Turn]()
     for number, chosen in enumerate(configurations):
         renderer = prepared(read, chosen)
@@ -89,10 +88,12 @@ def method_noise(
             np.mean(images, axis=0),
             np.std(images, axis=0, ddof=min(1, len(images) - 1)),
         )
-        told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
-        rendered.append((images, np.where(told, mean, reference), deviation))
-    # All methods take turns: their times are compared.
-    spent = in_turns([Piece(turn, _SECONDS) for turn in turns])
+        # A mean within two standard errors of the reference is shown as the reference: what is
+        # left of a picture of the difference is bias.
+        biased = np.abs(mean - reference) > 2.0 / math.sqrt(count) * deviation
+        rendered.append((images, np.where(biased, mean, reference), deviation))
+    # All methods take turns, 0.2 s each: their times are compared.
+    spent = in_turns([Piece(turn, 0.2) for turn in turns])
     seconds = [
         float(np.median([turn[0].frame.seconds for turn in chain(*rounds)])) for rounds in spent
     ]
@@ -137,6 +138,7 @@ def method_motion(
     least = BEFORE + 2 if stimulus == "step" else 3
     if frames < least:
         raise InputError(f"frames: got {frames}, expected at least {least} for a {stimulus}")
+    # Lights alone move: their references need no other geometry and no other camera.
     read = read_scene(scene)
     moves = Animation(moves=("light",), about=animation.about)
     places = (
@@ -152,6 +154,7 @@ def method_motion(
     for number, chosen in enumerate(configurations):
         if progress is not None:
             progress(frames * (1 + number), total, chosen.label)
+        # Each run is a whole sequence of frames, with its own history and random numbers.
         renderer = prepared(read, chosen)
         several = []
         for run in range(runs if renderer.method.noisy else 1):
@@ -161,9 +164,10 @@ def method_motion(
                     Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)
                 )
             )
-        found = [each for each in several if each is not None]
-        words = motion_verdict(found[0]).words if found else "the reference is dark"
-        rows.append(MethodMotion(chosen.label, mean_measures(found) if found else None, words))
+        measured = [each for each in several if each is not None]
+        words = motion_verdict(measured[0]).words if measured else "the reference is dark"
+        mean = mean_measures(measured) if measured else None
+        rows.append(MethodMotion(chosen.label, mean, words))
     return rows
 
 
@@ -190,6 +194,8 @@ def light_references(
         raise InputError(
             "the scene has no light that could circle; expected a point, spot or directional light"
         )
+    # One scene is changed in place from frame to frame. The last change brings it back to the
+    # first frame, as the caller gave it.
     references: list[Array] = []
     for number, change in enumerate([*changes, changes[0]]):
         change_scene(scene, change)
@@ -204,14 +210,15 @@ def method_frames(renderer: FrameRenderer, places: Sequence[Scene]) -> list[Arra
     """Return the airlight of a method in each frame, which gets what the frame before
     leaves, (height, width, 3).
     """
-    kept, images = None, []
+    caches, images = None, []
     for place, last in zip(places, (None, *places), strict=False):
         moved = {"camera_moved": False, "geometry_moved": False, "light_moved": place is not last}
-        frame, kept, _ = timed_image(renderer, place, kept, **moved)
+        frame, caches, _ = timed_image(renderer, place, caches, **moved)
         images.append(np.asarray(frame.airlight, dtype=np.float64))
     return images
 
 
 def _step(read: Scene, moves: Animation, frames: int) -> list[Scene]:
-    before, after = islice(animate(read, moves, _JUMP), 2)
+    # The jump is a twelfth of a turn.
+    before, after = islice(animate(read, moves, 12), 2)
     return [before] * BEFORE + [after] * (frames - BEFORE)
