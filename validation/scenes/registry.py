@@ -128,6 +128,7 @@ def _record(name: str, table: Table) -> SceneRecord:
     )
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
+    # Layers and smoke have no single extinction; neither belongs to `FOG_SCENES`.
     varying = bool({"layers", "smoke"} & set(table.get("fog", {})))
     many = any("swarm" in each for each in table["lights"])
     return SceneRecord(
@@ -144,6 +145,7 @@ def _record(name: str, table: Table) -> SceneRecord:
 
 def _build(table: Table) -> dict[str, Any]:
     scene: dict[str, Any] = {"type": "scene"}
+    # The medium comes first: the camera and boundaries refer to it by its id 'fog'.
     if "fog" in table:
         scene["fog"] = _medium(table["fog"])
     scene["sensor"] = camera(**table["camera"], size=(800, 600), in_fog="fog" in table)
@@ -169,6 +171,8 @@ def _lights(entries: Iterable[Table]) -> Iterator[Table]:
             continue
         own = dict(entry)
         swarm = own.pop("swarm")
+        # Seeded: the swarm is the same on every machine, as a file with every light written out
+        # would be.
         rng = np.random.default_rng(swarm["seed"])
         places = rng.uniform(swarm["low"], swarm["high"], (swarm["count"], 3))
         colours = np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * own["colour"]
@@ -183,6 +187,8 @@ def copies(entries: Iterable[Table]) -> Iterator[Table]:
     for entry in entries:
         step = entry.get("step", {})
         for number in range(entry.get("copies", 1)):
+            # With `of` all shapes of the list are copied together, and the table around them says
+            # only how.
             for each in entry.get("of", [entry]):
                 copy = {
                     key: _plus(value, step.get(key), number)
@@ -206,6 +212,8 @@ def _seed(entry: Table, number: int) -> Table:
     """Return place, kind, size, turn and colour of a seed of a sunflower, a
     spiral that is a little flat.
     """
+    # Vogel's spiral: the golden angle of 137.50776 degrees and radii as the square root of the
+    # number.
     distance, angle = 0.419 * math.sqrt(number + 2.3), math.radians(137.50776 * number + 21.7)
     x, y, z = entry["at"]
     return {
@@ -222,11 +230,14 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
     if "parts" in entry:
         mesh = joined([mesh_of(part, kinds) for part in copies(entry["parts"])])
     else:
+        # Keys that place a mesh are used below; all other keys are arguments of the function that
+        # makes it.
         name, given = (
             entry["mesh"],
             {key: value for key, value in entry.items() if key not in _PLACING},
         )
         mesh = mesh_of({**kinds[name], **given}, {}) if name in kinds else MESHES[name](**given)
+    # In this order: waves bend the mesh about its own origin, then come scale, turn and place.
     if "waves" in entry:
         mesh = bent(mesh[0], entry["waves"]), mesh[1]
     x, y, z = entry.get("at", (0.0, 0.0, 0.0))
@@ -262,6 +273,8 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
         density, low, high = _density(shape, json.dumps(table["density"]))
     else:
         return medium
+    # A grid volume of Mitsuba fills the unit cube: `to_world` takes the cube to the corners of the
+    # voxels.
     box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
     grid = {"type": "gridvolume", "grid": mi.VolumeGrid(density[..., None]), "to_world": box}
     return medium | {"type": "heterogeneous", "sigma_t": grid}
