@@ -27,11 +27,6 @@ from airlight.validation.kernels.cases import TABLE
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 
 
-_G = (
-    np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
-)  # few, since the reference takes one g at a time
-
-
 @dataclass(frozen=True)
 class RayInputs(Inputs):
     """The inputs of the integrals of rays."""
@@ -62,7 +57,9 @@ def hard_rays(count: int = 100_000) -> Cases:
     phase = np.asarray(PHASE_NAMES)[
         np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)
     ]
-    g = np.where(phase == "hg", _G[np.minimum((u[:, 9] * len(_G)).astype(int), len(_G) - 1)], 0.0)
+    # Few values of g, since the reference takes one at a time.
+    gs = np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
+    g = np.where(phase == "hg", gs[np.minimum((u[:, 9] * len(gs)).astype(int), len(gs) - 1)], 0.0)
     # A ray gets the first tag that fits.
     tags = np.select(
         [

@@ -39,8 +39,6 @@ from airlight.validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
 
-_ABOVE = 1 + 1e-5  # what float32 may add to the largest density
-
 
 def register_height_fog() -> None:
     """Let Mitsuba's current variant know the volume `heightfog`."""
@@ -70,7 +68,8 @@ def _register(variant: str) -> None:
         def parameters_changed(self, keys=()):
             given = {name: float(value[0]) for name, value in self._numbers.items()}
             # Delta tracking needs a bound that no evaluation in float32 exceeds.
-            self._largest = _ABOVE * _checked_largest(
+            above = 1 + 1e-5  # what float32 may add to the largest density
+            self._largest = above * _checked_largest(
                 given, self._clamped, float(self._ends["floor"][0])
             )
             self._layers = [i for i in "12" if given[f"sigma_{i}"] > 0]

@@ -23,7 +23,6 @@ from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.scenes.meshes import Mesh
 
 NOISE_BOUND = 0.75**0.5  #: of one octave: half the diagonal of a cell, between its corners' planes
-SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [m]
 
 
 def hypertexture(
@@ -176,8 +175,8 @@ def inside(mesh: Mesh, points: Array) -> Bools:
 def distance_into(mesh: Mesh, points: Array) -> Array:
     """Return the distance of points, (n, 3) [m], from a mesh, (n,) [m].
 
-    It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too
-    long at a depth of 40 m.
+    It is the distance of the nearest of points on the mesh, 11 m apart at most: 0.5 m too long at a
+    depth of 40 m.
     """
     from scipy.spatial import cKDTree
 
@@ -185,8 +184,8 @@ def distance_into(mesh: Mesh, points: Array) -> Array:
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     # Triangles with long edges get a finer lattice of points: edges are cut into `count` parts,
-    # each shorter than SAMPLING.
-    parts = np.ceil(longest / SAMPLING).astype(np.int64)
+    # each shorter than 11 m.
+    parts = np.ceil(longest / 11.0).astype(np.int64)
     samples = []
     for count in np.unique(parts):
         i, j = (

@@ -68,8 +68,7 @@ FILES = tuple(
 
 Table = dict[str, Any]
 
-# values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
-_DROPLETS = 20001
+
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
 _PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
 MESHES: dict[str, Callable[..., Mesh]] = {
@@ -256,7 +255,9 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
 
 
 def _medium(table: Table, shape: str = "") -> dict[str, Any]:
-    phase = phase_function(table.get("phase", "isotropic"), _DROPLETS)
+    # 20001 values of a tabulated phase function: glory and fogbow are blurred by less than 0.1
+    # degrees.
+    phase = phase_function(table.get("phase", "isotropic"), 20001)
     if "layers" in table:
         register_height_fog()
         return height_fog(

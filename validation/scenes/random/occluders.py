@@ -37,9 +37,8 @@ from airlight.validation.scenes.meshes import (
 from airlight.validation.scenes.random.design import Draws, Ranges
 from airlight.validation.scenes.random.lights import Light
 
-_TRIES = 24
 _CAMERA = 0.31  # an occluder is as far from the camera at least, in radii of the stage
-_LIGHT = 0.023  # and as far from a light
+
 _SCREENS = ("fence", "pierced", "sheet", "plate")
 
 
@@ -96,7 +95,7 @@ def draw_occluders(
         if number == 1 and draws.pick(ranges["spheres"], "spheres") == "yes":
             kind = "ball"
         # An occluder that finds no free place is left out.
-        for _ in range(_TRIES):
+        for _ in range(24):
             position, radius = _place(stream, ranges, kind, size, lights)
             if _is_clear(position, radius, camera, lights):
                 occluders.append(_occluder(stream, kind, position, radius, files))
@@ -128,7 +127,9 @@ def _is_clear(position: Array, radius: float, camera: Array, lights: Sequence[Li
     if np.linalg.norm(position - camera) < radius + _CAMERA:
         return False
     return all(
-        np.linalg.norm(position - light.position) > radius + light.ball + _LIGHT for light in lights
+        # the least distance from a light, in radii of the stage
+        np.linalg.norm(position - light.position) > radius + light.ball + 0.023
+        for light in lights
     )
 
 

@@ -41,10 +41,6 @@ from airlight.validation.scenes.random.media import Medium, draw_media
 from airlight.validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
 from airlight.validation.scenes.registry import Animation, SceneRecord
 
-_TABLE = 513  # values of a tabulated phase function
-# rays of the camera, and points on each, at which light is looked for
-_ACROSS, _UP, _ALONG = 7, 5, 3
-
 
 @dataclass(frozen=True)
 class RandomScene:
@@ -182,7 +178,8 @@ def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
     free = np.minimum(hit, away + drawn.scale)
     # The middles of equal parts of the free way of each ray, the points at which light is looked
     # for.
-    fraction = (np.arange(_ALONG) + 0.5) / _ALONG
+    along = 3  # points on each ray
+    fraction = (np.arange(along) + 0.5) / along
     points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(
         -1, 3
     )
@@ -198,8 +195,9 @@ def _directions(drawn: RandomScene) -> Array:
     up = np.cross(forward, left)
     tangent = np.tan(0.5 * np.deg2rad(drawn.fov))
     # The centres of the pixels of a small image of 4 to 3.
-    x = tangent * (2 * (np.arange(_ACROSS) + 0.5) / _ACROSS - 1)
-    y = 0.75 * tangent * (2 * (np.arange(_UP) + 0.5) / _UP - 1)
+    columns, rows = 7, 5
+    x = tangent * (2 * (np.arange(columns) + 0.5) / columns - 1)
+    y = 0.75 * tangent * (2 * (np.arange(rows) + 0.5) / rows - 1)
     rays = (forward + x[:, None, None] * left + y[None, :, None] * up).reshape(-1, 3)
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
@@ -261,7 +259,7 @@ def _filling(medium: Medium) -> Any:
     described = fog(
         sigma_t[0] if medium.grey else sigma_t,
         medium.albedo.tolist(),
-        phase_function(medium.phase, _TABLE),
+        phase_function(medium.phase, 513),  # values where it is tabulated
     )
     return mi.load_dict(described | {"id": f"{medium.name}-medium"})
 
