@@ -175,7 +175,7 @@ def reference_estimate(
 
     Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the
     image of each. A value that no sample of the batches reached has no standard error of theirs,
-    and must not be judged by that of the quadrature alone.
+    and must not be judged by the quadrature's standard error alone.
     """
     error = reference_error(image, layer)
     # A zero error of the batches says that no sample reached the value, not that it is exact.
@@ -222,7 +222,7 @@ def batch_estimate(batches: Batches, layer: str, mask: Bools) -> NoisyImage:
         layer_mean(batches, layer, mask),
         batches.standard_error[number].reshape(*mask.shape, 3),
         len(batches.seeds),
-        # The batch means are those of whole images.
+        # Batch means are means over whole images.
         batches.totals[:, number] if mask.all() else None,
     )
 

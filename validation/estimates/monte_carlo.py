@@ -79,7 +79,7 @@ class BatchInputs(Inputs):
     counts: NDArray[np.integer] | None
 
 
-# The modules are those of the estimators alone: what is here hands these inputs on as they are.
+# Only the modules of the estimators count: this module hands the inputs on as they are.
 class SingleScatterInputs(BatchInputs):
     """The inputs of batches by `single-scatter`."""
 

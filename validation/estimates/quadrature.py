@@ -11,7 +11,7 @@ the ray (DESIGN section 2),
     h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
 
 Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all
-E > 0 and the exponential that of t alone:
+E > 0 and the exponential depends on t alone:
 
     h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
 

@@ -51,7 +51,7 @@ def hard_rays(count: int = 100_000) -> Cases:
     foot, height, x0 = _rounded(foot), _rounded(height), _rounded(start)
     x1 = np.where(u[:, 6] < 0.1, np.inf, _rounded(x0 + length))
     thickness = _log(u[:, 7], 1e-6, 60.0)
-    # The optical depth is that of the way from the camera to the beginning of the segment and on to
+    # The optical depth belongs to the way from the camera to the beginning of the segment and on to
     # the light.
     sigma_t = _rounded(thickness / (x0 + np.hypot(x0 - foot, height)))
     phase = np.asarray(PHASE_NAMES)[

@@ -58,7 +58,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         size, compared = _scaled(full, scale), _scaled((320, 240), scale)
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
-        # From here on the scene has the smaller size, of which the reference is computed.
+        # From here on the scene has the smaller size, for the reference.
         resize(loaded, compared)
         reference = reference_image(loaded)
         whole = reference.airlight + reference.surface

@@ -119,7 +119,7 @@ def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     cases, found = wide_rays(_WIDE_RAYS), {}
     for name, kernel in (("printed", taylor_printed), ("derived", taylor)):
-        # In double precision: the error is that of the polynomial.
+        # In double precision: rounding adds nothing to the polynomial's error.
         error = relative_error(
             evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double"
         )

@@ -270,7 +270,7 @@ def _biased() -> list[float]:
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
     scene = read_scene(loaded)
     light = scene.lights[0]
-    # The depths are those of a frame in single precision; the sums are taken in double precision.
+    # A frame gives depths in single precision; the sums are taken in double precision.
     depth = render_frame(_renderer(scene, _MESH, _BIAS_MAP)).distance.astype(np.float64).ravel()
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
     sum_of = partial(crossings_sum, loaded, depth)

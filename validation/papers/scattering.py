@@ -147,7 +147,7 @@ def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) 
     """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
     above, radius = np.array([0.37, -0.31, 3.07]), 0.97  # direction to the lamp; of the sphere [m]
     lamp = above / np.linalg.norm(above) * (radius / size)
-    # the optical depth is that of the diameter
+    # `optical_depth` belongs to the diameter
     medium = fog(0.5 * optical_depth / radius, (0.83, 0.83, 0.83))
     return {
         "type": "scene",

@@ -114,7 +114,7 @@ def _common_sphere(first: Bounds, second: Bounds) -> float:
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
-    """Refuse meshes of which a part is inside out, or lies within another."""
+    """Refuse meshes with a part that is inside out, or lies within another part or mesh."""
     # Every connected part of every mesh is tested against all other parts with one of its vertices:
     # no edges cross (checked before), so one point decides for the whole part.
     parts = [(number, *part) for number, mesh in enumerate(meshes) for part in _parts(mesh)]
@@ -175,9 +175,9 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
 
 
 def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
-    """Refuse meshes of which an edge passes through a triangle that it does not touch.
+    """Refuse meshes with an edge that passes through a triangle that it does not touch.
 
-    `meshes`: by the numbers of their shapes, those of the Mitsuba scene `boundary`. Mitsuba finds
+    `meshes`: by the numbers of their shapes in the Mitsuba scene `boundary`. Mitsuba finds
     the triangles, in float32; the crossing is computed again in float64.
     """
     for mesh in meshes.values():

@@ -50,7 +50,7 @@ class Changeable:
     least: float
     most: float
     unit: str = ""
-    direction: bool = False  #: of which only the direction matters: not all of it may be 0
+    direction: bool = False  #: only its direction matters: not all of it may be 0
 
 
 def changeable(scene) -> dict[str, Changeable]:
@@ -345,7 +345,7 @@ def _media(scene) -> list[Any]:
     shapes bound, each once.
     """
     media: list[Any] = []
-    # The order is that of names: `medium` is the one around the camera. Grids are left out: they
+    # The order makes the names: `medium` is the one around the camera. Grids are left out: they
     # have no single extinction to change.
     around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
     for medium in around + [shape.interior_medium() for shape in scene.shapes()]:
@@ -458,7 +458,7 @@ def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
     config.merge_meshes = False
     state = mi.parser.parse_dict(config, description)
     give_lobes(state, lobes)
-    # The digest is that of the description with its new phase functions, taken before Mitsuba's
+    # The digest describes the scene with its new phase functions, and is taken before Mitsuba's
     # transforms rewrite it.
     digest = description_digest(state)
     mi.parser.transform_all(config, state)

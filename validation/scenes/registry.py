@@ -112,7 +112,7 @@ class SceneRecord:
         False
     )
     digest: str = ""  #: of its description
-    many: bool = False  #: whether it has many lights, of which methods are to choose
+    many: bool = False  #: whether it has many lights, among which methods choose
 
 
 def read_scenes(path: Path) -> dict[str, SceneRecord]:
@@ -163,7 +163,7 @@ def _build(table: Table) -> dict[str, Any]:
 
 
 def _lights(entries: Iterable[Table]) -> Iterator[Table]:
-    """Yield lights one by one, those of a swarm by their numbers."""
+    """Yield lights one by one, the lights of a swarm with numbers in their names."""
     for entry in entries:
         if "swarm" not in entry:
             yield entry
@@ -288,7 +288,7 @@ def _density(mesh: str, given: str) -> Any:
     return hypertexture(MESHES[mesh](), **json.loads(given))
 
 
-#: The built-in scenes by name, and those of homogeneous fog with few lights.
+#: The built-in scenes by name; `FOG_SCENES` are the scenes of homogeneous fog with few lights.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
 FOG_SCENES = {
     name: record

@@ -11,7 +11,7 @@
 Each number of `error` and `standard_error` is the error of the same number of the light.
 
 The computation runs twice, the second time with three quarters of the streams and two nodes fewer
-in each panel of depth. The change is the error that is printed: it is that of the coarser run, so
+in each panel of depth. The change is the error that is printed. It belongs to the coarser run, so
 the printed numbers are better.
 
 Definitions: order n is light that was scattered n times. Lengths are in mean free paths.

@@ -148,7 +148,7 @@ class SlabOrders:
         return np.stack([up, down, diffuse.sum(-1) + beam])
 
     def rest(self, fields: Array) -> Array:
-        """Return the moments of the sum of all orders after that of `fields`."""
+        """Return the moments of the sum of all orders after the order of `fields`."""
         mean, wave = _AllOrders(self, 0), _AllOrders(self, 1)  # by azimuthal mode
         # As in `_carried`, each moment from the one before, but for all orders after the last one
         # together.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Mistakes in a scene file, by the names of its parts, and what to do about
-those that Mitsuba finds.
+mistakes that Mitsuba finds.
 """
 
 import re

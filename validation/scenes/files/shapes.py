@@ -71,7 +71,7 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
         raise InputError(
             f"shape '{instance.id()}' is an instance of no shape group; expected a reference to one"
         )
-    # Mitsuba places a part by its own transform first, then by that of the instance.
+    # Mitsuba places a part by its own transform first, then by the instance's.
     place = instance.get("to_world", mi.ScalarAffineTransform4d())
     parts = [at for _, at in references(properties(state, group)) if kind(state, at) == "Shape"]
     for part in parts:

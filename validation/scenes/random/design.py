@@ -192,7 +192,7 @@ def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, floa
 
 
 def is_random(name: str) -> bool:
-    """Return whether a name is that of a random scene."""
+    """Return whether a name names a random scene."""
     return name.startswith(PREFIX)
 
 
