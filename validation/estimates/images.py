@@ -7,8 +7,8 @@ relative to the radiance, either of the image, *pooled*, or of its *worst* pixel
     pooled = sqrt(sum_p se_p^2) / sum_p L_p             worst = max_p se_p / max(L_p, 0.001 mean(L))
 
 for each channel of each layer, the largest of which counts; pixels are independent of each other.
-The floor of a thousandth of the mean is the same as in `airlight compare`. Rays that pass a light within
-`validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error:
+The floor of a thousandth of the mean is the same as in `airlight compare`. Rays that pass a light
+within `validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error:
 there no number of samples gives a standard error to trust (DESIGN section 6.6). Where that leaves
 out all light of a layer, the error of the image is not known.
 

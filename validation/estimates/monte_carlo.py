@@ -195,7 +195,7 @@ def monte_carlo_batches(
                 enough is not None and 2 <= tally["done"] < batches and enough(_all(done))
             ):
                 break
-    # What is finished stays in the cache: the message says how to go on.
+    # Finished work stays in the cache: the message says how to go on.
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
@@ -289,7 +289,7 @@ def _block(
     if block is not None:
         tally["done"] += BLOCK
         return block, True
-    # What the batches took, cached or traced, is what the block took.
+    # A block took the time of its batches, cached or traced.
     with counted() as ledger:
         for seed in seeds:
             batch = batch_of(seed)

@@ -110,7 +110,7 @@ def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) 
         # Marching is timed on all rays up to 64 steps, on fewer in proportion where it takes more.
         count //= max(1, size // 64)
     try:
-        # What a kernel refuses (a phase function, a size) is noted in its cost, and the study goes
+        # A refusal of a kernel (a phase function, a size) is noted in its cost, and the study goes
         # on.
         J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
         work = _frozen(kernel, rays, count)

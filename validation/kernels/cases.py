@@ -108,7 +108,7 @@ def relative_error(
     where either is not finite.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        # What underflow explains is no error; below the smallest normal number errors are absolute.
+        # Deviations that underflow explains are no errors; below the smallest normal number errors are absolute.
         error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(
             np.abs(expected), TINY[precision]
         )

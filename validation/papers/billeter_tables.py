@@ -2,8 +2,8 @@
 """Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010 measured
 again, after the light moved.
 
-Neither scene is available: `omni-box` stands for the scene of Fig. 6, `colonnade` for the Sponza atrium
-and `tangle` for the mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all
+Neither scene is available: `omni-box` stands for the scene of Fig. 6, `colonnade` for the Sponza
+atrium and `tangle` for the mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all
 have that of Fig. 7. The published hall has one map; ours has a lamp that shines in all directions,
 so its map has six faces in Fig. 7; in Table 1 a spot takes its place. The light volume is the
 paper's mesh; its height field walked without triangles stands beside it as `walk`. The paper's

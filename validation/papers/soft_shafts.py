@@ -12,8 +12,8 @@ from captions. It gives:
 Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the
 *penumbra*: where the visible surface gets more than 0.02 and less than 0.98 of the light that it would get without
 occluders. Both lights of this fraction are sums over the same sixteen points of the area light, so that a surface that
-sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors comes from a jackknife over
-vertical strips of the image.
+sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors comes from a jackknife
+over vertical strips of the image.
 
 *At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the
 steps) they take as long as R4. *Edges* is the median, over the hundredth of the penumbra where the

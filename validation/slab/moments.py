@@ -100,7 +100,7 @@ class SlabOrders:
         matrix[:-1, -1] = (
             albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
         )
-        # What is scattered into the peak goes straight on, in every stream.
+        # Light scattered into the peak goes straight on, in every stream.
         return matrix + albedo * self.peak * np.eye(mu.size + 1)
 
     def beam(self) -> Array:
@@ -194,7 +194,7 @@ def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[Arr
     `slab`: the slab; `sets`: first and last order of each set, the last one
     `math.inf` for a set without end.
     """
-    # So many orders are computed one by one as the sets need ends; all later orders are one sum,
+    # As many orders are computed one by one as the sets need ends; all later orders are one sum,
     # the last entry.
     finite = [int(last) for _, last in sets if math.isfinite(last)]
     finite += [first - 1 for first, last in sets if not math.isfinite(last)]

@@ -144,7 +144,7 @@ def _leave_out_rendering(state: Any) -> None:
                 del node.props[key]
             elif kind(state, at) == "Film":
                 film = properties(state, at)
-                # Of a film only its size counts; its type may be one that Mitsuba 3 no longer has.
+                # Only the size of a film counts; its type may be one that Mitsuba 3 no longer has.
                 kept = mi.Properties("hdrfilm")
                 for name in _FILM:
                     if name in film:

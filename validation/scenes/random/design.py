@@ -153,7 +153,7 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     none is above 0 are refused.
     """
     usual, limits = _defaults()
-    # What has limits is a range; every other name is a table of weights.
+    # A name with limits is a range; every other name is a table of weights.
     readers: dict[str, Reader] = {"meshes": _folder}
     readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
     readers |= {
