@@ -43,9 +43,8 @@ from airlight.validation.statistics.comparison import NoisyImage, compare_statis
 from airlight.validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
-_LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %
+
 _SAMPLES = 64  # a pixel in each batch
-_PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
 
 
 def agreement(
@@ -73,25 +72,31 @@ def agreement(
     margins are wider; single-scatter is compared with as many as the error of a pixel needs. The
     result is by layer, without the surface where nothing lit is visible.
     """
+    # Mitsuba's shadow rays end a relative epsilon before the light: volpath is compared with the
+    # quadrature of exactly this integral.
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     plain = reference_image(scene)
     shortened = (
         reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
     )
     masks = layer_masks(read_reference(scene), plain)
+    # A layer without any light has no relative bias.
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
     def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]
+        # The quadrature's own standard errors count too, where the batches have one.
         test = batch_estimate(traced, layer, mask)
         return compare_statistics(
             reference_estimate(shortened, layer, test, mask), test, mask=mask, margin=margin
         )
 
+    # A pilot with seeds that no run reaches says where volpath's samples spread most; the samples
+    # of all batches are placed by it.
     counts = None
     if estimator == "volpath" and layers:
         pilot = monte_carlo_batches(
-            scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2
+            scene, estimator, batches=8, samples=samples, first_seed=LARGEST_SEED // 2
         )
         counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
     # From here on: where a pilot alone takes long, no time was left for the batches that count.
@@ -99,7 +104,8 @@ def agreement(
     go_on = None if seconds is None else (lambda done: took().seconds <= seconds)
 
     def enough(so_far: Batches) -> bool:
-        if layers and len(so_far.seeds) < _LEAST_BATCHES:
+        # Before this many batches the standard error of a standard error exceeds 13 %.
+        if layers and len(so_far.seeds) < 32:
             return False
         return all(width_to_reach(compared(so_far, layer), margin) < 1 for layer in layers)
 
@@ -113,6 +119,7 @@ def agreement(
         go_on=go_on,
         elsewhere=None if spread is None else spread(estimator, samples, counts),
     ).batches
+    # Judged on all batches that were traced, whichever rule ended the run.
     results = {layer: compared(traced, layer) for layer in layers}
     return {
         layer: Agreement(
@@ -168,12 +175,15 @@ def reference_estimate(
 
     Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the
     image of each. A value that no sample of the batches reached has no standard error of theirs,
-    and must not be judged by that of the quadrature alone.
+    and must not be judged by the quadrature's standard error alone.
     """
     error = reference_error(image, layer)
+    # A zero error of the batches says that no sample reached the value, not that it is exact.
     reached = np.asarray(test.standard_error) > 0
     if error is None or not error.any():
         return NoisyImage(reference_layer(image, layer))
+    # Each replicate's mean over the image: the mean of the values plus what this replicate adds,
+    # with the mean of these removed.
     values, means = reference_layer(image, layer), None
     if image.replicate_means is not None and mask.all():
         added = image.replicate_means[LAYERS.index(layer)]
@@ -189,6 +199,8 @@ def layer_masks(reference: ReferenceScene, image: ReferenceImage) -> dict[str, B
     """Return the pixels to compare, by layer, (height, width): of the airlight those whose
     ray keeps off the lights.
     """
+    # At two pixel widths from a light: closer rays have heavy tails in the samples. Infinite values
+    # of the quadrature are left out, too.
     near = image.light_angle <= MASK_PIXELS * pixel_angle(reference)
     return {
         "airlight": ~near & np.isfinite(image.airlight).all(axis=2),
@@ -210,7 +222,7 @@ def batch_estimate(batches: Batches, layer: str, mask: Bools) -> NoisyImage:
         layer_mean(batches, layer, mask),
         batches.standard_error[number].reshape(*mask.shape, 3),
         len(batches.seeds),
-        # The batch means are those of whole images.
+        # Batch means are means over whole images.
         batches.totals[:, number] if mask.all() else None,
     )
 
@@ -234,6 +246,7 @@ def width_to_reach(statistics: Statistics, margin: float) -> float:
 
 def pixel_angle(reference: ReferenceScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
+    # The pixel in the middle and its neighbour; an image one pixel wide has the angle 0.
     middle = (reference.height // 2) * reference.width + reference.width // 2
     beside = middle - 1 if reference.width > 1 else middle
     return float(

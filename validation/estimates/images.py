@@ -7,8 +7,8 @@ relative to the radiance, either of the image, *pooled*, or of its *worst* pixel
     pooled = sqrt(sum_p se_p^2) / sum_p L_p             worst = max_p se_p / max(L_p, 0.001 mean(L))
 
 for each channel of each layer, the largest of which counts; pixels are independent of each other.
-The floor of a thousandth of the mean is that of `airlight compare`. Rays that pass a light within
-`validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error:
+The floor of a thousandth of the mean is the same as in `airlight compare`. Rays that pass a light
+within `validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error:
 there no number of samples gives a standard error to trust (DESIGN section 6.6). Where that leaves
 out all light of a layer, the error of the image is not known.
 
@@ -42,9 +42,6 @@ from airlight.validation.scenes.loading import LoadedScene
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
 USUAL_BATCH = 64  #: samples a pixel
-_MOST_BATCHES = 1 << 16  # of a run without a given number of samples; there are more seeds
-_LARGEST_TRACE = 1 << 22  # samples of one batch of such a run: so that it ends near its target
-_FLOOR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -59,6 +56,7 @@ class Budget:
     seconds: float | None = None  #: of the whole run; batches from the cache cost next to nothing
 
     def __post_init__(self) -> None:
+        # Exactly one of the three, a positive finite number.
         given = {name: value for name, value in vars(self).items() if value is not None}
         if len(given) != 1:
             what = f"{' and '.join(given)} exclude each other" if given else "a budget of nothing"
@@ -84,6 +82,7 @@ def layered_reference(
         "airlight_bound": reference.airlight_bound,
         "surface": reference.surface,
     }
+    # Only area lights have standard errors and light that the camera sees.
     extent = {
         "airlight_se": reference.airlight_se,
         "surface_se": reference.surface_se,
@@ -102,7 +101,7 @@ def layered_reference(
 
 
 def _digest_of(loaded: LoadedScene) -> dict[str, str]:
-    """Return the attribute that says of which scene an image is, none where nobody can tell."""
+    """Return the attribute that identifies the scene of an image, none where nobody can tell."""
     digest = scene_digest(loaded.scene)
     return {} if digest is None else {"airlight:scene_digest": digest}
 
@@ -148,16 +147,20 @@ def monte_carlo_reference(
     traces batches in other processes.
     """
     seen = None
+    # Scenes with lights in fog: the airlight of pixels beside a light is left out of the error.
     if orders is None:
         reference = read_reference(loaded.scene)
         distance = surface_hits(reference).distance
         near = near_light(reference, distance)
         shape = reference.height, reference.width
     else:
+        # Clouds have suns and a sky, which no ray passes near by: no pixel is left out.
         clouds = read_clouds(loaded.scene)
         seen = seen_clouds(clouds)
         distance, near = seen.distance, np.zeros(len(seen.distance), dtype=bool)
         shape = clouds.height, clouds.width
+    # A run with a target or a time has no number of batches of its own: at most as many as there
+    # are seeds left.
     batches, samples = batch_plan(budget, len(near))
     watch = _Watch(budget, near, progress)
     run = monte_carlo_batches(
@@ -173,6 +176,7 @@ def monte_carlo_reference(
         elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
+    # None where no target was set; an unknown error has not reached it.
     reached = (
         None
         if budget.error is None
@@ -180,6 +184,7 @@ def monte_carlo_reference(
     )
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
     if seen is not None:
+        # Behind a cloud stands the sky, attenuated along the ray; surfaces have no sky behind them.
         transmittance = seen.transmittance.reshape(*shape, 3)
         behind = np.isinf(distance).reshape(*shape, 1) * transmittance * clouds.sky
         image = replace(
@@ -195,6 +200,7 @@ def cloud_orders(words: str) -> tuple[str, ...]:
     from airlight.validation.slab.request import order_range, parse_orders
 
     names = tuple(name for name in parse_orders(words) if name != "all")
+    # Sorted by their first order, only neighbours can overlap.
     ranges = sorted(order_range(name) for name in names)
     for (_, last), (first, _) in pairwise(ranges):
         if first <= last:
@@ -225,6 +231,8 @@ class _Watch:
         done = len(batches.seeds)
         if error is None:
             return done >= LEAST_BATCHES
+        # The error falls with the square root of the number of batches: done (error/target)^2 in
+        # all. 1e6 keeps the square finite.
         self._expected = max(
             LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2)
         )
@@ -234,6 +242,7 @@ class _Watch:
     def go_on(self, done: int) -> bool:
         """Say whether another batch will end in time: it may take as long as the one before."""
         assert self._budget.seconds is not None
+        # A batch may take as long as the last one: no batch begins that would end after the time.
         return self._took().seconds + self._step <= self._budget.seconds
 
     def tell(self, done: int, total: int, estimator: str) -> None:
@@ -241,6 +250,8 @@ class _Watch:
         self._step, self._last = now - self._last, now
         if self._progress is None:
             return
+        # The fraction that is done: of the time, of the batches, or of the batches that are
+        # expected.
         if self._budget.seconds is not None:
             fraction = now / self._budget.seconds
         elif self._budget.samples is not None:
@@ -279,9 +290,13 @@ def batch_plan(budget: Budget, pixels: int) -> tuple[int, int]:
     other lengths go on from the same batches.
     """
     if budget.samples is not None:
+        # At least 32 batches where the samples allow it, each a power of two up to 64 samples; the
+        # number of batches is rounded up.
         samples = _power_of_two(min(USUAL_BATCH, budget.samples // LEAST_BATCHES))
         return max(2, -(-budget.samples // samples)), samples
-    return _MOST_BATCHES, _power_of_two(min(USUAL_BATCH, _LARGEST_TRACE // pixels))
+    # A run without a given number of samples has at most 2^16 batches; there are more seeds. One
+    # batch of it has at most 2^22 samples, so that the run ends near its target.
+    return 1 << 16, _power_of_two(min(USUAL_BATCH, (1 << 22) // pixels))
 
 
 def _power_of_two(number: int) -> int:
@@ -302,7 +317,9 @@ def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
         mean, error = batches.mean[number], batches.standard_error[number]
         if not (np.isfinite(mean).all() and np.isfinite(error).all()):
             return RelativeErrors(None, None, f"the {layer} is not finite in all pixels")
+        # Only airlight has heavy tails beside a light; surfaces count everywhere.
         keep = ~near if layer == "airlight" else np.ones_like(near)
+        # A channel without light has no relative error.
         lit = mean.any(axis=0)
         mean, error = mean[keep][:, lit], error[keep][:, lit]
         total = mean.sum(axis=0)
@@ -311,8 +328,10 @@ def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
                 None, None, f"all pixels with {layer} lie beside a light, and are left out"
             )
         if lit.any():
+            # Pixels are independent: variances add up in the pooled error. The floor of the worst
+            # pixel is a thousandth of the mean.
             pooled.append(float((np.sqrt((error**2).sum(axis=0)) / total).max()))
-            worst.append(float((error / np.maximum(mean, _FLOOR * total / len(mean))).max()))
+            worst.append(float((error / np.maximum(mean, 1e-3 * total / len(mean))).max()))
     if not pooled:
         return RelativeErrors(None, None, "no sample brought light")
     return RelativeErrors(max(pooled), max(worst))
@@ -329,5 +348,7 @@ def near_light(reference: ReferenceScene, distance: Array) -> Bools:
     for light in reference.lights:
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
         foot, height = foot_and_height(origin, reference.direction, light.position)
+        # The light is in front of the camera, before the visible surface, and within the angle of
+        # two pixels.
         near |= (foot > 0) & (foot < distance) & (np.arctan2(height, foot) <= widest)
     return near

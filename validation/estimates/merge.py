@@ -45,6 +45,7 @@ class _Part:
         mean, error = (
             np.asarray(self.image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se")
         )
+        # s^2 = squares/(K (K - 1)), solved for the sum of squared deviations.
         return count, mean, error**2 * (count * (count - 1))
 
 
@@ -57,10 +58,13 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     """
     if len(files) < 2:
         raise InputError(f"got {len(files)} file to merge; expected at least two")
+    # In the order of their seeds: the result does not depend on the order of the files.
     parts = sorted((_read(name, image) for name, image in files), key=lambda part: part.seeds)
+    # Batches are added up file by file: the spread within each, and that between their means.
     for part in parts[1:]:
         _check_same(parts[0], part)
     seeds = _all_seeds(parts)
+    # Files of clouds may have layers for sets of orders: all must have the same.
     held = [frozenset(part.image.layers) for part in parts]
     if any(names != held[0] for names in held):
         odd = sorted(held[0].union(*held) - held[0].intersection(*held))
@@ -92,6 +96,7 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
 def _read(name: str, image: Image) -> _Part:
     """Check that a file is a reference with batches."""
     header = image.attributes
+    # A file of a quadrature, or of another program, lacks the header of batches.
     missing = [
         key
         for key in ("estimator", "scene_digest", "batch_spp", "batches", "seeds")
@@ -113,6 +118,7 @@ def _read(name: str, image: Image) -> _Part:
         seeds = parse_seed_ranges(_of(header, "seeds"))
     except ValueError as error:
         raise InputError(f"{name}: its header names no seeds: {error}; compute it again") from error
+    # A standard error needs two batches, and a header must agree with itself.
     if str(len(seeds)) != _of(header, "batches") or len(seeds) < 2:
         raise InputError(
             f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; "

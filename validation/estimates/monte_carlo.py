@@ -79,7 +79,7 @@ class BatchInputs(Inputs):
     counts: NDArray[np.integer] | None
 
 
-# The modules are those of the estimators alone: what is here hands these inputs on as they are.
+# Only the modules of the estimators count: this module hands the inputs on as they are.
 class SingleScatterInputs(BatchInputs):
     """The inputs of batches by `single-scatter`."""
 
@@ -147,6 +147,7 @@ def monte_carlo_batches(
             f"seed: got {first_seed} for {batches} batches, which count up; expected 0 to "
             f"{LARGEST_SEED - batches}"
         )
+    # Batches lie in the cache under the key of all inputs; the seed is the name within it.
     folder = _INPUTS[estimator](scene_content(scene), samples, max_depth, orders, counts).key
     layers, trace = batch_tracer(
         scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders
@@ -156,6 +157,7 @@ def monte_carlo_batches(
     def kept_or_traced(seed: int) -> Batches | None:
         batch = _load(folder, range(seed, seed + 1), samples, layers, tally)
         if batch is None:
+            # The first two batches are always traced: without them there is no standard error.
             if go_on is not None and tally["done"] >= 2 and not go_on(tally["done"]):
                 return None
             spent = stopwatch()
@@ -169,6 +171,8 @@ def monte_carlo_batches(
     try:
         done, asked = None, first_seed
         for seeds in _blocks(first_seed, batches):
+            # Other processes are asked for the missing batches of several blocks at once. They
+            # store what they bring; the loop below then reads it like any batch of the cache.
             if elsewhere is not None and seeds[-1] >= asked:
                 bring, at_once = elsewhere
                 asked = seeds[0] + max(at_once, len(seeds))
@@ -180,6 +184,8 @@ def monte_carlo_batches(
                     if progress is not None:
                         progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
                 add_spent(Spent() - waited())  # what they spent counts, when their batches are read
+            # Blocks are added up in the order of their seeds, so that the sum does not depend on
+            # the cache.
             block, whole = _block(
                 folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced
             )
@@ -189,6 +195,7 @@ def monte_carlo_batches(
                 enough is not None and 2 <= tally["done"] < batches and enough(_all(done))
             ):
                 break
+    # Finished work stays in the cache: the message says how to go on.
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
@@ -213,6 +220,7 @@ def batch_tracer(
     see `monte_carlo_batches`.
     """
     if orders is None:
+        # Scenes with infinite radiance are refused: no number of samples gives their mean.
         reference = read_reference(scene)
         check_camera(reference)
         check_rays(reference, surface_hits(reference).distance)
@@ -225,6 +233,7 @@ def batch_tracer(
     else:
         from airlight.validation.slab.request import order_range
 
+        # `volpath` has no layer `surface_straight`, the last one.
         clouds, sets, layers = (
             read_clouds(scene),
             [(name, order_range(name)) for name in orders],
@@ -274,11 +283,13 @@ def _block(
     batch_of: Callable[[int], Batches | None],
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
+    # Only a whole block is kept as one file; batches at both ends of a run stay single.
     full = len(seeds) == BLOCK
     block = _load(folder, seeds, samples, layers, tally) if full else None
     if block is not None:
         tally["done"] += BLOCK
         return block, True
+    # A block took the time of its batches, cached or traced.
     with counted() as ledger:
         for seed in seeds:
             batch = batch_of(seed)
@@ -288,6 +299,7 @@ def _block(
         spent = ledger.spent()
     if full and block is not None:
         _store(folder, block, spent)
+        # The block holds all of them now.
         for seed in seeds:
             drop(_name(folder, range(seed, seed + 1)))
     return block, True
@@ -318,6 +330,7 @@ def _load(
         return None
     stored = kept.value
     tally["cached"] += len(seeds)
+    # One batch has no spread.
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
     return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"], layers)
 

@@ -34,6 +34,7 @@ def multiple_scattering_fraction(
     A light close to a camera ray makes heavy tails, and the interval of few batches too narrow.
     """
     how: dict[str, Any] = {"batches": batches, "samples": samples}
+    # The same seeds for both depths: the noise of paths of one scattering is in both and cancels.
     single, whole = (
         monte_carlo_batches(scene, "volpath", max_depth=depth, **how).batches.totals.mean(axis=2)
         for depth in (2, max_depth)
@@ -52,8 +53,10 @@ def left_out(part: Array, whole: Array) -> Fraction:
     (batches,); 0 without light.
     """
     count = len(whole)
+    # Written so that NaN counts as no light.
     if not whole.mean() > 0:
         return Fraction(0.0, (0.0, 0.0))
+    # R and s_R of the module, over the batches b.
     ratio = float(part.mean() / whole.mean())
     error = float((part - ratio * whole).std(ddof=1) / np.sqrt(count) / whole.mean())
     half = student_quantile(0.975, count - 1) * error

@@ -11,7 +11,7 @@ the ray (DESIGN section 2),
     h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
 
 Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all
-E > 0 and the exponential that of t alone:
+E > 0 and the exponential depends on t alone:
 
     h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
 
@@ -48,8 +48,6 @@ from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
 from airlight.validation.arrays import Array, Bools, Counted
 from airlight.validation.statistics.estimate import UNKNOWN, Estimate, Kind
-
-_ROUNDING = 2.0**-24
 
 
 @dataclass(frozen=True)
@@ -101,6 +99,8 @@ def _computed(scene, inputs: ReferenceInputs, progress: Counted | None) -> Refer
     reference, points = read_reference(scene), inputs.points
     # Only area lights take so long that a run is worth going on with.
     keep = _parts(inputs.key) if reference.area and inputs.pixel == "centre" else None
+    # A given number of points is taken as it is: first and most are the same, and no error is asked
+    # for.
     settings = {
         "checks": inputs.checks,
         "shadow_scale": inputs.shadow_scale,
@@ -132,6 +132,7 @@ def _checked_image(
 ) -> ReferenceImage:
     """Return the reference of an image whose every value is finite."""
     check_camera(reference)
+    # The mean over a pixel is finite even where its centre ray meets a light.
     if settings.get("pixel", "centre") == "centre":
         check_rays(reference, surface_hits(reference).distance)
     image = quadrature_image(reference, **settings, keep=keep, progress=progress)
@@ -146,6 +147,7 @@ def _parts(key: str | None) -> Keep:
 
     def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
         part = None if key is None else f"{key}/{name}"
+        # Without a key nothing can be kept: the work is done each time.
         found, spent = load(part), stopwatch()
         return (found or store(part, work(), spent())).value
 
@@ -190,6 +192,8 @@ def known_to(reference: ReferenceImage, layer: str) -> Estimate:
     positions are sampled: a standard error then. Surfaces are Mitsuba's in single precision:
     nothing says how far they are off where they are not sampled.
     """
+    # The mean error of the pixels: standard errors where something is sampled, and the bound of the
+    # airlight.
     values, sampled = reference_layer(reference, layer), reference_error(reference, layer)
     kind: Kind = reference.bound_kind if sampled is None else "statistical"
     errors = np.zeros_like(values) if sampled is None else sampled
@@ -198,6 +202,8 @@ def known_to(reference: ReferenceImage, layer: str) -> Estimate:
     finite = np.isfinite(values) & np.isfinite(errors)
     if not finite.any():
         return UNKNOWN
+    # Surfaces are Mitsuba's, in single precision, and say nothing about their error unless they are
+    # sampled.
     unknown = layer != "airlight" and sampled is None
     return Estimate(
         float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind
@@ -239,6 +245,8 @@ def check_rays(reference: ReferenceScene, distance: Array) -> None:
     for number, light in enumerate(reference.lights, 1):
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
         foot, height = foot_and_height(origin, reference.direction, light.position)
+        # A light counts as on the ray where its distance from it is not known to be more than 0; it
+        # must be in front of the camera, before the surface, and shine along the ray.
         known = _uncertainty(reference, light)
         meets = (
             (height <= known)
@@ -264,6 +272,7 @@ def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
         values: Any = getattr(image, what)
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
+            # The first pixel in reading order.
             row, column = np.argwhere(wrong)[0]
             raise InputError(
                 f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not "
@@ -280,11 +289,13 @@ def _name(number: int, light: ReferenceLight) -> str:
 
 def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
     """Return how well the distance from the camera to a light is known [m]."""
-    return _ROUNDING * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
+    # Positions are float32 numbers, known to 2^-24 of the largest coordinate.
+    return 2.0**-24 * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
 
 
 def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
     """Return whether there is a medium where a light is: beside it the airlight is finite."""
+    # A light within a bounded medium is in that medium, else in the one around all.
     inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else reference.medium
     return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))

@@ -50,8 +50,6 @@ SIZES: dict[str, tuple[int, ...]] = {
     "size": (32, 64, 128, 256, 512, 1024),
 }
 
-_MOST_STEPS = 64  # of marching, timed on all rays; on fewer in proportion where there are more
-
 
 def bench_kernels(
     names: Sequence[str] | None = None,
@@ -65,10 +63,13 @@ def bench_kernels(
     The first of the phase functions, given with their g, is measured with all sizes, the
     others with the default sizes.
     """
+    # Wrong names are refused here, before any time is spent.
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)
     costs: list[KernelCost] = []
     for number, (phase, g) in enumerate(phases):
+        # Errors need J, which takes long to compute: fewer rays have it. Times need many rays, and
+        # no J.
         reference, rays = (
             wide_rays(ERROR_RAYS, phase, g),
             wide_rays(RAYS, phase, g, reference=False),
@@ -106,8 +107,11 @@ def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) 
         and family in KERNELS
         and next(iter(KERNELS[family].parameters), None) == "steps"
     ):
-        count //= max(1, size // _MOST_STEPS)
+        # Marching is timed on all rays up to 64 steps, on fewer in proportion where it takes more.
+        count //= max(1, size // 64)
     try:
+        # A refusal of a kernel (a phase function, a size) is noted in its cost, and the study goes
+        # on.
         J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
         work = _frozen(kernel, rays, count)
     except InputError as reason:
@@ -131,6 +135,7 @@ def timed_in_turns(tried: Sequence[Tried], seconds: float = 0.3) -> list[KernelC
     for work in [*works, *works]:  # records, and replays once
         timed(work)
     pieces = [Piece(partial(_wall_and_device, work), seconds) for work in works]
+    # The rounds of a kernel are chained: one list of times for each kernel that was timed.
     spent = iter(list(chain(*rounds)) for rounds in in_turns(pieces))
     return [
         each.cost if each.work is None else _with_times(each.cost, next(spent)) for each in tried
@@ -148,6 +153,7 @@ def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:
     for phase, statistic, level in product(
         dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS
     ):
+        # A kernel may reach a level with several sizes; the cheapest of all counts.
         good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
         best = min(good, key=_ns, default=None)
         cheapest, ns = (best.kernel, _ns(best)) if best else (None, None)
@@ -169,6 +175,7 @@ def _ns(cost: KernelCost) -> float:
 
 def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
     """Return the kernel's family, its default size and the sizes to try."""
+    # A user's kernel, 'FILE:NAME', has no sizes of its own.
     if ":" in name:
         find_kernel(name)
         return name, None, (None,)
@@ -178,6 +185,7 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
     if not record.parameters:
         return record.name, None, (None,)
     parameter, default = next(iter(record.parameters.items()))
+    # Parameters without a list of sizes are tried at fractions and multiples of the default.
     known = SIZES.get(parameter, (default // 4, default // 2, default, 2 * default, 4 * default))
     return record.name, default, tuple(sorted({size for size in (*known, default) if size > 0}))
 
@@ -188,6 +196,8 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
     """
     part = slice(0, rays)
     name = cases.phase[0]
+    # Numbers are opaque inputs: a literal would be folded into the kernel, which is then faster
+    # than in a frame.
     phase = named_phase(
         name,
         g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
@@ -199,6 +209,7 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
     light = Light(dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
     columns = (cases.foot, cases.height, cases.x0, cases.x1)
     foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)
+    # Foot and height are given: neither the origin nor the direction of a ray is needed.
     geometry = RayGeometry(foot, height, None, None)
     dr.eval(geometry.foot, geometry.height, x0, x1)
     kernel = kernel.prepared(mi.Float)
@@ -219,6 +230,8 @@ def _wall_and_device(work: Callable[[], Any]) -> tuple[Spent, Spent]:
     when it is done once more.
     """
     wall = timed(work)[1]
+    # The history of kernels is recorded in a second run, so that the wall clock times a run without
+    # it.
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         timed(work)
@@ -231,6 +244,7 @@ def _wall_and_device(work: Callable[[], Any]) -> tuple[Spent, Spent]:
 
 def _with_times(cost: KernelCost, spent: Sequence[tuple[Spent, Spent]]) -> KernelCost:
     """Return the cost of a kernel with its times [ns a ray]."""
+    # From milliseconds for all rays to nanoseconds for one.
     scale = 1e6 / cost.rays
     wall, device = (
         RayTime(

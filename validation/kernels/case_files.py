@@ -74,6 +74,7 @@ def read_cases(path: str | Path) -> Cases:
         raise InputError(
             f"{path} has {'a header only' if header else 'no lines'}; expected a header and cases"
         )
+    # From rows of cells to columns of text, by the names of the header.
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
@@ -85,6 +86,8 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
     `direction` and `light`, (..., 3), may stand for the coordinates of rays. Raises InputError as
     `read_cases`, and for columns whose shapes do not go together; messages count rows from 0.
     """
+    # Vectors are split into the columns of a file, such as ox, oy, oz; both ways share all checks
+    # from there on.
     given: dict[str, Any] = {}
     for key, values in columns.items():
         column = np.asarray(values)
@@ -96,6 +99,7 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
             )
         else:
             given |= {letter: column[..., number] for number, letter in enumerate(_VECTORS[key])}
+    # Columns with other names are left out: their shapes need not fit.
     known = {key: values for key, values in given.items() if key in _KNOWN}
     try:
         spread = np.broadcast_arrays(*known.values())
@@ -104,6 +108,7 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
         raise InputError(
             f"cases: the columns have shapes that do not go together: {shapes}; give equal ones"
         ) from None
+    # The common shape is returned so that the results can have it, too.
     shape = spread[0].shape if spread else ()
     flat = {key: values.reshape(-1) for key, values in zip(known, spread)}
     if not all(len(values) for values in flat.values()):
@@ -120,6 +125,7 @@ def _checked(table: "_Table") -> Cases:
                 f"{table.name}: the columns '{name}' and '{short}' are the same; leave one of them "
                 "out"
             )
+    # Foot and height win where a table has both sets of columns.
     rays = table.named("foot") not in header and any(name in header for name in _RAY)
     table.require(*(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
     columns = {
@@ -128,12 +134,14 @@ def _checked(table: "_Table") -> Cases:
     g = table.numbers("g") if "g" in header else np.zeros(table.count)
     words = table.cells("phase") if "phase" in header else ["isotropic"] * table.count
     phase = tuple(cell.strip().lower() for cell in words)
+    # The first row with an unknown phase function is named; `_fault` remembers what it has tried.
     for row, name in enumerate(phase):
         reason = (
             "'tabulated' has no place for its table here" if name == "tabulated" else _fault(name)
         )
         if reason:
             raise InputError(f"{table.where(row, 'phase')}: {reason}")
+    # At |g| = 1 the phase function is a delta function.
     table.check("g", np.abs(g) < 1, "a number between -1 and 1")
     table.check("sigma_t", columns["sigma_t"] >= 0, "a number >= 0")
     table.check("x1", columns["x1"] >= columns["x0"], "a number >= x0, or inf")
@@ -142,6 +150,7 @@ def _checked(table: "_Table") -> Cases:
         origin, direction, light = (
             np.stack([columns[n] for n in _RAY[k : k + 3]], axis=1) for k in (0, 3, 6)
         )
+        # Files have directions in decimals: their length need not be 1 to the last digit.
         length = np.sqrt(np.sum(direction**2, axis=1))
         table.check("dx", np.abs(length - 1) <= 1e-5, "a direction of length 1")
         foot, height = foot_and_height(origin, direction, light)
@@ -177,6 +186,7 @@ def integrate_cases(
     phase function 'tabulated'.
     """
     value, error = np.empty(len(cases.phase)), np.empty(len(cases.phase))
+    # A quadrature takes one phase function at a time: rows are grouped by phase function and g.
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
         columns = (
@@ -248,6 +258,8 @@ class _Table:
         Raises InputError for a cell that is no number, or not finite, with its place.
         """
         try:
+            # NumPy converts the whole column at once; only when this fails is the cell that caused
+            # it looked for.
             values = np.array(self.columns[self.named(name)], dtype=np.float64)
         except (TypeError, ValueError):
             row = next(
@@ -256,6 +268,7 @@ class _Table:
             raise InputError(
                 f"{self.where(row, name)}: '{self.cells(name)[row]}' is not a number; write one"
             ) from None
+        # An infinite x1 is a ray that never ends; anything else must be finite.
         fine = ~np.isnan(values) if infinite or name == "x1" else np.isfinite(values)
         self.check(name, fine, "a finite number")
         return values

@@ -53,6 +53,7 @@ def evaluate_accepted(
     """
     names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
     refused: dict[str, Exception] = {}
+    # Kernels evaluate one phase function at a time; J stays NaN where one is refused.
     for name in dict.fromkeys(cases.phase):
         rows = np.flatnonzero(names == name)
         try:
@@ -87,11 +88,13 @@ def evaluate_rows(
         Float=types.scalar,
     )
     medium = Homogeneous((column(cases.sigma_t[rows]),), types.color(1), phase)
+    # Without rays the light stands at the origin: the kernel asks for foot and height alone.
     if cases.light is None or cases.origin is None or cases.direction is None:
         light = Light(types.vector(0), types.color(intensity))
         geometry = RayGeometry(column(cases.foot[rows]), column(cases.height[rows]), None, None)
     else:
         light = Light(types.vector(cases.light[rows].T), types.color(intensity))
+        # Directions stay in double precision until foot and height are computed.
         direction = mi.Vector3d(cases.direction[rows].T)
         geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light)
     x0, x1 = column(cases.x0[rows]), column(cases.x1[rows])
@@ -105,6 +108,7 @@ def relative_error(
     where either is not finite.
     """
     with np.errstate(invalid="ignore", over="ignore"):
+        # Deviations that underflow explains are no errors; below the smallest normal number errors are absolute.
         error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(
             np.abs(expected), TINY[precision]
         )
@@ -120,6 +124,8 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
     function = find_kernel(kernel)
     for name in ("foot", "height", "x0", "x1", "sigma_t"):
         values = getattr(cases, name)
+        # A number whose square overflows gives infinity or NaN, with a message about the kernel and
+        # not about the unit.
         large = (np.abs(values) > LARGEST.get(precision, np.inf)) & np.isfinite(values)
         if large.any():
             row = int(np.argmax(large))
@@ -137,6 +143,7 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
         hint = f"{kernel} is not valid there: use another kernel"
+        # The usual cause: the light lies on the segment itself, where J is infinite.
         if cases.height[row] < 1e-30 and cases.x0[row] <= cases.foot[row] <= cases.x1[row]:
             hint = "the light lies on the segment, and J, which grows like 1/height, is infinite: give a larger height"
         raise InputError(
@@ -162,6 +169,7 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
     if not finite.any():
         return quantiles
     p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
+    # Counted among the finite errors, then as a row of the whole table, then as a line of the file.
     worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
     worst = cases.lines[worst] if cases.lines else worst
     return quantiles | {
@@ -177,6 +185,7 @@ def write_results(cases: Cases, results: Array, target: Path) -> None:
     """Write the rows of a file with their results [1/m] in a column
     `result`, whole or not at all.
     """
+    # A file with results of an earlier run gets new ones in their place.
     kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")

@@ -48,11 +48,6 @@ from airlight.validation.kernels.cases import TABLE, relative_error
 from airlight.validation.kernels.rays import case_row
 from airlight.validation.kernels.records import KernelErrors
 
-_NODES = 8
-_LARGEST_DEPTH = 87.0
-_FARTHEST = 2.0**63  # [m]
-_SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
-
 
 def groups(cases: Cases) -> dict[str, Bools]:
     """Return which rows belong to 'all', to each tag and to each phase
@@ -71,14 +66,21 @@ def underflow_allowance(cases: Cases, precision: str) -> Array:
     normal number, (n,) [1/m].
     """
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        # The upper bound of L: the segment ends 87 optical depths behind the foot or the beginning,
+        # and at 2^63 m at the latest.
         beginning = np.maximum(cases.foot, cases.x0)
-        end = np.minimum(cases.x1, beginning + _LARGEST_DEPTH / cases.sigma_t)
-        length = np.minimum(end - cases.x0, _FARTHEST)
+        end = np.minimum(cases.x1, beginning + 87.0 / cases.sigma_t)
+        length = np.minimum(end - cases.x0, 2.0**63)
+        # r: the least distance between the light and the segment; the clip moves the foot to the
+        # nearer end where it lies outside.
         nearest = np.hypot(cases.height, np.clip(0.0, cases.x0 - cases.foot, cases.x1 - cases.foot))
         peaks = np.array([_peak(*kind) for kind in zip(cases.phase, cases.g.tolist())])
+        # The upper bound of V, the lesser of both.
         vacuum = peaks * np.minimum(length / nearest**2, np.pi / cases.height)
     vacuum = np.nan_to_num(vacuum, nan=0.0)  # an empty segment at the light
-    return np.asarray(_SMALLEST[precision] * (_NODES * length + vacuum + 1.0))
+    # a = t (n L + V + 1), with t the smallest normal number and n = 8 nodes
+    smallest = {"single": 2.0**-126, "double": 2.0**-1022}[precision]
+    return np.asarray(smallest * (8 * length + vacuum + 1.0))
 
 
 @cache
@@ -100,6 +102,7 @@ def errors_by_group(
     `values`: J by a kernel, (cases,) [1/m]; `refused`: the phase functions that it refuses.
     """
     assert cases.value is not None
+    # One computation for all groups; each group then takes its rows.
     error = relative_error(values, cases.value, precision, underflow_allowance(cases, precision))
     accepted, known = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
     return {
@@ -111,6 +114,8 @@ def errors_by_group(
 def _errors(
     cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools
 ) -> KernelErrors:
+    # Rows of refused phase functions count as refused, not as wrong; rows whose reference is not
+    # finite have no error.
     J, finite = values[tried], np.isfinite(error) & tried
     bad = tried & known & ~np.isfinite(values)
     median = p99 = largest = mean = worst = None
@@ -118,6 +123,7 @@ def _errors(
         median, p99, largest = (float(q) for q in np.percentile(error[finite], [50, 99, 100]))
         mean = float(error[finite].mean())
         worst = int(np.argmax(np.where(finite, error, -1.0)))
+    # A value that is not finite is worse than any error.
     if bad.any():
         worst = int(np.argmax(bad))
     return KernelErrors(

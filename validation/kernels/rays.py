@@ -26,12 +26,6 @@ from airlight.validation.kernels.cases import TABLE
 
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 
-_SEED = 20101
-_G = (
-    np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
-)  # few, since the reference takes one g at a time
-_LARGEST_SOBOL = 1 << 20
-
 
 @dataclass(frozen=True)
 class RayInputs(Inputs):
@@ -43,20 +37,30 @@ class RayInputs(Inputs):
 
 def hard_rays(count: int = 100_000) -> Cases:
     """Return rays that cover every magnitude, with tags and the true J."""
+    # Ten coordinates of a Sobol point, one for each choice.
     u = _sobol(count, 10)
     distance = _log(u[:, 0], 1e-6, 1e6)
     height = distance * _log(u[:, 1], 1e-7, 1.0)
+    # Seven rays of ten have the light before the camera. The height is a fraction of the distance:
+    # down to 1e-7, rays that nearly meet the light.
     foot = np.where(u[:, 2] < 0.7, 1.0, -1.0) * np.sqrt(np.maximum(distance**2 - height**2, 0.0))
     start = np.where(u[:, 3] < 0.5, 0.0, distance * _log(u[:, 4], 1e-3, 30.0))
     length = distance * _log(u[:, 5], 1e-3, 1e3)
+    # Everything is rounded to float32 numbers: both precisions, and the reference, see the same
+    # ray.
     foot, height, x0 = _rounded(foot), _rounded(height), _rounded(start)
     x1 = np.where(u[:, 6] < 0.1, np.inf, _rounded(x0 + length))
     thickness = _log(u[:, 7], 1e-6, 60.0)
+    # The optical depth belongs to the way from the camera to the beginning of the segment and on to
+    # the light.
     sigma_t = _rounded(thickness / (x0 + np.hypot(x0 - foot, height)))
     phase = np.asarray(PHASE_NAMES)[
         np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)
     ]
-    g = np.where(phase == "hg", _G[np.minimum((u[:, 9] * len(_G)).astype(int), len(_G) - 1)], 0.0)
+    # Few values of g, since the reference takes one at a time.
+    gs = np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
+    g = np.where(phase == "hg", gs[np.minimum((u[:, 9] * len(gs)).astype(int), len(gs) - 1)], 0.0)
+    # A ray gets the first tag that fits.
     tags = np.select(
         [
             (height < 1e-3 * distance) & (x0 < foot) & (foot < x1),
@@ -84,9 +88,11 @@ def wide_rays(
     u = _sobol(count, 3)
     distance = _log(u[:, 0], 1e-4, 60.0)
     angle = np.radians(1e-3 + (180.0 - 2e-3) * u[:, 1])
+    # The camera is at 0: distance and angle to the light give foot and height.
     foot, height = _rounded(distance * np.cos(angle)), _rounded(distance * np.sin(angle))
     x1 = _rounded(distance * _log(u[:, 2], 1e-3, 100.0))
     names = np.full(count, phase)
+    # g as float32 has it, for the kernel and the reference alike.
     g_exact = np.full(count, float(np.float32(g)))
     zeros, ones = np.zeros(count), np.ones(count)
     cases = table(
@@ -149,10 +155,11 @@ def case_row(cases: Cases, k: int) -> str:
 
 
 def _sobol(count: int, dimensions: int) -> Array:
-    if not 1 <= count <= _LARGEST_SOBOL:
-        raise ValueError(f"count: got {count}, expected 1 to {_LARGEST_SOBOL} rays")
+    largest = 1 << 20
+    if not 1 <= count <= largest:
+        raise ValueError(f"count: got {count}, expected 1 to {largest} rays")
     exponent = max(1, int(np.ceil(np.log2(count))))  # a power of two keeps the points balanced
-    return qmc.Sobol(dimensions, rng=np.random.default_rng(_SEED)).random_base2(exponent)[:count]
+    return qmc.Sobol(dimensions, rng=np.random.default_rng(20101)).random_base2(exponent)[:count]
 
 
 def _log(u: Array, low: float, high: float) -> Array:

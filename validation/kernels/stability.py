@@ -63,6 +63,8 @@ def kernel_stability(kernel: Kernel, sets: dict[str, Cases]) -> Stability:
     for label, cases in sets.items():
         values: dict[str, Array] = {}
         for each in PRECISIONS:
+            # Both precisions of every set: single precision is what frames use, double says whether
+            # the formula itself is right.
             values[each], reasons = evaluate_accepted(cases, kernel, each)
             refused |= {phase: str(reason) for phase, reason in reasons.items()}
         rows = groups(cases)
@@ -70,6 +72,7 @@ def kernel_stability(kernel: Kernel, sets: dict[str, Cases]) -> Stability:
             each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS
         }
         studied.append(Rays(name=label, columns=",".join(cases.header), **errors))
+        # Only kernels that claim to be exact have limits to break.
         if kernel.exact:
             broken += _broken(label, cases, values, refused)
     return Stability(
@@ -85,6 +88,7 @@ def _broken(
     name: str, cases: Cases, values: dict[str, Array], refused: Collection[str] = ()
 ) -> list[str]:
     """Return the limits that a kernel that claims to be exact exceeds, in words."""
+    # Tabulated phase functions have kinks, which no rule of fixed cost resolves.
     sharp, smooth = np.abs(cases.g) > 0.9, np.asarray(cases.phase) != "tabulated"
     rows: dict[str, Bools] = {
         "all": np.ones(len(sharp), dtype=bool),
@@ -101,6 +105,8 @@ def _broken(
         ("float32 maximum, |g| above 0.9", single["g above 0.9"], "max", BAR["single_max_sharp"]),
         ("float64 maximum", double["smooth"], "max", BAR["double_max"]),
     ]
+    # Quantiles depend on how many rays of a set are hard: only the certified sets, which stay as
+    # they are, have limits for them.
     if name != GENERATED:
         limits += [
             ("float32 99 %", single["smooth"], "p99", BAR["single_p99"]),
@@ -112,6 +118,7 @@ def _broken(
         if value is not None and value > limit:
             at = f" at {errors.worst}" if quantile == "max" else ""
             faults.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
+    # Values that are NaN, infinite or negative break the limits for every phase function.
     for precision, errors in (("float32", single["all"]), ("float64", double["all"])):
         counts = {"NaN": errors.nan, "infinite": errors.infinite, "negative": errors.negative}
         faults += [

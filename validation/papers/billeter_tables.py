@@ -2,8 +2,8 @@
 """Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010 measured
 again, after the light moved.
 
-Neither scene is available: `omni-box` stands for that of Fig. 6, `colonnade` for the Sponza atrium
-and `tangle` for the mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all
+Neither scene is available: `omni-box` stands for the scene of Fig. 6, `colonnade` for the Sponza
+atrium and `tangle` for the mesh "Yeah Right". The paper gives no image size for Fig. 6 and Table 1: all
 have that of Fig. 7. The published hall has one map; ours has a lamp that shines in all directions,
 so its map has six faces in Fig. 7; in Table 1 a spot takes its place. The light volume is the
 paper's mesh; its height field walked without triangles stands beside it as `walk`. The paper's
@@ -67,6 +67,7 @@ def _images(size: tuple[int, int]) -> dict[str, Any]:
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
         chosen = sampled(np.arange(size[0] * size[1]).reshape(size[::-1]), stride)
+        # The reference is computed for the compared pixels alone.
         true = reference_of_pixels(loaded, chosen.ravel()).airlight.reshape(*chosen.shape, 3)
         for name, (where, method, values) in IMAGES.items():
             if where == scene_name:
@@ -81,6 +82,7 @@ def _image(
     name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int
 ) -> dict[str, Any]:
     ready = renderer()
+    # The error comes first: a frame that takes too long is not timed.
     error = error_metrics(true, sampled(frame_within(ready).airlight, stride)).relative_rmse
     return {f"{name} error": error, f"{name} fps": _rate(ready)}
 
@@ -105,6 +107,7 @@ def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
                 figures |= _view(scene, f"{name} {texels}", texels, tessellation)
     last = maps[-1]
     static, adaptive = (figures[f"colonnade {last} {how} fps"] for how in ("static", "adaptive"))
+    # Where one of both rates was not measured, the reason stands in place of the gain.
     gain: Any = next((each for each in (static, adaptive) if isinstance(each, str)), None)
     if gain is None:
         gain = adaptive.over(static)
@@ -138,6 +141,8 @@ def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, 
 
     def measured() -> dict[str, Any]:
         renderer = prepared(scene, configuration(_MESH, "exact", values))
+        # One frame before the timing, which compiles and says whether frames are fast enough to
+        # time.
         frame_within(renderer)
         return {rate: _rate(renderer)}
 

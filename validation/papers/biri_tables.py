@@ -23,8 +23,6 @@ from airlight.validation.scenes.loading import load_scene, resize
 from airlight.validation.study.configuration import configuration, prepared
 from airlight.validation.study.frame_times import moved_light
 
-# size of the frames that are compared: the default report keeps these references [pixels]
-_COMPARED = (320, 240)
 _SECONDS = 0.1  # for each timing [s]
 
 #: All that the paper has at once, beside its polynomial and the cone of a spot.
@@ -56,9 +54,11 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
     figures: dict[str, Any] = {}
     errors = []
     for name, (scene_name, full, cone) in ENTRIES.items():
-        size, compared = _scaled(full, scale), _scaled(_COMPARED, scale)
+        # Frames of 320 x 240 are compared: the default report keeps these references.
+        size, compared = _scaled(full, scale), _scaled((320, 240), scale)
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
+        # From here on the scene has the smaller size, for the reference.
         resize(loaded, compared)
         reference = reference_image(loaded)
         whole = reference.airlight + reference.surface
@@ -70,6 +70,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))
         forms = chosen, configuration("shadow-planes", "exact")
         works = [moved_light(prepared(scene, form)) for form in forms]
+        # Times are of the published size, in turns.
         published, ours = time_in_turns(works, seconds=2 * seconds, least=3)
         rates = {"": published.rate, "ours ": ours.rate}
         figures |= {f"{name} {whose}fps": quartiles(rate) for whose, rate in rates.items()}

@@ -111,6 +111,8 @@ class Claim:
         unknown where some of them do.
         """
         least, most = self.bounds
+        # An interval that lies whole on one side gives an answer; one that straddles a limit gives
+        # none.
         inside, outside = least <= low and high <= most, high < least or low > most
         if not (inside or outside):
             return Answer.UNKNOWN
@@ -171,6 +173,8 @@ def claims() -> tuple[Claim, ...]:
 
 def taken(claim: Claim, figures: Figures) -> Figure | str:
     """Return the figure of a claim, or why there is none."""
+    # The name of a figure may be 'a / b', a quotient of two results; a result may be text that says
+    # why there is none.
     parts = [figures[name] for name in claim.figure.split(" / ")]
     for part in parts:
         if isinstance(part, str):
@@ -199,6 +203,8 @@ def judged(claim: Claim, figures: Figures) -> Claim:
     which rule it is judged.
     """
     figure = taken(claim, figures) if claim.experiment else claim.why
+    # Without a figure a claim with a direction is impossible to judge; a number without a direction
+    # has no verdict anyway.
     if isinstance(figure, str):
         return replace(
             claim,

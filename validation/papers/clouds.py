@@ -42,19 +42,11 @@ from airlight.validation.study.frame_times import first_frame
 from airlight.validation.timing import Timing
 
 SIZE, SAMPLES = (80, 60), 512
-_FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared
+
 RESULTS = ("stratocumulus", "cumulus")  #: of Fig. 12
 FRAMES = (*RESULTS, "cumulus-detail")  #: of section 9
 GAP, LOBES = "ring", "two-lobes"  #: of Fig. 11
 _METHOD = "cloud-collectors"
-_HIGH = (0.013, 0.029, -1.0)  #: way of the sun's light over the ring
-_MOST = 16  #: crossings of a ray towards the sun
-_ASIDE, _WIDTH = 250.0, 60.0  #: where searches start beside a point, and how wide [m]
-_APART = 1.0  #: distance of their ends from which on there are two [sigma]
-
-#: Three steps at most, one where the collector of the last frame still is one
-#: (within 0.05 of its spread).
-WARM: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
 
 
 def clouds_figures() -> dict[str, Any]:
@@ -65,15 +57,20 @@ def clouds_figures() -> dict[str, Any]:
     figures: dict[str, Any] = {
         name: _ratio(*pair_of(shown(name, SIZE), SAMPLES), every) for name in RESULTS
     }
-    fewer = SAMPLES // _FEWER
+    fewer = SAMPLES // 4  # in Fig. 11, where means over pixels are compared
+    # Fig. 11a: only the pixels in which another part of the cloud shades the surface are compared.
     loaded = shown(GAP, SIZE)
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
     figures["gap, shaded"] = _ratio(*pair, shaded)
+    # The light of these pixels as a fraction of all light, by light paths [%]; the lost light is
+    # that part times what the ratio lacks of 1. A larger ratio loses less, hence the exchanged
+    # ends.
     part = 100 * float(pair[1][shaded].sum() / pair[1].sum())
     shaded_ratio = figures["gap, shaded"]
     value, most, least = (part * (1 - ratio) for ratio in shaded_ratio[:3])
     figures["gap, lost"] = Figure(value, least, most, INTERVAL)
     loaded = shown(LOBES, SIZE)
+    # Fig. 11b: the pixels in which both searches found light at different places.
     two = _two_collectors(loaded)
     figures["lobes, two"] = (
         _ratio(*pair_of(loaded, fewer), two) if two.any() else "no pixel has two collectors"
@@ -103,7 +100,11 @@ def cloud_frames() -> dict[str, Any]:
 
 
 def _light_moved(scene: Scene) -> Timing:
-    renderer = frame_renderer(scene, METHODS["cloud-collectors"], **WARM)
+    # Three steps at most, one where the collector of the last frame still is one (within 0.05 of
+    # its spread).
+    warm: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
+    renderer = frame_renderer(scene, METHODS["cloud-collectors"], **warm)
+    # The first frame searches from the start; timed are the frames after it.
     cache = first_frame(renderer)
 
     def work() -> None:
@@ -112,6 +113,7 @@ def _light_moved(scene: Scene) -> Timing:
 
     maps = time_repeated(lambda: renderer.prepare(scene), seconds=1.0)
     frame = time_repeated(work, seconds=1.0)
+    # When the light moves, its maps are made again and a frame is rendered: both times add up.
     median, low, high = (
         own + more for own, more in zip(maps.quartiles, frame.quartiles, strict=True)
     )
@@ -127,7 +129,9 @@ def shown(name: str, size: tuple[int, int]) -> LoadedScene:
     if name in RESULTS:
         return load_scene(name, size)
     record = SCENES[name]
-    description = record.build() | ({"sun": sun(_HIGH, (3.17, 3.05, 2.83))} if name == GAP else {})
+    high = (0.013, 0.029, -1.0)  # way of the sun's light over the ring
+    description = record.build() | ({"sun": sun(high, (3.17, 3.05, 2.83))} if name == GAP else {})
+    # The boundary of the built-in cloud with the paper's droplets inside.
     droplets = fog(0.0363, (0.99997,) * 3, tabulated_phase("mie", 20001))
     description["cloud"] = medium_boundary("cloud", mesh_triangles(description["cloud"]), droplets)
     loaded = LoadedScene(name, mi.load_dict(description), record.purpose, record.published)
@@ -142,6 +146,7 @@ def pair_of(
     standard error [W/(m^2 sr)].
     """
     frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
+    # The batches of light paths give the standard error.
     traced = monte_carlo_reference(
         loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress
     ).image
@@ -157,6 +162,8 @@ def _shaded(clouds: CloudScene) -> Bools:
     the cloud and enters again.
     """
     toward = -np.asarray(clouds.suns[0].direction, dtype=np.float64)
+    # From the first point of the cloud, a little inside, towards the sun: a ray that leaves the
+    # cloud and enters again is shaded by another part.
     first = clouds.scene.ray_intersect(
         _rays(np.broadcast_to(clouds.origin, clouds.direction.shape), clouds.direction)
     )
@@ -164,11 +171,12 @@ def _shaded(clouds: CloudScene) -> Bools:
     step = 1e-4 * float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     origin = np.array(first.p, dtype=np.float64).T + step * clouds.direction
     enters = np.zeros_like(going)
-    for _ in range(_MOST):
+    for _ in range(16):  # crossings of a ray towards the sun
         hit = clouds.scene.ray_intersect(
             _rays(origin, np.broadcast_to(toward, origin.shape)), going
         )
         going &= np.array(hit.is_valid(), dtype=bool)
+        # A face whose normal points against the way to the sun is an entry.
         enters |= going & ((np.array(hit.n, dtype=np.float64).T @ toward) < 0)
         origin = np.where(
             going[:, None], np.array(hit.p, dtype=np.float64).T + step * toward, origin
@@ -186,10 +194,13 @@ def _two_collectors(loaded: LoadedScene) -> Bools:
     """Return the pixels in which two searches end apart in some set of orders, both
     with light, (height, width).
     """
-    sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-_ASIDE, _ASIDE)]
+    # Searches start 250 m on either side of a point.
+    sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-250.0, 250.0)]
     found = []
+    # By set of orders: both searches must have ended with light, and farther apart than one width
+    # of the collector.
     for (left, light_left, width), (right, light_right, _) in zip(*sides, strict=True):
-        far = np.linalg.norm(left - right, axis=-1) > _APART * width
+        far = np.linalg.norm(left - right, axis=-1) > width
         found.append(far & (width > 0) & (light_left > 0) & (light_right > 0))
     return np.any(found, axis=0)
 
@@ -202,6 +213,8 @@ def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array
         scene, METHODS[_METHOD], extra_layers=True, start="previous", iterations=40
     )
     cache = first_frame(renderer)
+    # The collectors of a first frame are moved aside; up to 40 steps from there find the nearest
+    # collector.
     start = _each(cache.carried, lambda collector: _beside(collector, aside))
     cast, lit = run_cast_and_shade(renderer)
     rendered = run_method(renderer, cache.state, cast, lit, start)
@@ -225,10 +238,11 @@ def _each(carried: Any, change: Callable[[Collector], Collector]) -> Any:
 
 
 def _beside(collector: Collector, aside: float) -> Collector:
+    # Only where the first frame had a collector: elsewhere the width stays 0.
     zero = dr.zeros(type(collector.width), dr.width(collector.width))
     made = Collector(
         type(collector.centre)(zero + aside, zero, zero),
-        dr.select(collector.width > 0, zero + _WIDTH, 0),
+        dr.select(collector.width > 0, zero + 60.0, 0),  # how wide a search starts [m]
     )
     dr.eval(made)
     return made

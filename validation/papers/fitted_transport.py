@@ -29,15 +29,8 @@ from airlight.realtime.numerics.array_types import ArrayTypes
 from airlight.validation.arrays import Array
 
 _THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS = 10, 10, 5, 13, 3
-_ANGLES = 61  # entries of P
-_HORIZON = 5e-4  # cosine of the entry at mu = 0
-_LEAST_D, _LEAST_SUM = 1.01, 1.05
-_FLOOR = 0.02  # of the brightest of a thickness, below which errors count less
-_ROUNDS = 2  # of P and the other functions
-# of a fit: it then ends within some thousandths, and the form misses T by 10 to 30 %
-_EVALUATIONS = 12
+_LEAST_SUM = 1.05  # of B + D, in mean free paths
 _EXPONENTS = (-200, 50)  # of A X, and +-14 of D: without light nothing else bounds them
-_NARROWEST = 1e-3  # of the widths C, in thicknesses
 
 
 @dataclass(frozen=True)
@@ -58,6 +51,7 @@ class FittedRadiance:
         """
         from scipy.interpolate import RegularGridInterpolator
 
+        # Outside of the tables the nearest entry stands in.
         t = float(np.clip(t, coordinates.THINNEST, coordinates.THICKEST))
         sun = float(np.clip(mu_l, coordinates.LOWEST_SUN, 1))
         thickness = np.full_like(mu, _thickness_place(t))
@@ -98,7 +92,8 @@ class _Samples:
         """By which an error is divided: T itself, and a fraction of the
         brightest where T is dim.
         """
-        return self.T + _FLOOR * self.T.max(axis=(1, 2, 3, 4), keepdims=True) + 1e-30
+        # Errors of what is dimmer than 0.02 of the brightest of a thickness count less.
+        return self.T + 0.02 * self.T.max(axis=(1, 2, 3, 4), keepdims=True) + 1e-30
 
 
 def fit_radiance(look_up: Transport, types: ArrayTypes) -> tuple[FittedRadiance, ...]:
@@ -116,10 +111,12 @@ def fit_radiance(look_up: Transport, types: ArrayTypes) -> tuple[FittedRadiance,
 def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
     """Return T of each set on a coarse grid of points."""
     thicknesses = coordinates.thicknesses(_THICKNESSES)
+    # The middles of equal parts of the half circle: T is even in the azimuth.
     azimuths = (np.arange(_AZIMUTHS) + 0.5) * np.pi / _AZIMUTHS
     shape = (_THICKNESSES, _DEPTHS, _SUNS, _DIRECTIONS, _AZIMUTHS)
 
     def along(axis: int, values: Array) -> Array:
+        # Values along one of the five axes, constant along the others.
         return np.broadcast_to(
             values.reshape([-1 if each == axis else 1 for each in range(5)]), shape
         )
@@ -129,6 +126,8 @@ def _samples(look_up: Transport, types: ArrayTypes) -> list[_Samples]:
     depths = np.stack([coordinates.depths(_DEPTHS, thickness) for thickness in thicknesses])
     d = np.broadcast_to(depths[:, :, None, None, None], shape)
 
+    # The direction of a view is its cosine and the cosine and sine of its azimuth; the look-up
+    # takes all points at once.
     given = [types.scalar(values.ravel()) for values in (t, d, mu, np.cos(phi), np.sin(phi), mu_l)]
     samples = []
     for number in range(len(SETS)):
@@ -142,9 +141,10 @@ def _directions(count: int) -> Array:
     """Return mu = +-(1 - cos(pi v))/2 at even v from -1 to 1, fine at the horizon; the
     one in the middle is off 0.
     """
+    # The inverse of `_direction_place`: tables are linear in v.
     places = np.linspace(-1.0, 1.0, count)
     values = np.sign(places) * (1 - np.cos(np.pi * places)) / 2
-    values[count // 2] = _HORIZON
+    values[count // 2] = 5e-4  # cosine of the entry at mu = 0
     return values
 
 
@@ -162,19 +162,23 @@ def _sun_place(mu_l: Any) -> Any:
 
 
 def _scattering_angles(mu: Array, mu_l: Any, phi: Any) -> Array:
+    # The sun's light travels down and the view leaves upwards: mu and mu_l enter the product with
+    # opposite signs.
     sines = np.sqrt((1 - mu**2) * (1 - mu_l**2))
     return np.arccos(np.clip(sines * np.cos(phi) - mu * mu_l, -1, 1))
 
 
 def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
     """Fit one set of orders: P and the other functions in turns; P of an `isotropic` one is 1."""
-    at = np.linspace(0, np.pi, _ANGLES)
+    entries = 61  # of P
+    at = np.linspace(0, np.pi, entries)
     angles = _scattering_angles(samples.mu, samples.mu_l, samples.phi)
-    bins = np.rint(angles / np.pi * (_ANGLES - 1)).astype(np.int64).ravel()
+    # Each sample belongs to the nearest entry of P.
+    bins = np.rint(angles / np.pi * (entries - 1)).astype(np.int64).ravel()
     weight = 1 / samples.scale**2
-    p = np.ones(_ANGLES)
+    p = np.ones(entries)
     starts = [_first_guess(samples, number) for number in range(_THICKNESSES)]
-    for _ in range(_ROUNDS):
+    for _ in range(2):  # rounds of P and the other functions
         # All functions but P, from where they ended.
         values = np.interp(angles, at, p)
         fits = [
@@ -187,9 +191,13 @@ def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
 
         # P takes what is left at each angle, weighted as T is fitted.
         model = np.stack([fit.model for fit in fits])
-        above = np.bincount(bins, (weight * samples.T * model).ravel(), _ANGLES)
-        below = np.bincount(bins, (weight * model**2).ravel(), _ANGLES)
+        # Least squares for a factor f of each angle: sum w (T - f M)^2 is least at f = sum w T M /
+        # sum w M^2.
+        above = np.bincount(bins, (weight * samples.T * model).ravel(), entries)
+        below = np.bincount(bins, (weight * model**2).ravel(), entries)
         hit = below > 0
+        # Angles without samples take the factor between their neighbours; 1e-3 keeps P above 0, so
+        # that later rounds can raise it again.
         p *= np.interp(at, at[hit], np.maximum(above[hit] / below[hit], 1e-3))
     return FittedRadiance(
         p, np.stack([fit.of_directions for fit in fits]), np.stack([fit.of_suns for fit in fits])
@@ -201,6 +209,8 @@ def _first_guess(samples: _Samples, number: int) -> Array:
     with which a fit begins.
     """
     T, t = samples.T[number], float(samples.t[number].flat[0])
+    # Every function begins as a constant: A as the median of T, the middle of the bell at a third
+    # of the thickness.
     typical = max(float(np.median(T[T > 0])) if (T > 0).any() else 1e-30, 1e-30)
     # A bell far wider than the slab shows no slope in its width, and the evaluations of
     # a fit would leave it so.
@@ -231,8 +241,10 @@ def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _F
             x[: 4 * _DIRECTIONS].reshape(-1, 4).copy(),
             x[4 * _DIRECTIONS :].reshape(-1, 2),
         )
-        of_directions[:, 2] = np.maximum(np.abs(of_directions[:, 2]), _NARROWEST * t)
-        of_directions[:, 3] = _LEAST_D + np.exp(np.clip(of_directions[:, 3], -14, 14))
+        # A width enters squared, so its sign is free; D is kept above its limit by an exponential.
+        # Widths of at least 1e-3 thicknesses; D above 1.01 mean free paths.
+        of_directions[:, 2] = np.maximum(np.abs(of_directions[:, 2]), 1e-3 * t)
+        of_directions[:, 3] = 1.01 + np.exp(np.clip(of_directions[:, 3], -14, 14))
         return of_directions, of_suns
 
     def model(x: Array) -> Array:
@@ -240,7 +252,9 @@ def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _F
         log_a, b1, width, shift = of_directions.T
         log_x, b2 = of_suns.T
         b = b1 - b2[:, None]
+        # log(d + D)/log(B + D), kept off its pole at B + D = 1.
         ratio = np.log(d[:, None, None] + shift) / np.log(np.maximum(b + shift, _LEAST_SUM))
+        # log(A X) and the bell in one exponent; only log(A X) is bounded.
         exponent = np.clip(log_a + log_x[:, None], *_EXPONENTS) - (d[:, None, None] - b) ** 2 / (
             2 * width**2
         )
@@ -250,7 +264,8 @@ def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _F
         lambda x: ((model(x) - T) / scale).ravel(),
         start,
         method="trf",
-        max_nfev=_EVALUATIONS,
+        # It then ends within some thousandths, and the form misses T by 10 to 30 %.
+        max_nfev=12,
         x_scale="jac",
     )
     return _Fit(fitted.x, *tables(fitted.x), model(fitted.x))

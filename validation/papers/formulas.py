@@ -89,6 +89,7 @@ def _over_angle(foot: float, height: float, length: float, sigma: float) -> floa
         path = (np.sin(theta) + 1) / np.cos(theta)
         return np.exp(-sigma * height * path) * float(_HAZY(np.cos(theta + np.pi / 2)))
 
+    # theta is the angle of the ray's point at the light: tan(theta) = (x - foot)/height.
     ends = np.arctan((0 - foot) / height), np.arctan((length - foot) / height)
     return (
         np.exp(-sigma * foot)
@@ -118,6 +119,7 @@ def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     cases, found = wide_rays(_WIDE_RAYS), {}
     for name, kernel in (("printed", taylor_printed), ("derived", taylor)):
+        # In double precision: rounding adds nothing to the polynomial's error.
         error = relative_error(
             evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double"
         )
@@ -130,6 +132,8 @@ def _cloud_equations() -> dict[str, float]:
     leaves of an isotropic field.
     """
     kappa, x0, x1, l0, l1 = 0.05, 3.0, 19.0, 11.0, 4.0
+    # The way from the point to the light changes linearly along the ray, from l0 to l1; all numbers
+    # are arbitrary.
     depth = quad(
         lambda x: kappa * np.exp(-kappa * (x + l0 + (l1 - l0) * (x - x0) / (x1 - x0))), x0, x1
     )[0]
@@ -164,5 +168,7 @@ def _moderate(cases: Cases) -> Bools:
     # and optical depth: the extinction of the set is 1
     distance = np.hypot(cases.foot, cases.height)
     length = cases.x1 / distance
+    # As an angle to the light of 1 to 179 degrees: the height is at least the sine of 1 degree
+    # times the distance.
     fine = (distance >= 0.01) & (distance <= 5) & (length >= 0.05) & (length <= 10)
     return fine & (cases.height >= distance * np.sin(np.radians(1)))

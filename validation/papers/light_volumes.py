@@ -69,12 +69,7 @@ SIZE = (160, 120)  #: of images [pixels]
 #: by which the mesh is pushed towards the light, of its depth [1]
 BIASES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
-_MAPS = (32, 128, 512)  # of Fig. 6 [texels]
-FACETS = {"few": 16, "many": 512}  #: of a ring of the sphere: 514 triangles, and half a million
-_TRIANGLE_SIZE = (512, 512)
 _MESH = "light-volumes-2010"
-_SECONDS = 0.3  # for each timing [s]
-_HALVINGS = 24  # of the interval of the threshold
 
 
 def maps() -> dict[str, float]:
@@ -83,7 +78,9 @@ def maps() -> dict[str, float]:
     """
     loaded = load_scene("omni-box", SIZE).scene
     scene, true = read_scene(loaded), reference_image(loaded).airlight
-    images = {size: render_frame(_renderer(scene, _MESH, size)).airlight for size in _MAPS}
+    # The finest map is the last image, which the one of 128 texels is compared with, too.
+    sizes = (32, 128, 512)  # of the maps of Fig. 6 [texels]
+    images = {size: render_frame(_renderer(scene, _MESH, size)).airlight for size in sizes}
     errors = {
         str(size): known(error_metrics(true, image).relative_rmse) for size, image in images.items()
     }
@@ -99,15 +96,19 @@ def triangle_times() -> dict[str, Any]:
     with many triangles [ms].
     """
     times: dict[str, Any] = {}
-    for name, facets in FACETS.items():
+    # Facets of a ring of the sphere: 514 triangles, and half a million.
+    for name, facets in {"few": 16, "many": 512}.items():
         scene = _sphere(facets)
         volumes = _renderer(scene, "light-volumes", MAP, walls="slanted")
         state = volumes.prepare(scene)
+        # The cast of the view and its shading are evaluated first: the timing of the volume must
+        # not contain them.
         cast, lit = run_cast_and_shade(volumes)
         dr.eval(cast, lit)
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
         works = [_evaluation(volumes, state, cast, lit), moved_light(planes)]
-        volume, frame = time_in_turns(works, seconds=_SECONDS * len(works))
+        # In turns: both share whatever slows the machine meanwhile.
+        volume, frame = time_in_turns(works, seconds=0.3 * len(works))  # for each timing [s]
         medians = {"volume": volume.quartiles, "planes": frame.quartiles}
         times |= {f"{what}, {name}": quartiles(found) for what, found in medians.items()}
     return times
@@ -120,11 +121,12 @@ def _evaluation(volumes: FrameRenderer, *given: Any) -> Callable[[], None]:
 def _sphere(facets: int) -> Scene:
     """Return `sphere-spot` with a round sphere of so many facets a ring."""
     described = SCENES["sphere-spot"].build()
+    # Rings in the middle of equal bands of the polar angle; fans close the poles.
     polar = np.pi * (1 - (np.arange(facets) + 0.5) / facets)
     mesh = placed(lathe(0.47 * np.sin(polar), 0.47 * np.cos(polar), facets), (0.11, -0.07, 1.93))
     described["sphere"] = mitsuba_mesh("sphere", mesh, (0.57, 0.31, 0.23))
     scene = mi.load_dict(described)
-    resize(scene, _TRIANGLE_SIZE)
+    resize(scene, (512, 512))
     return read_scene(scene)
 
 
@@ -141,6 +143,7 @@ def tessellation() -> dict[str, Any]:
     shadow_map = cast_shadow_map(scene.geometry, light, MAP)
     heights = corner_heights(shadow_map)
     divided = divide(edges(heights, THRESHOLD))
+    # The side of the quad that holds each texel: a level halves it.
     side, jump = MAP / 2.0 ** quad_levels(divided), _jumps(heights)
     errors = {f"bias {bias:g}": error for bias, error in zip(BIASES, _biased())}
     return {
@@ -165,6 +168,7 @@ def quad_levels(divided: list[Any]) -> Index:
     size = 2 ** len(divided)
     level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
     for number, numbers, _ in quads(divided):
+        # A quad of this level covers step x step texels; its number counts faces, rows and columns.
         step = size >> number
         face, rest = np.divmod(numbers, 4**number)
         row, column = np.divmod(rest, 2**number)
@@ -175,6 +179,7 @@ def quad_levels(divided: list[Any]) -> Index:
 
 def _jumps(heights: Array) -> Bools:
     """Return the texels whose corners differ by more than a tenth."""
+    # The four corners of every texel, as four shifted views of the map.
     corners = np.stack(
         [heights[:, a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)]
     )
@@ -188,9 +193,11 @@ def plain_edges(heights: Array, wanted: int) -> list[Any]:
     The `heights` are inverse depths, (faces, N + 1, N + 1) [1/m]. The threshold is found by
     bisection, so that the mesh has about as many triangles as are `wanted`.
     """
+    # Bisection in the logarithm of the threshold, from e^-20 to above the largest response, which
+    # no texel exceeds. A higher threshold marks fewer texels, and the mesh has fewer triangles.
     response = laplacian(heights)
     low, high = -20.0, float(np.log(response.max() + 1))
-    for _ in range(_HALVINGS):
+    for _ in range(24):  # halvings of the interval
         middle = 0.5 * (low + high)
         if len(triangles(divide(_marked(response > np.exp(middle))))) > wanted:
             low = middle
@@ -207,6 +214,7 @@ def laplacian(heights: Array) -> Array:
     the farthest other corner.
     """
     depth = 1 / np.maximum(heights, heights[heights > 0].min())
+    # Repeated edges: a border has no neighbour beyond it, and must not look like a jump.
     wide = np.pad(depth, ((0, 0), (1, 1), (1, 1)), mode="edge")
     around = wide[:, :-2, 1:-1] + wide[:, 2:, 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:]
     return np.abs(around - 4 * depth)
@@ -216,6 +224,8 @@ def _marked(corners: Bools) -> list[Any]:
     """Return the nodes of each level that have a marked corner."""
     marked = corners[:, :-1, :-1] | corners[:, 1:, :-1] | corners[:, :-1, 1:] | corners[:, 1:, 1:]
     levels = []
+    # From texels to the whole face: a node is marked if one of its four children is. The coarsest
+    # level comes first, as `divide` expects.
     while marked.shape[1] > 1:
         marked = (
             marked[:, ::2, ::2]
@@ -243,6 +253,8 @@ def _filter_errors(
     def adaptive(divided: list[Any]) -> VolumeMesh:
         return adaptive_mesh(shadow_map, light, heights, triangles(divided))
 
+    # Both adaptive meshes are compared with the static mesh of the same map, so the map's own error
+    # is not counted.
     static = airlight(volume_mesh(shadow_map, light))
     plain = divide(plain_edges(heights, len(triangles(ours))))
     return {
@@ -258,6 +270,7 @@ def _biased() -> list[float]:
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
     scene = read_scene(loaded)
     light = scene.lights[0]
+    # A frame gives depths in single precision; the sums are taken in double precision.
     depth = render_frame(_renderer(scene, _MESH, _BIAS_MAP)).distance.astype(np.float64).ravel()
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
     sum_of = partial(crossings_sum, loaded, depth)
@@ -279,8 +292,12 @@ def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -
     )
     sigma = float(reference.medium.sigma_t[0])
     total = np.zeros(len(depth))
+    # The airlight of a ray is the signed sum of integrals from the camera to each crossing of the
+    # volume's boundary.
     for batch in signed_crossings(mesh, camera):
         pixel, x, sign = (np.array(each) for each in (batch.pixel, batch.distance, batch.sign))
+        # Clamped: a crossing behind the surface counts with the integral up to the surface. With
+        # depth testing it is not drawn at all.
         drawn = np.ones(len(x), dtype=bool) if clamp else x < depth[pixel]
         pixel, sign, end = pixel[drawn], sign[drawn], np.minimum(x, depth[pixel])[drawn]
         J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, Isotropic())
@@ -294,6 +311,8 @@ def _pushed(mesh: VolumeMesh, light: Light, bias: float) -> VolumeMesh:
     """
     place = np.array(light.position, dtype=np.float64).ravel()
     s = mesh.vertices[:, 3:]
+    # Homogeneous coordinates (light s + k, s) stand for the point light + k/s. A depth k/s that is
+    # smaller by the fraction `bias` needs s/(1 - bias), and light s changes with it.
     nearer = s / (1 - bias)
     return VolumeMesh(
         np.hstack([mesh.vertices[:, :3] + place * (nearer - s), nearer]), mesh.triangles

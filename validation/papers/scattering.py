@@ -39,13 +39,10 @@ from airlight.validation.study.configuration import configuration, prepared
 _SCENES = ("open-fog", "two-pens", "colonnade")
 _SIZE = (32, 24)  # of the images of multiple scattering [pixels]
 _BATCHES, _SAMPLES, _DEPTH = 8, 8, 64
-# extinction of `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
-_THIN = 0.00173
+
 
 SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to the centre
 OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
-_LAMP = np.array([0.37, -0.31, 3.07])  # [m]
-_RADIUS = 0.97  # [m]
 
 
 def multiple_scattering() -> dict[str, Any]:
@@ -53,10 +50,12 @@ def multiple_scattering() -> dict[str, Any]:
     its fraction in thin fog.
     """
     described = SCENES["open-fog"].build()
-    described["fog"]["scale"] = _THIN
+    # `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
+    described["fog"]["scale"] = 0.00173
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
     thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
+    # In thin fog the second scattering is a fraction in proportion to the optical depth.
     low, high = thin.interval
     return {
         "left over": max(map(_left_over, _SCENES)),
@@ -66,6 +65,8 @@ def multiple_scattering() -> dict[str, Any]:
 
 def _left_over(name: str) -> float:
     scene = load_scene(name, _SIZE).scene
+    # Two images with independent noise: the product of their residuals has the mean of the squared
+    # bias, without the noise.
     first, second = (_multiple(scene, seed) for seed in (0, 1000))
     ambient = _ambient(read_scene(scene))
     return left_over(first, second, fitted_constant(ambient, 0.5 * (first + second)) * ambient)
@@ -82,12 +83,14 @@ def left_over(first: Array, second: Array, model: Array) -> float:
     """Return the relative RMSE of a model to the mean of two images with independent
     noise, without it; 0 at least.
     """
+    # Noise can make the estimate of a square negative.
     squares = float(np.mean((first - model) * (second - model)) / np.mean(first * second))
     return max(0.0, squares) ** 0.5
 
 
 def _multiple(scene: Any, seed: int) -> Array:
     """Return the airlight of two and more scatterings, (pixels, 3)."""
+    # The same seeds: most of the noise of the first scattering cancels in the difference.
     whole, single = (
         monte_carlo_batches(
             scene, "volpath", batches=_BATCHES, samples=_SAMPLES, first_seed=seed, max_depth=depth
@@ -99,6 +102,7 @@ def _multiple(scene: Any, seed: int) -> Array:
 
 def _ambient(scene: Scene) -> Array:
     """Return the ambient fog of constant 1, (pixels, 3), as the method draws it."""
+    # The method adds the ambient light to the airlight; the difference is the ambient light alone.
     lit, unlit = (
         render_frame(
             prepared(scene, configuration("shadow-planes-2006", "exact", values))
@@ -119,8 +123,11 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
     biases, ratios = [], []
     for size, depth in product(SIZES, OPTICAL_DEPTHS):
         scene = read_scene(mi.load_dict(sphere_in_vacuum(size, depth, image)), "double")
+        # Float64: rounding plays no part in the comparison.
         exact = _airlight(scene, "exact")
         forms = [("paper", "exact"), ("paper", "taylor"), ("printed", "exact")]
+        # Only pixels whose ray meets the sphere: vacuum has no airlight, and would only dilute the
+        # errors.
         paper, taylor, printed = (
             error_metrics(exact, _airlight(scene, *form), mask=exact[..., 1] > 0) for form in forms
         )
@@ -138,13 +145,15 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
 
 def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
     """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
-    lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
-    medium = fog(0.5 * optical_depth / _RADIUS, (0.83, 0.83, 0.83))
+    above, radius = np.array([0.37, -0.31, 3.07]), 0.97  # direction to the lamp; of the sphere [m]
+    lamp = above / np.linalg.norm(above) * (radius / size)
+    # `optical_depth` belongs to the diameter
+    medium = fog(0.5 * optical_depth / radius, (0.83, 0.83, 0.83))
     return {
         "type": "scene",
         "sensor": camera((0.13, -5.3, 0.21), (0.0, 0.0, 0.0), fov=27.1, size=image, in_fog=False),
         "lamp": point_light(lamp.tolist(), (3.1, 3.1, 3.1)),
-        "ball": {"type": "sphere", "radius": _RADIUS, "bsdf": {"type": "null"}, "interior": medium},
+        "ball": {"type": "sphere", "radius": radius, "bsdf": {"type": "null"}, "interior": medium},
     }
 
 

@@ -31,7 +31,7 @@ from airlight.validation.study.configuration import configuration, prepared
 
 SIZE = (160, 120)  #: of the images [pixels]
 SCENES = ("two-pens", "clutter", "hall", "colonnade")  #: whose planes are ordered
-_CLOSE = 0.3  # optical depth between camera and light
+
 _RAYS = 4000  # of the stencil
 
 
@@ -63,6 +63,8 @@ def shortcuts() -> dict[str, float]:
     which is a quarter of the brightest airlight of 99 % of the pixels, and four times as much.
     """
     scene, true = _opened("clutter")
+    # White at a quarter of the brightest airlight clips bright pixels; white at four times the
+    # brightest leaves few steps for dim pixels.
     brightest = float(np.percentile(true.max(axis=2), 99))
     biases = {}
     for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
@@ -80,11 +82,13 @@ def _steps() -> float:
     The lamp stands in front of the camera, before which the whole fog is lit; near is within 10
     degrees of the lamp. White is the brightest radiance of 99 % of the picture.
     """
-    scene = mi.load_dict(_lamp_in_fog(_CLOSE))
+    scene = mi.load_dict(_lamp_in_fog(0.3))  # optical depth between camera and light
     resize(scene, SIZE)
     read = read_scene(scene)
+    # Without shadows: only the polynomial differs.
     true, shown = (_rendered(read, "unshadowed", kernel) for kernel in ("exact", "taylor"))
     white, near = float(np.percentile(true, 99)), _close_to_lamp(scene)
+    # As a display shows it: clipped at white, in 255 steps.
     on_screen = [255 * np.clip(image[near] / white, 0, 1) for image in (true, shown)]
     return float(np.percentile(np.abs(on_screen[1] - on_screen[0]).max(axis=1), 99))
 
@@ -104,6 +108,7 @@ def _close_to_lamp(scene: Any) -> Bools:
     foot, height = foot_and_height(
         reference.origin, reference.direction, reference.lights[0].position
     )
+    # The angle at the camera between the ray and the light: height over foot.
     return (np.arctan2(height, foot) < np.radians(10)).reshape(reference.height, reference.width)
 
 
@@ -149,14 +154,19 @@ def drawn(shadows: list[tuple[float, float]], step: int) -> float:
     """Return the sum that is drawn; `step` is what planes that face the camera add to the
     stencil, others take it.
     """
+    # The stencil begins with the number of shadows that the surface lies in.
     level = sum(a < 1 < b for a, b in shadows)
     planes = sorted(
         [(a, True) for a, _ in shadows] + [(b, False) for _, b in shadows], reverse=True
     )
+    # The surface itself closes the last lit interval, with Gamma(1), if it is lit.
     total = 1.0 if level == 0 else 0.0
     for x, front in planes:
+        # A plane behind the surface is hidden by it.
         if x >= 1:
             continue
+        # Front planes count where the stencil is 1, back planes where it is 0: only the border
+        # between light and shadow is drawn, not the borders within overlapping shadows.
         if level == (1 if front else 0):
             total += x if front else -x
         level += step if front else -step

@@ -33,18 +33,16 @@ from airlight.validation.slab.moments import DOWN, UP, SlabOrders, order_sets
 from airlight.validation.slab.phases import droplet_phase, phase_pair
 
 THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
-_SUNS = (0.0, 75.0)  # [degrees]
-_FIGURE_3 = (1000.0, 100.0, 75.0)  # thickness [m], depth [m] and sun [degrees] of its left part
+
 #: Phase functions that are compared with the droplets, by thickness [m].
 _REFLECTANCES: Mapping[float, tuple[str, ...]] = {
     50.0: ("printed", "modified", "half", "printed g"),
     300.0: ("printed", "matched g"),
     1000.0: ("printed",),
 }
-_PRINTED_G = 0.99
-_DROPLETS = (6.0, 2.0, 0.55)
+
 _STREAMS, _NODES = 48, 6  # which give reflectances to 1e-4
-_APPEARS = 1.0  # fraction from which on orders appear [%]
+
 
 SUN = 25.0  #: of Fig. 8 [degrees]
 #: Thickness and depths of Fig. 8 [m].
@@ -52,8 +50,6 @@ PANELS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (100.0, (0.0, 100.0)),
     (1000.0, (0.0, 100.0, 1000.0)),
 )
-_ANGLES = 36  # zenith angles of the view
-_DIM = 1e-6  # of the light of all sets, below which a set is not compared
 
 
 def slab_figures() -> dict[str, Any]:
@@ -61,29 +57,36 @@ def slab_figures() -> dict[str, Any]:
     radiance changes by azimuth.
     """
     green = optics()
+    # The modified phase function has lost a part of its peak; light in it goes straight on, so the
+    # extinction is lowered by the same part.
     cut = float(Modified(green).removed)
-    full, modified = (droplet_phase(*_DROPLETS, modified=cut_off) for cut_off in (False, True))
+    droplets = (6.0, 2.0, 0.55)  # r_e [um], gamma, wavelength [um]
+    full, modified = (droplet_phase(*droplets, modified=cut_off) for cut_off in (False, True))
     lowered = (1 - cut) * green.extinction
     figures = {f"azimuth, {name}": ratio for name, ratio in _by_azimuth(lowered, modified).items()}
     for thickness, asked in _REFLECTANCES.items():
         tau = thickness * green.extinction
+        # Optical thickness and phase function of what is compared with the droplets in full.
         slabs: dict[str, tuple[float, SlabPhase]] = {
             "printed": (thickness * green.printed_extinction, full),
             "modified": ((1 - cut) * tau, modified),
             "half": (0.5 * tau, modified),
             "matched g": (tau, HenyeyGreensteinPhase(green.g)),
-            "printed g": (tau, HenyeyGreensteinPhase(_PRINTED_G)),
+            "printed g": (tau, HenyeyGreensteinPhase(0.99)),
         }
         whole = _reflectance(tau, full)
         figures |= {
             f"{thickness:g} m, {name}": _reflectance(*slabs[name]) / whole for name in asked
         }
     fractions = {
-        (t, sun): _fractions(t * lowered, sun, modified) for t in THICKNESSES for sun in _SUNS
+        (t, sun): _fractions(t * lowered, sun, modified) for t in THICKNESSES for sun in (0.0, 75.0)
     }
+    # Fraction of orders 1 to 30 in the reflected light with the sun overhead; the rest, of higher
+    # orders, is the isotropic part.
     overhead = [fractions[t, 0.0][0] for t in THICKNESSES]
     return figures | {
-        "isotropic from": crossing(THICKNESSES, [100 - each for each in overhead], _APPEARS),
+        # Orders appear from a fraction of 1 % on.
+        "isotropic from": crossing(THICKNESSES, [100 - each for each in overhead], 1.0),
         "transmitted, 1000 m": fractions[1000.0, 0.0][1],
         "reflected, least": min(reflected for reflected, _ in fractions.values()),
     }
@@ -112,6 +115,7 @@ def _fractions(tau: float, sun: float, phase: SlabPhase) -> tuple[float, float]:
     """Return the fraction of orders 1 to 30 in the light that is reflected, and
     transmitted after scattering [%].
     """
+    # At the upper face for reflected light, at the lower face for transmitted light.
     (few, _), total = order_sets(
         _slab(tau, math.cos(math.radians(sun)), phase), [(1, 30), (31, math.inf)]
     )
@@ -124,13 +128,15 @@ def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
     """Return by set how far radiance changes with the azimuth, at the point of Fig.
     3, where it changes most.
     """
-    thickness, depth, sun = _FIGURE_3
+    # thickness [m], depth [m] and sun [degrees] of the left part of Fig. 3
+    thickness, depth, sun = 1000.0, 100.0, 75.0
     slab = DirectionalMoments(phase, 1.0, np.array([-0.9, -0.6, -0.3, 0.3, 0.6, 0.9]))
     modes = slab(thickness * lowered, [math.cos(math.radians(sun))], [depth * lowered])[
         :, :, 0, 0, 0
     ]
     phi = np.linspace(0, np.pi, 37)
     m = np.arange(modes.shape[1])[:, None]
+    # A Fourier series in the azimuth: modes above 0 count twice, since the series runs over +-m.
     radiance = np.einsum("smv,mp->svp", modes, np.cos(m * phi) * np.where(m > 0, 2.0, 1.0))
     ratios = radiance.max(-1) / np.maximum(radiance.min(-1), 1e-300)
     return {set_name(number): float(ratios[number].max()) for number in range(len(SETS))}
@@ -142,7 +148,9 @@ def transport_figures() -> dict[str, Any]:
     """
     medians = []
     for curve in transport_curves():
-        shown = curve.exact > _DIM * curve.whole
+        # Directions dimmer than a millionth of the light of all sets are not compared: their
+        # relative errors would count as much as all others.
+        shown = curve.exact > 1e-6 * curve.whole
         if shown.any():
             medians.append(np.median(np.abs(curve.fit[shown] / curve.exact[shown] - 1)))
     return {"fit, median": 100 * float(np.median(medians))}
@@ -170,7 +178,9 @@ def transport_curves() -> list[TransportCurve]:
     grid = on_device(canonical_transport(pair.deterministic, 1.0), types)
     fit = fit_radiance(grid, types)
     lowered = (1 - Modified(optics()).removed) * optics().extinction
-    angles = (np.arange(_ANGLES) + 0.5) * np.pi / _ANGLES
+    count = 36  # zenith angles of the view
+    angles = (np.arange(count) + 0.5) * np.pi / count
+    # The exact curve: more streams and modes than the grid that frames look up.
     slab = DirectionalMoments(
         pair.deterministic,
         1.0,
@@ -185,6 +195,8 @@ def transport_curves() -> list[TransportCurve]:
     for thickness, depths in PANELS:
         t, at = thickness * lowered, [depth * lowered for depth in depths]
         modes = slab(t, [math.cos(math.radians(SUN))], at)[:, :, 0, 0]
+        # In the plane of the sun all cosines of the Fourier series are 1; modes above 0 count
+        # twice.
         twice = np.where(np.arange(modes.shape[1]) > 0, 2.0, 1.0)
         exact = np.einsum("smdv,m->sdv", modes, twice)
         for place, depth in enumerate(at):
@@ -207,6 +219,7 @@ def transport_curves() -> list[TransportCurve]:
 def _looked_up(
     look_up: Transport, types: ArrayTypes, orders: int, t: float, d: float, angles: Array
 ) -> Array:
+    # Thickness, depth, direction (cosine, and cosine and sine of the azimuth 0) and sun.
     numbers = np.broadcast_arrays(t, d, np.cos(angles), 1.0, 0.0, math.cos(math.radians(SUN)))
     T, *_ = look_up(orders, *(types.scalar(np.array(each)) for each in numbers))
     dr.eval(T)

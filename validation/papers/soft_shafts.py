@@ -12,8 +12,8 @@ from captions. It gives:
 Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the
 *penumbra*: where the visible surface gets more than 0.02 and less than 0.98 of the light that it would get without
 occluders. Both lights of this fraction are sums over the same sixteen points of the area light, so that a surface that
-sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors is that of a jackknife over
-vertical strips of the image.
+sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors comes from a jackknife
+over vertical strips of the image.
 
 *At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the
 steps) they take as long as R4. *Edges* is the median, over the hundredth of the penumbra where the
@@ -45,11 +45,10 @@ from airlight.validation.timing import Timing
 
 SCENE, SIZE = "fence", (200, 152)  #: of the frames [pixels]; the source prints none
 POINTS = 64
-_FEW = 16  # points of the penumbra, the same with and without occluders
+
 STEPS, MANY = 32, 150
 TAPS = (4, 8, 16, 32)
-# of the flicker: frames, and how far the light goes from one to the next [m]
-_FRAMES, _TRAVEL = 5, 0.02
+
 _STRIPS = 16  # of the jackknife
 
 #: Names and values of parameters, beside the defaults: 5 points on a ring, uniform
@@ -82,6 +81,7 @@ class Reference:
         """
         where = self.penumbra
         if left_out is not None:
+            # Strips are of equal width; each column belongs to one of them.
             where = where & (np.arange(where.shape[1]) * _STRIPS // where.shape[1] != left_out)
         expected = self.image[where]
         return float(np.sqrt(np.mean((image[where] - expected) ** 2)) / np.mean(expected))
@@ -89,6 +89,9 @@ class Reference:
     def ratio(self, above: Array, below: Array) -> Figure:
         """Return the error of an image over that of another, with its 95 % interval."""
         whole = self.error(above) / self.error(below)
+        # Jackknife over n strips: the variance of the ratio is (n - 1)/n times the sum of squared
+        # deviations of the ratios without one strip, which is (n - 1) times their variance.
+        # Student's quantile has n - 1 degrees of freedom.
         rest = [self.error(above, strip) / self.error(below, strip) for strip in range(_STRIPS)]
         half = student_quantile(0.5 + LEVEL / 2, _STRIPS - 1) * float(
             np.sqrt((_STRIPS - 1) * np.var(rest))
@@ -99,6 +102,7 @@ class Reference:
         """Return the median gradient of an image over the reference's, at the steepest
         hundredth of the penumbra.
         """
+        # Gradients of the green channel.
         shown, true = (np.hypot(*np.gradient(picture[..., 1])) for picture in (image, self.image))
         steep = self.penumbra & (true > np.quantile(true[self.penumbra], 0.99))
         return float(np.median(shown[steep] / true[steep]))
@@ -108,6 +112,7 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
     """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings."""
     scene, reference = shafts_scene(size)
     times = timings(scene, RENDERINGS, seconds)
+    # The renderings of Fig. 4.19; the best of the smaller counts is compared with the largest.
     taps = {f"{count} taps": {"steps": count} for count in TAPS}
     chosen = {**RENDERINGS, **_at_equal_time(times), **VARIANTS, **taps}
     images = {name: rendered(scene, values) for name, values in chosen.items()}
@@ -139,9 +144,13 @@ def penumbra(scene: Scene) -> Bools:
     """Return where the visible surface gets a part of the light, with and without
     occluders from the same points.
     """
-    surface = render_frame(prepared(scene, _exact(_FEW))).surface
-    bare = frame_renderer(scene, _WithoutShadows, points=_FEW, pattern="sobol")
+    # Both lights are sums over the same sixteen points: where the surface sees the whole light, the
+    # fraction is 1.
+    points = 16  # the same with and without occluders
+    surface = render_frame(prepared(scene, _exact(points))).surface
+    bare = frame_renderer(scene, _WithoutShadows, points=points, pattern="sobol")
     unshadowed = np.asarray(render_frame(bare).surface, dtype=np.float64)[..., 1]
+    # A surface that faces away from the light is in no penumbra.
     reached = unshadowed > 0
     fraction = np.where(reached, surface[..., 1], 0) / np.where(reached, unshadowed, 1)
     return (fraction > 0.02) & (fraction < 0.98)
@@ -188,6 +197,8 @@ def timings(
 def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, dict[str, Any]]:
     """Return R2 and R3 with as many steps as take the time of R4."""
     ms = {name: timing.median_ms for name, timing in times.items()}
+    # The time is linear in the steps: what one more step costs is the difference of R1 and R2 over
+    # that of their steps.
     a_step = max((ms["R1"] - ms["R2"]) / (MANY - STEPS), 1e-6)
     more = {name: round(max(ms["R4"] - ms[name], 0.0) / a_step) for name in ("R2", "R3")}
     return {
@@ -201,13 +212,16 @@ def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
     """
     (light,) = scene.area_lights
     across = light.across / np.linalg.norm(light.across)
+    # The light moves along its first edge, by equal steps.
     path = [
-        replace(scene, area_lights=(replace(light, middle=light.middle + step * _TRAVEL * across),))
-        for step in range(_FRAMES)
+        # five frames; the light goes 0.02 m from one to the next
+        replace(scene, area_lights=(replace(light, middle=light.middle + step * 0.02 * across),))
+        for step in range(5)
     ]
 
     def second_difference(chosen: Configuration) -> float:
         renderer = prepared(scene, chosen)
+        # Frames of one renderer: only the light changes.
         images = [render_frame(replace(renderer, scene=now)) for now in path]
         frames = np.array(
             [(each.airlight + each.surface)[reference.penumbra] for each in images],
@@ -215,6 +229,7 @@ def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
         )
         return float(np.sqrt(np.mean(np.diff(frames, 2, axis=0) ** 2)))
 
+    # A light that moves evenly has a second difference of its own, which the exact sum shows.
     smooth = second_difference(_exact())
     chosen = {
         "R2": RENDERINGS["R2"],

@@ -19,10 +19,6 @@ from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.arrays import Array
 from airlight.validation.properties.view import distance, light_places, lit_points, optical_depths
 
-_GRID = (32, 24)  # rays across and down the image
-_STEPS = 8  # points on each ray
-_COSINES = 4096
-
 #: Names of the properties for readers.
 PROPERTIES: Mapping[str, str] = {
     "lights": "number of lights",
@@ -45,9 +41,12 @@ def scene_properties(scene: Scene) -> dict[str, float]:
     `realtime.scene.read_scene.read_scene` returned it.
     """
     lights, (origin, ends, depth) = light_places(scene), _seen(scene)
-    fraction = (np.arange(_STEPS) + 0.5) / _STEPS
+    # The middles of equal parts of each ray from the camera to its end.
+    steps = 8  # points on each ray
+    fraction = (np.arange(steps) + 0.5) / steps
     points = origin + fraction[:, None] * (ends - origin)[..., None, :]
     kinds = [light.kind for light in lights]
+    # Shapes of area lights are lights, not occluders, and their triangles do not count.
     lamps = {light.name for light in scene.area_lights}
     balls = [(*_ball(each), _extinction(each.medium)) for each in scene.medium.bounded_media]
     meshes = [
@@ -72,13 +71,17 @@ def _seen(scene: Scene) -> tuple[Array, Array, Array]:
 
     Rays that meet nothing end as far away as all lights and bounds lie.
     """
-    grid = min(_GRID[0], scene.camera.width), min(_GRID[1], scene.camera.height)
+    # 32 x 24 rays, or one for each pixel of a smaller image
+    grid = min(32, scene.camera.width), min(24, scene.camera.height)
     camera = read_camera(resized_camera(scene.camera, *grid))
+    # Pixel centres, counted from the middle of the image.
     across = (0.5 * (camera.width - 1) - np.arange(camera.width))[None, :, None] * camera.left
     upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
     directions = camera.forward + across + upwards
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     depth = distance(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
+    # The distances of lights, of the far ends of bounds and of surfaces; a half more is where rays
+    # that meet nothing end.
     far = [
         float(np.linalg.norm(light.place - camera.origin))
         for light in light_places(scene)
@@ -101,6 +104,7 @@ def _extinction(medium: Any) -> Array:
 
 def _mean_cosine(scene: Scene) -> float:
     """Return the mean cosine of the phase function that is farthest from isotropic."""
+    # A scene may have vacuum around bounded media: then only these count.
     media = [bounded.medium for bounded in scene.medium.bounded_media]
     phases = [medium.phase for medium in ([] if scene.medium.clear else [scene.medium]) + media]
     return max((_cosine_of(phase) for phase in phases), key=abs, default=0.0)
@@ -110,8 +114,9 @@ def _cosine_of(phase: Phase) -> float:
     if phase.constant:
         return 0.0
     # Denser forward, where lobes are: cos = 1 - 2 s^3.
-    s = (np.arange(_COSINES) + 0.5) / _COSINES
-    cosine, weight = 1 - 2 * s**3, 6 * s**2 / _COSINES
+    count = 4096
+    s = (np.arange(count) + 0.5) / count
+    cosine, weight = 1 - 2 * s**3, 6 * s**2 / count
     values = np.array(phase.evaluate(mi.Float(cosine)), dtype=np.float64)
     dr.sync_thread()
     return float(np.sum(weight * values * cosine) / np.sum(weight * values))

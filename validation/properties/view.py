@@ -14,8 +14,6 @@ import numpy as np
 from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.arrays import Array, Bools
 
-_BEFORE = 1e-3  # of its way a shadow ray leaves out at either end
-
 
 @dataclass(frozen=True)
 class LightPlace:
@@ -40,6 +38,7 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
     """Return the lights of a scene, area lights last."""
     places: list[LightPlace] = []
     for light in scene.lights:
+        # A directional light has an extent: it is known by the direction that its light comes from.
         if light.extent is not None:
             places.append(LightPlace("directional", -_host(light.axis)))
         elif light.cone is not None:
@@ -54,6 +53,7 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
         else:
             places.append(LightPlace("point", _host(light.position)))
     for wide in scene.area_lights:
+        # Flat lights shine on the side of their normal; spheres and meshes in all directions.
         flat = wide.normal if wide.kind in ("rectangle", "disk") else None
         radius = (
             float(np.linalg.norm(wide.across + wide.up))
@@ -76,6 +76,7 @@ def _rays(origin: Array, direction: Array, longest: Array | None = None) -> Any:
 
 def distance(geometry: Any, origin: Array, direction: Array) -> Array:
     """Return the distance of the nearest surface, infinity where there is none [m]."""
+    # Without shapes there is no surface to meet.
     if not geometry.shapes():
         return np.full(direction.shape[:-1], np.inf)
     hit = geometry.ray_intersect_preliminary(_rays(origin, direction), coherent=True)
@@ -87,13 +88,16 @@ def lit_points(geometry: Any, light: LightPlace, points: Array) -> Bools:
     """Return which points a light reaches, the middle of one with extent; points (..., 3) [m]."""
     unit, distance = light.toward(points)
     lit = np.ones(points.shape[:-1], dtype=bool)
+    # Within a spot's cone, or before a flat light, where the cosine is above 0.
     if light.axis is not None:
         lit &= -(unit @ light.axis) > light.cos_cutoff
     if geometry.shapes():
+        before = 1e-3  # of its way a shadow ray leaves out at either end
+        # A shadow ray ends before the ball around an area light, whose own shape would block it.
         longest = np.where(
-            np.isfinite(distance), distance * (1 - _BEFORE) - light.radius, np.finfo(np.float32).max
+            np.isfinite(distance), distance * (1 - before) - light.radius, np.finfo(np.float32).max
         )
-        start = points + unit * np.where(np.isfinite(distance), distance * _BEFORE, 0.0)[..., None]
+        start = points + unit * np.where(np.isfinite(distance), distance * before, 0.0)[..., None]
         blocked = geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
         lit &= ~np.array(blocked, dtype=bool).reshape(lit.shape)
     return lit
@@ -112,6 +116,8 @@ def optical_depths(
     depth = np.zeros((*length.shape, 3))
     for centre, radius, sigma_t in balls:
         inside = _chord(centre, radius, start, way, length)
+        # The balls are disjoint: the medium between them has what the balls leave of the segment.
+        # Rounding may leave a little less than nothing.
         outside = outside - inside
         depth += inside[..., None] * sigma_t
     return np.asarray(depth + np.maximum(outside, 0)[..., None] * around)
@@ -121,6 +127,8 @@ def _chord(centre: Array, radius: float, start: Array, way: Array, length: Array
     """Return how much of segments lies in a ball, (...,) [m]: from `start` along
     `way`, (..., 3), of a length.
     """
+    # As fractions of the segment: `middle` is the foot of the perpendicular from the centre,
+    # `reach` half of the chord. The chord is cut at both ends of the segment.
     square = np.maximum(length**2, 1e-30)
     from_centre = start - centre
     middle = -np.sum(from_centre * way, axis=-1) / square

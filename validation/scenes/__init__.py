@@ -13,7 +13,7 @@ Read in this order:
 - `engine_fog.py`: the height fog of engines as layers;
 - `height_fog.py`: the volume `heightfog` of Mitsuba: density by height;
 - `random`: scenes drawn from a seed;
-- `numbers.py`: refuses numbers of which no finite image can come;
+- `numbers.py`: refuses numbers that cannot give a finite image;
 - `bodies.py`: refuses bounds of media that are no bodies beside one another;
 - `changes.py`: camera, lights and media of a scene changed by name, isotropic
   media given a mean cosine;

@@ -85,6 +85,9 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
     homogeneous = moved.medium if isinstance(moved.medium, Homogeneous) else None
     if moved.area_lights or ("medium" in moves and homogeneous is None):
         return None
+    # The names follow `validation.scenes.changes`: the first light has no number, the second is
+    # `light-2`. A light at a place (w = 1) has a position and an intensity, a light at infinity an
+    # irradiance; spots and directional lights have an axis.
     changes: dict[str, Any] = {}
     for number, light in enumerate(moved.lights, 1):
         prefix = "light" if number == 1 else f"light-{number}"
@@ -94,6 +97,7 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
         if "colour" in moves:
             changes[f"{prefix}.{'intensity' if light.w else 'irradiance'}"] = light.intensity
     if homogeneous is not None and "medium" in moves:
+        # One value a channel: the extinction of each channel is an array of one element.
         changes["medium.sigma_t"] = [float(own[0]) for own in homogeneous.sigma_t]
     return {
         name: tuple(np.array(value, dtype=np.float64).ravel().tolist())
@@ -108,6 +112,8 @@ def frame_objects(scene: Scene, animation: Animation, frames: int) -> dict[str, 
     objects = _objects(scene, animation)
     matrices: dict[str, tuple[Any, ...]] = {}
     for name, about in {} if objects is None else objects.middles.items():
+        # A turn R about the point m is x -> R x + (m - R m): rotation block first, then the
+        # translation that keeps m where it is.
         own = np.tile(np.eye(4), (frames, 1, 1))
         own[:, :3, :3] = [_turn(scene, number / frames) for number in range(frames)]
         own[:, :3, 3] = about - own[:, :3, :3] @ about
@@ -119,6 +125,8 @@ def _objects(scene: Scene, animation: Animation) -> Objects | None:
     if "objects" not in animation.moves:
         return None
     lamps = {light.name for light in scene.area_lights}
+    # Where no names are given all closed meshes turn, except the shapes of area lights, which
+    # follow their lights.
     closed = closed_shapes(read_occluders(scene.geometry, scene.area_lights))
     names = animation.objects or tuple(name for name in closed if name not in lamps)
     if not names:
@@ -135,11 +143,13 @@ def _turn(scene: Scene, fraction: float) -> Array:
 
 def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
     """Return a function from a fraction of the turn, 0 to 1, to the scene after it."""
+    # The axis and the objects are the same in all frames and are found once.
     about = np.array(animation.about) if animation.about else middle(scene)
     objects = _objects(scene, animation)
 
     def after(fraction: float) -> Scene:
         turn = _turn(scene, fraction)
+        # Each part starts from the scene as it was read, so that frames do not accumulate rounding.
         lights, area_lights, medium = scene.lights, scene.area_lights, scene.medium
         if "light" in animation.moves:
             lights = tuple(turned_light(light, about, turn) for light in lights)
@@ -148,8 +158,10 @@ def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
             lights = tuple(coloured_light(light, fraction) for light in lights)
             area_lights = tuple(coloured_area_light(light, fraction) for light in area_lights)
         if "medium" in animation.moves:
+            # Between half and one and a half times the extinction of the scene.
             medium = thicker_medium(medium, 1 + 0.5 * np.sin(2 * np.pi * fraction))
         moved = replace(scene, lights=lights, medium=medium)
+        # Objects and the shapes of opaque area lights move in the one Mitsuba scene.
         moved = turned_objects(moved, objects, turn) if objects else moved
         return with_area_lights(moved, area_lights)
 
@@ -179,6 +191,8 @@ def middle(scene: Scene) -> Array:
             np.array(box.min, dtype=np.float64).ravel()
             + np.array(box.max, dtype=np.float64).ravel()
         )
+    # Without shapes there is no box: the foot of the perpendicular from the first light to the
+    # camera's axis is in view and at the depth of the light.
     origin, forward = (
         np.array(vector, dtype=np.float64).ravel()
         for vector in (scene.camera.origin, scene.camera.forward)

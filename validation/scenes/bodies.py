@@ -31,9 +31,6 @@ from airlight.reference.scene.shapes import distance_to_triangles
 from airlight.validation.arrays import Array, Index
 
 Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
-# of the length of an edge, and of the weights of a corner: what lies nearer
-# to an end only touches it
-_SIDE = 1e-6
 
 
 def check_bodies(scene: Any) -> None:
@@ -45,6 +42,9 @@ def check_bodies(scene: Any) -> None:
     """
     shapes = [shape for shape in scene.shapes() if _bounds_medium(shape)]
     read = [read_bounds(shape) for shape in shapes]
+    # Spheres and convex meshes are compared pair by pair below. Only meshes that are not convex
+    # need the search for crossing edges, and then all meshes take part, since either of two may be
+    # the one that is not convex.
     if any(bounds is None for bounds, _ in read):
         meshes = {
             shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None
@@ -73,15 +73,20 @@ def _overlap(first: Body, second: Body) -> bool:
     Two meshes that are not both convex are for `_check_crossings` and `_check_nesting`.
     """
     (one, one_mesh), (other, other_mesh) = first, second
+    # Both are spheres or convex meshes: their bounding spheres come first.
     if one is not None and other is not None:
         gap = float(np.linalg.norm(one.centre - other.centre))
         margin = FLAT * min(one.radius, other.radius)
         if gap >= one.radius + other.radius - margin:
             return False
+        # For two spheres the bounding spheres are the bodies themselves.
         if one_mesh is None and other_mesh is None:
             return True
         if one_mesh is not None and other_mesh is not None:
             return _common_sphere(one, other) > margin
+    # A sphere and a mesh of any shape. Apart means that no triangle comes nearer to the centre than
+    # the radius; the centre inside the mesh is the case of a sphere that touches no triangle
+    # because the mesh holds it.
     sphere, mesh = (one, other_mesh) if one_mesh is None else (other, one_mesh)
     if sphere is None or mesh is None or not sphere.is_sphere:
         return False
@@ -95,6 +100,9 @@ def _common_sphere(first: Bounds, second: Bounds) -> float:
     """
     from scipy.optimize import linprog
 
+    # Unknowns are the centre x and the radius t; a point is t inside a half space of unit normal n
+    # if n . x + t <= offset. Minimising -t finds the largest sphere; no solution means no common
+    # point.
     planes = np.concatenate([first.normals, second.normals])
     largest = linprog(
         [0, 0, 0, -1],
@@ -106,13 +114,17 @@ def _common_sphere(first: Bounds, second: Bounds) -> float:
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
-    """Refuse meshes of which a part is inside out, or lies within another."""
+    """Refuse meshes with a part that is inside out, or lies within another part or mesh."""
+    # Every connected part of every mesh is tested against all other parts with one of its vertices:
+    # no edges cross (checked before), so one point decides for the whole part.
     parts = [(number, *part) for number, mesh in enumerate(meshes) for part in _parts(mesh)]
     boxes = [(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for *_, corners, _ in parts]
     for number, (own, first, _, outwards) in enumerate(parts):
         mesh = meshes[own]
         tail, head = mesh.faces[first, :2]
         point = mesh.vertices[tail]
+        # The winding numbers of all other parts about the point, summed over the parts of a mesh.
+        # The bounding boxes save the sum of solid angles for parts far away.
         around: dict[int, int] = {}  # by mesh
         for other, (low, high) in enumerate(boxes):
             if other != number and np.all(point >= low) and np.all(point <= high):
@@ -126,6 +138,7 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
                 f"{mesh.edge_words(tail, head)}; expected faces "
                 "that run counter-clockwise seen from outside, and parts beside one another"
             )
+        # Only the windings of other meshes are left in `around`.
         nesting = [other for other, winding in around.items() if winding]
         if nesting:
             raise InputError(
@@ -142,6 +155,7 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    # Two vertices are connected if an edge of a triangle joins them.
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     graph = coo_array(
         (np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2
@@ -152,6 +166,8 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
     for each in np.unique(own):
         inside = np.flatnonzero(own == each)
         corners = mesh.corners[inside]
+        # Six times the signed volume, about the mean of the corners, where the sum loses fewest
+        # digits. It is positive for faces that run counter-clockwise seen from outside.
         local = corners - corners.mean(axis=(0, 1))
         volume = np.einsum("ij,ij->", local[:, 0], np.cross(local[:, 1], local[:, 2]))
         parts.append((int(inside[0]), corners, bool(volume > 0)))
@@ -159,18 +175,20 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
 
 
 def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
-    """Refuse meshes of which an edge passes through a triangle that it does not touch.
+    """Refuse meshes with an edge that passes through a triangle that it does not touch.
 
-    `meshes`: by the numbers of their shapes, those of the Mitsuba scene `boundary`. Mitsuba finds
+    `meshes`: by the numbers of their shapes in the Mitsuba scene `boundary`. Mitsuba finds
     the triangles, in float32; the crossing is computed again in float64.
     """
     for mesh in meshes.values():
         tail, head = _edges(mesh)
         begin, end = mesh.vertices[tail], mesh.vertices[head]
+        # Candidates come from Mitsuba's float32 rays along the edges; each is decided in float64.
         met, triangle, edge = _met_triangles(boundary, begin, end)
         for number in np.unique(met).tolist():
             against, pairs = meshes[number], np.flatnonzero(met == number)
             at = _piercing(against.corners[triangle[pairs]], begin[edge[pairs]], end[edge[pairs]])
+            # An edge meets the triangles at its own ends; they share a vertex and do not cross.
             if against is mesh:
                 shared = (
                     mesh.faces[triangle[pairs]][:, :, None]
@@ -224,6 +242,8 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
         triangles.append(np.array(hit.prim_index)[valid].astype(np.int64))
         left = left[valid]
         edges.append(left)
+        # The next ray starts a little beyond the hit, by 1e-5 of the edge, so that it does not find
+        # the same triangle again.
         past[left] += np.array(hit.t, dtype=np.float64)[valid] + 1e-5 * length[left]
         left = left[past[left] < length[left]]
     return np.concatenate(shapes), np.concatenate(triangles), np.concatenate(edges)
@@ -233,6 +253,9 @@ def _piercing(corners: Array, begin: Array, end: Array):
     """Return which segments pass through the inside of triangles, by Moeller and
     Trumbore's weights in float64.
     """
+    # Solve begin + fraction along = corner + u first + v second by Cramer's rule; the weights of
+    # the corners are 1 - u - v, u, v. A segment in the plane has no determinant and pierces
+    # nothing.
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     along, offset = end - begin, begin - corners[:, 0]
     across = np.cross(along, second)
@@ -246,4 +269,7 @@ def _piercing(corners: Array, begin: Array, end: Array):
         v = np.einsum("ij,ij->i", along, turned) * inverse
         fraction = np.einsum("ij,ij->i", second, turned) * inverse
         weights = np.stack([u, v, 1 - u - v, fraction, 1 - fraction])
-        return np.all(weights > _SIDE, axis=0) & np.isfinite(inverse)
+        # As a fraction of the edge's length and of the weights of a corner: a crossing nearer to an
+        # end than this only touches.
+        side = 1e-6
+        return np.all(weights > side, axis=0) & np.isfinite(inverse)

@@ -50,11 +50,12 @@ class Changeable:
     least: float
     most: float
     unit: str = ""
-    direction: bool = False  #: of which only the direction matters: not all of it may be 0
+    direction: bool = False  #: only its direction matters: not all of it may be 0
 
 
 def changeable(scene) -> dict[str, Changeable]:
     """Return the changeable parameters of a Mitsuba scene, by name, with their values."""
+    # A scene without a camera has lights and media to change all the same.
     found = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
     for number, emitter in enumerate(scene.emitters(), 1):
         found += _of_light(_numbered("light", number), emitter)
@@ -84,6 +85,7 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     A name that the scene does not have and a value that it cannot have are refused,
     and the scene is as it was.
     """
+    # All values are checked before any is set: a refused change leaves the scene as it was.
     known = changeable(scene)
     wanted = {name: _checked(name, values, known) for name, values in changes.items()}
     camera = {
@@ -91,12 +93,15 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
         for name, values in wanted.items()
         if name.startswith("camera.")
     }
+    # Origin, target and up make one transform: coordinates that are not changed are read from the
+    # camera.
     if camera:
         _change_camera(
             scene.sensors()[0],
             {name: known[f"camera.{name}"].value for name in _AIM} | camera,
             camera,
         )
+    # Changes of one light or medium are made together, since its plugin is updated once.
     for kind, parts, change in (
         ("light", scene.emitters(), _change_light),
         ("medium", _media(scene), _change_medium),
@@ -131,6 +136,8 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
                 else "the scene has no shapes"
             )
             raise InputError(f"objects: got {name!r}, {known}")
+        # A mesh has its vertices in world coordinates and no transform that could be set; the
+        # vertices themselves are moved. Rectangle, disk and sphere have `to_world`.
         matrix = np.array(rows, dtype=np.float64)
         place, vertices, normals = (
             f"{name}.{each}" for each in ("to_world", "vertex_positions", "vertex_normals")
@@ -175,6 +182,8 @@ def _word(value: float) -> str:
     """Return the shortest decimals that are this number in single precision, if
     it is one, or in double.
     """
+    # The shortest decimals of float32 are enough where the value came from float32; otherwise more
+    # digits are needed to read the same double again.
     single = np.float32(value)
     return np.format_float_positional(
         single if float(single) == value else np.float64(value), trim="-"
@@ -194,6 +203,7 @@ def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]
             "point "
             "in each, such as 0.5"
         )
+    # The comparison is written so that NaN fails it.
     numbers = np.array(values, dtype=np.float64)
     if not np.all((numbers >= item.least) & (numbers <= item.most)):
         given = ",".join(f"{value:g}" for value in values)
@@ -234,6 +244,8 @@ def _of_camera(sensor) -> Iterable[Changeable]:
     parameters = mi.traverse(sensor)
     if "x_fov" not in parameters:
         return
+    # The columns of the camera's transform are left, up, forward and origin. A target at a distance
+    # of one metre stands for the direction.
     matrix = matrix_of(sensor.world_transform())
     yield _point("camera.origin", matrix[:3, 3])
     yield _point("camera.target", matrix[:3, 3] + matrix[:3, 2])
@@ -255,6 +267,8 @@ def _looking(like, origin: Values, target: Values, up: Values):
     type of another transform.
     """
     forward = np.subtract(target, origin)
+    # Up and forward must span a plane: else `look_at` divides by zero. 1e-9 is the sine of the
+    # angle between both.
     left = np.cross(up, forward)
     if not np.linalg.norm(left) > 1e-9 * np.linalg.norm(up) * np.linalg.norm(forward):
         raise InputError(
@@ -270,6 +284,8 @@ def _looking(like, origin: Values, target: Values, up: Values):
 def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
     parameters = mi.traverse(emitter)
     kind = emitter.class_name()
+    # A point light keeps its position as a parameter; a spot has it in its transform, with its axis
+    # as the third column.
     if kind == "PointLight":
         yield _point(f"{prefix}.position", np.array(parameters["position"]))
     if kind == "SpotLight":
@@ -280,6 +296,8 @@ def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
         )
     for name, unit in _LIGHTS.items():
         if f"{name}.value" in parameters:
+            # A grey spectrum of one number may be given one number only; an RGB value takes one or
+            # three.
             value = _values(parameters[f"{name}.value"])
             yield Changeable(
                 f"{prefix}.{name}",
@@ -309,6 +327,9 @@ def _shining(emitter, like, changed: Mapping[str, Values]):
     if "position" in changed:
         matrix[:3, 3] = changed["position"]
     if "direction" in changed:
+        # A light's axis is the third column. The two columns across it are arbitrary, but form a
+        # right-handed orthonormal frame; the axis of coordinates least parallel to the light's axis
+        # gives the cross product most digits.
         axis = np.array(changed["direction"]) / np.linalg.norm(changed["direction"])
         across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
         across /= np.linalg.norm(across)
@@ -324,6 +345,8 @@ def _media(scene) -> list[Any]:
     shapes bound, each once.
     """
     media: list[Any] = []
+    # The order makes the names: `medium` is the one around the camera. Grids are left out: they
+    # have no single extinction to change.
     around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
     for medium in around + [shape.interior_medium() for shape in scene.shapes()]:
         if (
@@ -342,6 +365,8 @@ def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
             prefix, {name: _values(parameters[f"sigma_t.{name}"]) for name in NUMBERS}
         )
     else:
+        # Mitsuba's extinction is the product of the colour and `scale`; only the product is
+        # changed.
         sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(
             parameters["scale"]
         )
@@ -350,6 +375,9 @@ def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
     albedo = _values(parameters["albedo.value.value"])
     yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
     if "phase_function.g" in parameters or _is_isotropic(medium):
+        # An isotropic phase function has no parameter g; its mean cosine is 0, and
+        # `scene_with_lobes` can give it another. At |g| = 1 the lobe is a delta function, hence
+        # 0.99.
         g = _values(parameters["phase_function.g"]) if "phase_function.g" in parameters else (0.0,)
         yield Changeable(f"{prefix}.g", g, (1,), -0.99, 0.99)
 
@@ -363,6 +391,8 @@ def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeabl
     for name, value in numbers.items():
         part, layer = name.split("_")
         if layer == "0" or numbers[f"sigma_{layer}"] > (0.0,):
+            # A scale height divides, so it stays above 0; extinctions may be 0, base heights
+            # anything.
             least = {"sigma": 0.0, "z": -LARGEST_LENGTH, "H": 1e-6}[part]
             yield Changeable(
                 f"{prefix}.{name}",
@@ -377,6 +407,7 @@ def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeabl
 def _change_medium(medium, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(medium)
     if "sigma_t" in changed:
+        # The value that is set is the whole extinction: the old scale must not multiply it again.
         parameters["scale"] = 1.0
         _set_colour(parameters, "sigma_t.value.value", changed["sigma_t"])
     for name in NUMBERS:
@@ -423,9 +454,12 @@ def _set_colour(parameters, key: str, values: Values) -> None:
 def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
     """Return the Mitsuba scene of a dictionary, see `give_lobes`."""
     config = mi.parser.ParserConfig(mi.variant())
+    # Merged meshes would lose their names, as in `load_scene`.
     config.merge_meshes = False
     state = mi.parser.parse_dict(config, description)
     give_lobes(state, lobes)
+    # The digest describes the scene with its new phase functions, and is taken before Mitsuba's
+    # transforms rewrite it.
     digest = description_digest(state)
     mi.parser.transform_all(config, state)
     scene = mi.parser.instantiate(config, state)
@@ -461,6 +495,8 @@ def _isotropic_phase(state: Any, name: str) -> Any:
             continue
         for key in medium.keys():  # noqa: SIM118 - properties iterate over pairs
             value = medium[key]
+            # A parsed dictionary refers to plugins by number (resolved) or by id (a `ref`). A `ref`
+            # of an unknown id falls back to the medium itself, which is no phase function.
             if isinstance(value, mi.Properties.ResolvedReference):
                 phase = nodes[value.index()]
             elif isinstance(value, mi.Properties.Reference):

@@ -12,7 +12,6 @@ import numpy as np
 from airlight.validation.arrays import Array
 from airlight.validation.scenes.meshes import Mesh, icosphere
 
-_STEPS = 160  # of the search along a direction
 _BASE = 713.0  # height of the base of the cumulus [m]
 
 
@@ -27,8 +26,12 @@ def _cumulus_distance(points: Array) -> Array:
     """Return about the signed distance [m] from the cumulus, at points, (n, 3) [m]."""
     count = 31
     number = np.arange(count)
+    # A sunflower: with the golden angle 2.39996 and radii as the square root of the number, the
+    # lobes cover the disk evenly.
     fraction = np.sqrt((number + 0.37) / count)
     angle = 2.39996 * number + 0.71
+    # Golden-ratio multiples modulo 1 are spread evenly and follow no order of the radius: heights
+    # look irregular, and no random numbers are needed.
     rank = (0.618034 * number + 0.29) % 1.0
     tower = 1 - fraction**2.3
     centres = np.stack(
@@ -41,6 +44,7 @@ def _cumulus_distance(points: Array) -> Array:
     )
     radii = 89.0 + 83.0 * (1 - fraction) + 47.0 * ((0.754878 * number + 0.13) % 1.0)
     union = lobes(centres, radii, 13.7)(points) + 11.3 - 39.0 * bumps(points, 47.0)
+    # Positive below the base: the maximum with it cuts the lobes off there, with gentle waves.
     base = (
         _BASE
         + 9.7 * np.sin(points[:, 0] / 131.0 + 0.9) * np.sin(points[:, 1] / 113.0)
@@ -58,6 +62,8 @@ def stratocumulus() -> Mesh:
     plane = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((216, 150))], axis=-1).reshape(
         -1, 3
     )
+    # 0 at the border, 1 from 431 m inwards, smooth at both ends (3 r^2 - 2 r^3): top and bottom
+    # meet in a thin upright rim.
     rim = np.minimum(*((half - np.abs(plane[:, axis])) / 431.0 for axis, half in enumerate(halves)))
     rim = np.clip(rim, 0.0, 1.0)
     full = rim * rim * (3 - 2 * rim)
@@ -86,13 +92,17 @@ def star_shaped(
     `reach` [m]. The sphere gives the directions, unit vectors, and the triangles between them.
     """
     directions, faces = sphere
+    # Search inwards from the reach: the first change of sign is the outermost surface.
     radius = np.full(len(directions), reach)
     outside = np.ones(len(directions), dtype=bool)
-    step = reach / _STEPS
+    steps = 160  # of the search along a direction
+    step = reach / steps
     previous = function(centre + reach * directions)
-    for number in range(_STEPS - 1, -1, -1):
+    for number in range(steps - 1, -1, -1):
         value = function(centre + number * step * directions)
         enters = outside & (value < 0)
+        # Linear between the value at this radius (below 0) and the value one step farther out
+        # (above 0).
         fraction = value[enters] / (value[enters] - previous[enters])
         radius[enters] = (number + fraction) * step
         outside &= ~enters
@@ -104,12 +114,13 @@ def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
     """Return the closed surface between two heights, (n, m) [m], over a
     rectangle, upright at its border.
 
-    The lines x, (n,), and y, (m,) [m], ascend, and the top is above the bottom everywhere: 4
-    (n - 1) (m - 1) + 4 (n + m
-    - 2) triangles.
+    The lines x, (n,), and y, (m,) [m], ascend, and the top is above the bottom everywhere. The
+    surface has 4 (n - 1) (m - 1) + 4 (n + m - 2) triangles.
     """
     n, m = len(x), len(y)
     plane = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    # Two sheets of the same n m points, the bottom first; `size` is the offset from one to the
+    # other.
     sheets = [
         np.concatenate([plane, height[..., None]], axis=-1).reshape(-1, 3)
         for height in (bottom, top)
@@ -130,6 +141,8 @@ def between_heights(x: Array, y: Array, bottom: Array, top: Array) -> Mesh:
         ]
     )
     following, size = np.roll(border, -1), n * m
+    # Each edge of the border makes two triangles of the upright wall. The bottom's faces are
+    # reversed so that they face downwards.
     sides = [
         np.stack([border, following, following + size], axis=1),
         np.stack([border, following + size, border + size], axis=1),
@@ -149,6 +162,8 @@ def lobes(centres: Array, radii: Array, blend: float) -> Callable[[Array], Array
         total = np.zeros(len(points))
         for centre, radius in zip(centres, radii, strict=True):
             total += np.exp(
+                # exp(600) is finite in double precision: deep inside a lobe the sum must not
+                # overflow.
                 np.minimum((radius - np.linalg.norm(points - centre, axis=1)) / blend, 600.0)
             )
         return -blend * np.log(np.maximum(total, 1e-300))
@@ -161,6 +176,8 @@ def bumps(points: Array, size: float) -> Array:
     with sharp valleys, 0 to 1.
     """
     turned = points @ _TURN.T / size
+    # Sines of bent coordinates along three directions of no symmetry; their absolute values have
+    # valleys with sharp edges. The small constant rounds these edges by a little.
     waves = np.sin(turned + 1.7 * np.sin(0.61 * turned[:, [1, 2, 0]] + (0.37, 1.91, 4.13)))
     return np.sqrt(np.abs(waves).prod(axis=1) ** (2 / 3) + 1e-3)
 

@@ -26,7 +26,7 @@ from pathlib import Path
 
 LN2 = math.log(2.0)
 _UNREAL = 0.1  # of a density by 1000 per cm, per metre
-_LEAST_DIFFERENCE = 0.01  # between HDRP's heights [m]
+
 
 Layer = tuple[float, float, float]  # extinction [1/m], base [m], scale height [m]
 
@@ -44,6 +44,8 @@ def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...
     values = {
         name: given.get(name, default) for name, default in ENGINES[engine]["parameters"].items()
     }
+    # "needed" stands in the table in place of a default, for parameters that an engine has no
+    # usable default for.
     missing = [name for name, value in values.items() if value == "needed"]
     if missing:
         raise ValueError(
@@ -56,20 +58,25 @@ def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...
                 f"heightfog has meanFreePath = {number['meanFreePath']:g}; expected a length above "
                 "0 m"
             )
-        rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
+        # HDRP keeps its heights 0.01 m apart at least
+        rise = max(number["maximumHeight"] - number["baseHeight"], 0.01)
         return (
+            # exp(-rise/H) = 1/1000 at the maximum height
             (1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),
         ), _is_clamped(engine)
     if engine == "playcanvas":
         return (
             (number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),
         ), _is_clamped(engine)
+    # Unreal's own unit (see the module): the analytic fog has (ln 2)^2, the volumetric one 1/2.
     factor = _UNREAL * (
         0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2
     )
     base, layers = number["FogHeight"], []
     for prefix, offset in (("", 0.0), ("Second", number["SecondFogHeightOffset"])):
         if number[f"{prefix}FogDensity"]:
+            # H = 1/(k ln 2) with k = FogHeightFalloff/1000 per cm, which is FogHeightFalloff/10 per
+            # metre. A density of 0 is Unreal's way to say that there is no second layer.
             scale = 10 / (_above_zero(number, f"{prefix}FogHeightFalloff") * LN2)
             layers.append((factor * number[f"{prefix}FogDensity"], base + offset, scale))
     return tuple(layers), _is_clamped(engine)
@@ -83,6 +90,8 @@ def parameters_of(
         return "it has no fog without a layer"
     if constant:
         return "it has no constant part"
+    # HDRP and PlayCanvas are constant below their bases, the fog of Unreal grows on: layers of the
+    # other kind have no parameters.
     if clamped != _is_clamped(engine):
         return f"its layers {'go on' if clamped else 'are constant'} below their bases"
     if len(layers) > (2 if engine.startswith("unreal") else 1):
@@ -102,6 +111,7 @@ def parameters_of(
         "FogHeightFalloff": 10 / (scale * LN2),
         "FogHeight": base,
     }
+    # The second layer of Unreal has its height relative to the first.
     if len(layers) == 2:
         sigma_t, other, scale = layers[1]
         found["SecondFogDensity"] = sigma_t / factor

@@ -38,8 +38,6 @@ from airlight.reference.scene.transforms import matrix_of
 from airlight.validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
-_WIDE = 1000.0  # half of the least width over the height
-_ABOVE = 1 + 1e-5  # what float32 may add to the largest density
 
 
 def register_height_fog() -> None:
@@ -54,23 +52,31 @@ def _register(variant: str) -> None:
 
         def __init__(self, props):
             given, self._clamped = _given(props)
+            # Mitsuba samples distances within the box of `to_world`: the wide box replaces the one
+            # of the file, which gives floor and cap only.
             floor, cap, up, box = _box(props)
             props["to_world"] = mi.ScalarAffineTransform4d(box)
             mi.Volume.__init__(self, props)
             self._numbers = {name: mi.Float(value) for name, value in given.items()}
             self._ends = {"floor": mi.Float(floor), "cap": mi.Float(cap)}
             self._up = mi.Vector3f(*up)
+            # Opaque numbers are inputs of compiled kernels: a change of the fog compiles nothing
+            # again.
             dr.make_opaque(self._numbers, self._ends, self._up)
             self.parameters_changed()
 
         def parameters_changed(self, keys=()):
             given = {name: float(value[0]) for name, value in self._numbers.items()}
-            self._largest = _ABOVE * _checked_largest(
+            # Delta tracking needs a bound that no evaluation in float32 exceeds.
+            above = 1 + 1e-5  # what float32 may add to the largest density
+            self._largest = above * _checked_largest(
                 given, self._clamped, float(self._ends["floor"][0])
             )
             self._layers = [i for i in "12" if given[f"sigma_{i}"] > 0]
 
         def eval_1(self, it, active=True):
+            # The axis up is an axis of coordinates with a sign, so the dot product is the height
+            # itself, exactly.
             z = dr.dot(mi.Vector3f(it.p), self._up)
             total = self._numbers["sigma_0"]
             for i in self._layers:
@@ -111,6 +117,7 @@ def _given(props: Any) -> tuple[dict[str, float], bool]:
         given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
         return given, bool(props.get("clamped", False))
     engine = str(props["engine"])
+    # A parameter that the engine has but the file does not give keeps the engine's default.
     names = ENGINES[engine]["parameters"] if engine in ENGINES else ()
     layers, clamped = layers_of(
         engine, {name: float(props[name]) for name in names if name in props}
@@ -135,6 +142,8 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
             "heightfog has a to_world without a height; expected its cap above its floor"
         )
     up = matrix[:3, 2] / height
+    # The third column must point along an axis of coordinates, and the other two have no part along
+    # it, to 1e-6: the density depends on one coordinate only.
     axis = int(np.argmax(np.abs(up)))
     level = np.abs(matrix[axis, :2]).max() <= 1e-6 * np.abs(matrix[axis, 2])
     if abs(up[axis]) < 1 - 1e-6 or not level:
@@ -142,10 +151,14 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
             "heightfog has a to_world that is tilted; expected its third axis along x, y or z, the "
             "others level"
         )
+    # Without the rounding of the file's matrix from here on.
     up = np.sign(up) * (np.arange(3) == axis)
     floor = float(up @ matrix[:3, 3])
     middle = matrix[:3, 3] + 0.5 * (matrix[:3, 0] + matrix[:3, 1])
-    half = np.maximum(0.5 * (np.abs(matrix[:3, 0]) + np.abs(matrix[:3, 1])), _WIDE * height)
+    # The fog has no sides: half the width is a thousand heights at least.
+    half = np.maximum(0.5 * (np.abs(matrix[:3, 0]) + np.abs(matrix[:3, 1])), 1000.0 * height)
+    # Along the axis up the box goes from the lower to the upper end, whichever sign the axis has;
+    # across it the box is centred on the file's own.
     low = np.where(up != 0, np.minimum(matrix[:3, 3], matrix[:3, 3] + matrix[:3, 2]), middle - half)
     size = np.where(up != 0, height, 2 * half)
     box = np.diag([*size, 1.0])
@@ -164,8 +177,12 @@ def _checked_largest(given: dict[str, float], clamped: bool, floor: float) -> fl
                 "height above 0"
             )
         if sigma_t:
+            # All layers fall with height, so the density is largest at the floor; clamped layers
+            # are constant below their bases. More than 700 scale heights below the base exp
+            # overflows; the sum is refused at the end.
             above = (max(floor - base, 0.0) if clamped else floor - base) / scale
             total += sigma_t * (math.exp(-above) if above > -700 else math.inf)
+    # Written with `not >= 0` so that NaN is refused too.
     negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not given[name] >= 0]
     if negative:
         raise ValueError(

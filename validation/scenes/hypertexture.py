@@ -23,7 +23,6 @@ from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.scenes.meshes import Mesh
 
 NOISE_BOUND = 0.75**0.5  #: of one octave: half the diagonal of a cell, between its corners' planes
-SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [m]
 
 
 def hypertexture(
@@ -49,15 +48,20 @@ def hypertexture(
     from scipy.ndimage import map_coordinates
 
     low, high = mesh[0].min(axis=0) - margin, mesh[0].max(axis=0) + margin
+    # The distance varies slowly: every second voxel is enough, an eighth of the queries.
     coarse = voxels // 2
     sparse = grid_points(low, high, (coarse,) * 3)
     within = inside(mesh, sparse)
     distance = np.zeros(within.shape)
     distance[within] = distance_into(mesh, sparse[within])
+    # The centres of the fine voxels in coordinates of the coarse grid, whose first centre is 0.
     place = (np.arange(voxels) + 0.5) * (coarse / voxels) - 0.5
     depth = map_coordinates(
         distance, np.meshgrid(place, place, place, indexing="ij"), order=1, mode="nearest"
     )
+    # Noise is needed only where it can change the density: deeper than the last depth plus the
+    # largest noise the density is 1 whatever the noise is. Outside the mesh the depth is 0 and
+    # stays so.
     edge = (depth > 0) & (depth < depths[1] + amplitude)
     depth[edge] += amplitude * octaves(grid_points(low, high, (voxels,) * 3)[edge], cells, 4, seed)
     return sigmoid(depth, *depths).astype(np.float32), low, high
@@ -73,14 +77,18 @@ def gradient_noise(points: Array, seed: int) -> Array:
     offset = points - cell
     low = cell.min(axis=0).astype(np.int64)
     counts = tuple(int(n) for n in cell.max(axis=0).astype(np.int64) - low + 2)
+    # All corners of all cells of the box, one more than cells along each axis.
     lattice = np.stack(np.unravel_index(np.arange(np.prod(counts)), counts), axis=1) + low
     gradients = _gradients(lattice, seed)
     first = np.ravel_multi_index(tuple((cell.astype(np.int64) - low).T), counts)
+    # Perlin's 6 t^5 - 15 t^4 + 10 t^3: its first two derivatives are 0 at both ends.
     fade = offset**3 * (offset * (6 * offset - 15) + 10)
     total = np.zeros(len(points))
     for corner in np.ndindex(2, 2, 2):
         gradient = gradients[first + np.ravel_multi_index(corner, counts)]
         weight = np.where(corner, fade, 1 - fade).prod(axis=1)
+        # Each corner adds the plane through 0 at the corner with its gradient, weighted by the fade
+        # of all three axes.
         total += weight * np.einsum("ij,ij->i", gradient, offset - corner)
     return total
 
@@ -95,6 +103,7 @@ def octaves(points: Array, size: float, count: int, seed: int) -> Array:
     total = np.zeros(len(points))
     for octave, weight in enumerate(weights):
         total += weight * gradient_noise(points * (2**octave / size), seed + octave)
+    # The largest possible sum is scaled to 1; seeds of octaves differ so that they are not copies.
     return total / (weights.sum() * NOISE_BOUND)
 
 
@@ -126,14 +135,20 @@ def inside(mesh: Mesh, points: Array) -> Bools:
     # Columns may lie on edges of a regular mesh: a little beside it they meet
     # one face, not two or none.
     x, y = x + 1e-7 * (x[1] - x[0]), y + 1.7e-7 * (y[1] - y[0])
+    # The columns of the lattice whose x and y lie within the bounding rectangle of each triangle:
+    # `_low` is the first of them, `_high` the one after the last.
     ends = [np.searchsorted(own, corners[:, :, axis]) for axis, own in enumerate((x, y))]
     (x_low, x_high), (y_low, y_high) = ((end.min(axis=1), end.max(axis=1)) for end in ends)
     triangle = np.repeat(np.arange(len(faces)), (x_high - x_low) * (y_high - y_low))
+    # One entry for each pair of a triangle and a column of its rectangle; `number` counts the pairs
+    # within a triangle, row by row.
     number = np.arange(len(triangle)) - np.searchsorted(triangle, triangle)
     column = x_low[triangle] + number % np.maximum(x_high - x_low, 1)[triangle]
     row = y_low[triangle] + number // np.maximum(x_high - x_low, 1)[triangle]
     place = np.stack([x[column], y[row]], axis=1)
     a, b, c = (corners[triangle, corner] for corner in range(3))
+    # Barycentric weights: a column passes through the triangle if the three areas have one sign,
+    # and they weight the corners' heights at the crossing.
     areas = [
         _twice_area(first[:, :2], second[:, :2], place)
         for first, second in ((b, c), (c, a), (a, b))
@@ -152,21 +167,25 @@ def inside(mesh: Mesh, points: Array) -> Bools:
     np.add.at(
         leaves, (below, row[crosses], column[crosses]), np.sign(whole[crosses]).astype(np.int64)
     )
+    # Summed from the top: at a voxel the sum is the number of exits above it minus the number of
+    # entries, which is 1 inside and 0 outside.
     return np.asarray(leaves[::-1].cumsum(axis=0)[::-1][1:] > 0)
 
 
 def distance_into(mesh: Mesh, points: Array) -> Array:
     """Return the distance of points, (n, 3) [m], from a mesh, (n,) [m].
 
-    It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too
-    long at a depth of 40 m.
+    It is the distance of the nearest of points on the mesh, 11 m apart at most: 0.5 m too long at a
+    depth of 40 m.
     """
     from scipy.spatial import cKDTree
 
     vertices, faces = mesh
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.ceil(longest / SAMPLING).astype(np.int64)
+    # Triangles with long edges get a finer lattice of points: edges are cut into `count` parts,
+    # each shorter than 11 m.
+    parts = np.ceil(longest / 11.0).astype(np.int64)
     samples = []
     for count in np.unique(parts):
         i, j = (
@@ -183,11 +202,14 @@ def _gradients(cell: Index, seed: int) -> Array:
     2020, in wrapping integers.
     """
     v = (cell + np.array([seed, 3 * seed + 1, 7 * seed + 5])).astype(np.uint32)
+    # The hash: a linear congruential step, then two rounds that mix the three coordinates.
     v = v * np.uint32(1664525) + np.uint32(1013904223)
     for _ in range(2):
         for axis in range(3):
             v[:, axis] += v[:, (axis + 1) % 3] * v[:, (axis + 2) % 3]
         v ^= v >> np.uint32(16)
+    # Uniform on the sphere: height and azimuth are uniform (Archimedes). 2^-31 takes 32 bits to the
+    # range from 0 to 2.
     height = (v[:, 0] + 0.5) * 2.0**-31 - 1
     angle = v[:, 1] * (2.0**-31 * np.pi)
     across = np.sqrt(1 - height**2)

@@ -59,7 +59,10 @@ def load_scene(
     record = find_record(name_or_path)
     path = Path()
     if record is not None:
+        # Not optimised: merged shapes would lose their names.
         built = mi.load_dict(record.build(), optimize=False)
+        # Where Mitsuba does not tell every property of a built scene, the name and the digest of
+        # the code that builds it are its identity.
         if record.digest and not is_whole(built):
             give_description(
                 built, f"{record.name} {source_digest('airlight.validation.scenes.registry')}"
@@ -72,6 +75,8 @@ def load_scene(
         loaded = LoadedScene(
             path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
         )
+    # The g of an isotropic medium has no parameter to set: such a scene is built again with phase
+    # functions of another type.
     isotropic = isotropic_media(loaded.scene) if changes else {}
     lobes = {
         isotropic[name]: value[0]
@@ -86,6 +91,7 @@ def load_scene(
         loaded = replace(loaded, scene=scene)
     if size is not None:
         resize(loaded.scene, size)
+    # After the size: a size that is given removes a crop, or a film that is too large.
     _check_films(loaded)
     if changes:
         change_scene(loaded.scene, changes)
@@ -122,6 +128,8 @@ def scene_identity(scene: str) -> str:
     if is_random(scene):
         seed, ranges = random_parts(scene)
         meshes = read_ranges(ranges)["meshes"] if ranges else ""
+        # A random scene depends on the default ranges, a user's ranges and the meshes that these
+        # name.
         files = [
             RANGES,
             *([ranges] if ranges else []),
@@ -163,6 +171,8 @@ def _existing(name_or_path: str) -> Path:
         )
     if path.is_file():
         return path
+    # A name with an extension or a separator was meant as a path; anything else as a name, whose
+    # spelling the message then helps with.
     looks_like_path = path.suffix or os.sep in name_or_path
     if looks_like_path:
         raise InputError(
@@ -223,6 +233,8 @@ def name_shapes(scene) -> None:
     taken = {shape.id() for shape in scene.shapes()}
     for number, shape in enumerate(scene.shapes(), 1):
         if not shape.id():
+            # A name may already be taken by a shape of the file: the number of shapes makes it
+            # differ.
             name = f"{shape.class_name().lower()}-{number}"
             shape.set_id(name if name not in taken else f"{name}-{len(taken)}")
 

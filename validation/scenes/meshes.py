@@ -24,6 +24,7 @@ def rotation(axis: ArrayLike, degrees: float) -> Array:
     angle [degrees] (Rodrigues).
     """
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    # skew @ v is the cross product of the axis with v.
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.deg2rad(degrees)
     return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
@@ -77,6 +78,8 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
     i = np.arange(sides)
     j = (i + 1) % sides
     faces = []
+    # Between neighbouring rings each quad is cut into two triangles; the modulo leads from the last
+    # ring to the first in a ring of rings.
     for ring in range(count if ring_of_rings else count - 1):
         low, high = ring * sides, (ring + 1) % count * sides
         faces += [
@@ -85,6 +88,8 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
         ]
     vertices = rings.reshape(-1, 3)
     if not ring_of_rings:
+        # The centres of the fans are two more vertices, after those of the rings. The lower fan
+        # runs against the ring, so that it faces downwards.
         first, last, end = count * sides, count * sides + 1, (count - 1) * sides
         faces += [
             np.stack([np.full(sides, first), j, i], axis=1),
@@ -110,6 +115,8 @@ def grid(
         + v.reshape(-1, 1) * np.asarray(up)
     )
     i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    # The four corners of each cell, counter-clockwise seen from the side of the normal: vertices
+    # are numbered along `up` first.
     a, b, c, d = (
         i * (m + 1) + j,
         (i + 1) * (m + 1) + j,
@@ -160,6 +167,7 @@ def icosphere(levels: int) -> Mesh:
         [t if np.linalg.det(vertices[list(t)]) > 0 else (t[0], t[2], t[1]) for t in triples]
     )
     vertices = vertices / np.linalg.norm(vertices[0])
+    # Only the midpoints are new; they are moved out to the unit sphere.
     for _ in range(levels):
         known = len(vertices)
         vertices, faces = divided((vertices, faces))
@@ -172,6 +180,7 @@ def divided(mesh: Mesh) -> Mesh:
     vertices that were there.
     """
     vertices, faces = mesh
+    # Each edge with its lower vertex first: both triangles of an edge then share one midpoint.
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     unique, number = np.unique(edges, axis=0, return_inverse=True)
     ab, bc, ca = (number.reshape(-1, 3) + len(vertices)).T
@@ -190,10 +199,12 @@ def gem(sides: int, rings: int) -> Mesh:
     polar = np.pi * (1 - np.arange(1, rings + 1) / (rings + 1))
     i = np.arange(sides)
     j = (i + 1) % sides
+    # Every ring is turned by half a side against the one below.
     angle = 2 * np.pi * (i + 0.5 * np.arange(rings)[:, None]) / sides
     height = np.broadcast_to(np.cos(polar)[:, None], angle.shape)
     points = np.stack([np.cos(angle), np.sin(angle), height], axis=2)
     points[:, :, :2] *= np.sin(polar)[:, None, None]
+    # The south pole is vertex rings * sides, the north pole the one after it.
     faces = [np.stack([np.full(sides, rings * sides), j, i], axis=1)]
     for low in range(0, (rings - 1) * sides, sides):
         high = low + sides
@@ -263,6 +274,7 @@ def gable(
     """
     vertices, faces = grid(corner, across, up, cells)
     apex = np.asarray(corner) + 0.5 * np.asarray(across) + 1.5 * np.asarray(up)
+    # The vertices of the upper edge of the wall; the fan joins them to the apex.
     eaves = np.arange(cells[0] + 1) * (cells[1] + 1) + cells[1]
     fan = np.stack([eaves[:-1], eaves[1:], np.full(cells[0], len(vertices))], axis=1)
     return np.concatenate([vertices, [apex]]), np.concatenate([faces, fan])
@@ -290,12 +302,14 @@ def pierced(
     width, height = np.linalg.norm(right), np.linalg.norm(above)
     # Each ray from the centre ends at the side that it meets first; the ray nearest to a
     # corner ends at the corner.
+    # Directions from the centre of the hole, half a cell off `across`, so that no sine is 0.
     x, y = np.cos(angle), np.sin(angle)
     sideways = np.where(x > 0, 1 - u, u) * width / np.abs(x)
     upwards = np.where(y > 0, 1 - v, v) * height / np.abs(y)
     border = np.minimum(sideways, upwards)[:, None] * np.stack([x, y], axis=1)
     for end in np.array([[-u, -v], [1 - u, -v], [1 - u, 1 - v], [-u, 1 - v]]) * (width, height):
         border[np.argmax((x * end[0] + y * end[1]) / np.linalg.norm(end))] = end
+    # Rings of points go from the hole (0) to the border (1).
     fraction = np.arange(cells[1] + 1)[:, None, None] / cells[1]
     offset = (1 - fraction) * radius * np.stack([x, y], axis=1) + fraction * border
     points = (
@@ -323,6 +337,8 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
     even number of each, (n,) [m]; its thickness is towards -x [m].
     """
     n, m = len(along) - 1, len(up) - 1
+    # Two layers of the same lattice of points: front at x = corner[0], back at a distance of the
+    # thickness.
     y, z = np.meshgrid(along, up, indexing="ij")
     plane = np.stack([np.zeros(y.size), y.ravel(), z.ravel()], axis=1)
     vertices = np.concatenate([plane, plane - [thickness, 0, 0]]) + np.asarray(corner)
@@ -332,12 +348,14 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
         return 0 <= i < n and 0 <= j < m and not (i % 2 and j % 2)
 
     def at(i: int, j: int, layer: int) -> int:
+        # The number of a point of the lattice in the front (0) or back (1) layer.
         return layer * (n + 1) * (m + 1) + i * (m + 1) + j
 
     for i in range(n):
         for j in range(m):
             if not solid(i, j):
                 continue
+            # The front face, and the back face in the opposite order so that it faces away.
             ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
             quads.append([at(*point, 0) for point in ring])
             quads.append([at(*point, 1) for point in reversed(ring)])
@@ -399,6 +417,7 @@ def faceted_sphere(radius: float, rings: int, sides: int, toward: Sequence[float
     """
     polar = np.pi * (1 - (np.arange(rings) + 0.5) / rings)
     axis = np.asarray(toward) / np.linalg.norm(toward)
+    # Any vector across the axis: the sphere looks the same up to a turn about it.
     side = np.cross(axis, (1.0, 0.0, 0.0))
     side = side / np.linalg.norm(side)
     sphere = lathe(radius * np.sin(polar), radius * np.cos(polar), sides)
@@ -422,6 +441,8 @@ def fluted_column(
     level = np.linspace(0.0, 1.0, rings)
     widened = foot[0] * np.exp(-level / foot[1]) + head[0] * np.exp(-(1 - level) / head[1])
     vertices, faces = lathe(radius * (1 - taper * level) + widened, height * level, sides)
+    # The radius is reduced where the cosine is positive: twelve flutes around. The last two entries
+    # are the centres of the fans, which stay.
     fluted = 1 - flutes * (np.cos(12 * 2 * np.pi * np.arange(sides) / sides) > 0)
     scale = np.concatenate([np.tile(fluted, rings), [1.0, 1.0]])
     return vertices * np.stack([scale, scale, np.ones_like(scale)], axis=1), faces
@@ -433,10 +454,13 @@ def statue(fold: float) -> Mesh:
     """
     level = np.linspace(0.0, 1.0, 32)[:, None]
     angle = 2 * np.pi * np.arange(56)[None] / 56
+    # Radii [m] at fractions of the height: a plinth up to 0.2, the figure above it.
     stops = [0, 0.2, 0.21, 0.3, 0.55, 0.62, 0.79, 0.83, 0.86, 0.93, 0.98, 1]
     outline = np.interp(
         level, stops, [0.37, 0.37, 0.29, 0.31, 0.19, 0.2, 0.27, 0.11, 0.08, 0.13, 0.1, 0.03]
     )
+    # The folds begin above the plinth and end below the shoulders, where the figure is flatter
+    # along y.
     draped = np.clip((level - 0.21) / 0.1, 0, 1) * np.clip((0.8 - level) / 0.2, 0, 1)
     folds = 1 + 0.13 * draped * np.cos(7 * angle + 5.3 * level + fold)
     radius = outline * folds * (1 - 0.23 * draped * np.sin(angle) ** 2)
@@ -460,13 +484,18 @@ def knot(
     t = 2 * np.pi * np.arange(rings)[:, None] / rings
     a = 2 * np.pi * np.arange(sides)[None] / sides
     zero = np.zeros_like(t)
+    # At the angle `about` t around the axis: away from the axis, and along the circle.
     outwards = np.stack([np.cos(about * t), np.sin(about * t), zero], axis=2)
     onwards = np.stack([-np.sin(about * t), np.cos(about * t), zero], axis=2)
     up = np.array([0.0, 0.0, 1.0])
     cos, sin = np.cos(across * t)[:, :, None], np.sin(across * t)[:, :, None]
+    # The normal of the torus at the point of the curve, the tangent of the curve, and the third
+    # vector of the frame, which lies in the torus.
     normal = cos * outwards + sin * up
     tangent = (radius + core * cos) * about * onwards + core * across * (cos * up - sin * outwards)
     side = np.cross(tangent / np.linalg.norm(tangent, axis=2, keepdims=True), normal)
+    # Thickness along the tube and ridges around it; all factors stay above 0, so the section is a
+    # star.
     swelling = 1 + 0.37 * np.sin((across + 4) * t + 0.7) + 0.19 * np.sin((3 * about + 7) * t + 1.9)
     ridges = 1 + 0.21 * np.cos(3 * a + (about + across) * t) + 0.13 * np.cos(2 * a - 5 * t + 0.9)
     section = (thickness * swelling * ridges)[:, :, None]

@@ -25,11 +25,9 @@ _LIGHT = ("intensity", "irradiance", "radiance")
 _NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
 _PLACES = ("z_1", "z_2", "floor", "cap", "up")  # of height fog
 _CUTOFF = "cutoff_angle"  # of spots, half of the cone [degrees]
-_LARGEST_ALBEDO = 1 + 1e-6  # rounding
+
 _CLIP = ("near_clip", "far_clip")  # no method takes them, see `validation.scenes.files.camera`
 _NO_MATTER = ("vertex_texcoords",)
-_LEAST_SCALE = 1e-15  # of an axis of a transform [m]
-_FLATTEST = 1e-9  # of one axis beside another
 
 
 def check_numbers(scene: Any) -> None:
@@ -53,6 +51,7 @@ def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
     """Yield the parts of a scene under names that a user knows; media first, which
     are parts of others too.
     """
+    # Media are checked under their own names before the shapes and cameras that hold them.
     media = [sensor.get_medium() for sensor in scene.sensors()]
     for shape in scene.shapes():
         media += [shape.interior_medium(), shape.exterior_medium()]
@@ -105,17 +104,21 @@ def _check(name: str, key: str, values: Array) -> None:
             "90: a wider light is "
             "a 'point' light"
         )
+    # The limit depends on the quantity: lights to 1e18, lengths and extinctions to 1e9, clip planes
+    # unlimited, since no method reads them.
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
     if "albedo" in words:
-        largest = _LARGEST_ALBEDO
+        largest = 1 + 1e-6  # an albedo of 1 with its rounding
     least = (
         0.0
         if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES
         else -largest
     )
+    # The comparison is negated so that NaN counts as wrong.
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
+        # The message names the number of bad places: a mesh has thousands of coordinates.
         way = (
             "a medium scatters no more than arrives"
             if "albedo" in words
@@ -133,12 +136,15 @@ def _check(name: str, key: str, values: Array) -> None:
 
 
 def _check_transform(name: str, key: str, matrix: Array) -> None:
+    # Singular values are the half axes of the ellipsoid that the transform makes of the unit ball.
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    if scale[-1] < _LEAST_SCALE or scale[-1] < _FLATTEST * scale[0]:
+    least = 1e-15  # of an axis of a transform [m]
+    flattest = 1e-9  # of one axis beside another
+    if scale[-1] < least or scale[-1] < flattest * scale[0]:
         raise InputError(
             f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; "
             "expected at least "
-            f"{_LEAST_SCALE:g} m, and {_FLATTEST:g} of the other: give it a size"
+            f"{least:g} m, and {flattest:g} of the other: give it a size"
         )
 
 

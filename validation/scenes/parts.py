@@ -34,6 +34,7 @@ def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
 
     Media are dictionaries or Mitsuba's own.
     """
+    # A medium of a dictionary gets an id, so that messages and changes can name it.
     inside = medium | {"id": f"{name}-medium"} if isinstance(medium, dict) else medium
     outside = {} if around is None else {"exterior": around}
     return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": inside} | outside)
@@ -45,6 +46,7 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
         properties[key] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
+    # Aligned arrays: kernels are compiled for the alignment of what they read.
     parameters = mi.traverse(result)
     parameters["vertex_positions"] = aligned_array(mi.Float, vertices.astype(np.float32).ravel())
     parameters["faces"] = aligned_array(mi.UInt32, faces.astype(np.uint32).ravel())
@@ -91,6 +93,7 @@ def height_fog(
         for i, layer in enumerate(layers, 1)
         for name, value in zip(("sigma", "z", "H"), layer)
     }
+    # Only the height of the box counts: the volume widens it.
     box = mi.ScalarTransform4f().translate([0, 0, floor]).scale([1, 1, cap - floor])
     return {
         "type": "heterogeneous",
@@ -128,14 +131,19 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
         raise InputError(f"the table of '{words}' has {values} values; expected at least 2")
     phase = phase_from_words(words)
     nodes, weights = np.polynomial.legendre.leggauss(32)
+    # Gauss-Legendre nodes within each cell between two cosines. Each value is the integral of the
+    # function times its hat: rising over the cell before, falling over the cell after.
     t = 0.5 * (nodes + 1)
     cell = np.arange(values - 1)[:, None]
+    # (1 + cos)/2 and (1 - cos)/2 are each computed without cancellation: a narrow peak needs the
+    # digits of 1 - cos near the forward direction.
     up = (cell + t) / (values - 1)  # (1 + cos)/2
     down = (values - 2 - cell + (1 - t)) / (values - 1)
     p = phase.from_half(down, up)
     hats = np.zeros(values)
     hats[:-1] += 0.5 * p @ (weights * (1 - t))
     hats[1:] += 0.5 * p @ (weights * t)
+    # The hats at both ends have one side only, half the area.
     hats[[0, -1]] *= 2
     return {"type": "tabphase", "values": ", ".join(repr(float(value)) for value in hats)}
 

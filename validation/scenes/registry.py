@@ -68,8 +68,7 @@ FILES = tuple(
 
 Table = dict[str, Any]
 
-# values of a tabulated phase function: glory and fogbow are blurred by less than 0.1 degrees
-_DROPLETS = 20001
+
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
 _PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
 MESHES: dict[str, Callable[..., Mesh]] = {
@@ -113,7 +112,7 @@ class SceneRecord:
         False
     )
     digest: str = ""  #: of its description
-    many: bool = False  #: whether it has many lights, of which methods are to choose
+    many: bool = False  #: whether it has many lights, among which methods choose
 
 
 def read_scenes(path: Path) -> dict[str, SceneRecord]:
@@ -128,6 +127,7 @@ def _record(name: str, table: Table) -> SceneRecord:
     )
     digest = hashlib.sha256(json.dumps(table).encode()).hexdigest()
     words = table["purpose"], table["published"]
+    # Layers and smoke have no single extinction; neither belongs to `FOG_SCENES`.
     varying = bool({"layers", "smoke"} & set(table.get("fog", {})))
     many = any("swarm" in each for each in table["lights"])
     return SceneRecord(
@@ -144,6 +144,7 @@ def _record(name: str, table: Table) -> SceneRecord:
 
 def _build(table: Table) -> dict[str, Any]:
     scene: dict[str, Any] = {"type": "scene"}
+    # The medium comes first: the camera and boundaries refer to it by its id 'fog'.
     if "fog" in table:
         scene["fog"] = _medium(table["fog"])
     scene["sensor"] = camera(**table["camera"], size=(800, 600), in_fog="fog" in table)
@@ -162,13 +163,15 @@ def _build(table: Table) -> dict[str, Any]:
 
 
 def _lights(entries: Iterable[Table]) -> Iterator[Table]:
-    """Yield lights one by one, those of a swarm by their numbers."""
+    """Yield lights one by one, the lights of a swarm with numbers in their names."""
     for entry in entries:
         if "swarm" not in entry:
             yield entry
             continue
         own = dict(entry)
         swarm = own.pop("swarm")
+        # Seeded: the swarm is the same on every machine, as a file with every light written out
+        # would be.
         rng = np.random.default_rng(swarm["seed"])
         places = rng.uniform(swarm["low"], swarm["high"], (swarm["count"], 3))
         colours = np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * own["colour"]
@@ -183,6 +186,8 @@ def copies(entries: Iterable[Table]) -> Iterator[Table]:
     for entry in entries:
         step = entry.get("step", {})
         for number in range(entry.get("copies", 1)):
+            # With `of` all shapes of the list are copied together, and the table around them says
+            # only how.
             for each in entry.get("of", [entry]):
                 copy = {
                     key: _plus(value, step.get(key), number)
@@ -206,6 +211,8 @@ def _seed(entry: Table, number: int) -> Table:
     """Return place, kind, size, turn and colour of a seed of a sunflower, a
     spiral that is a little flat.
     """
+    # Vogel's spiral: the golden angle of 137.50776 degrees and radii as the square root of the
+    # number.
     distance, angle = 0.419 * math.sqrt(number + 2.3), math.radians(137.50776 * number + 21.7)
     x, y, z = entry["at"]
     return {
@@ -222,11 +229,14 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
     if "parts" in entry:
         mesh = joined([mesh_of(part, kinds) for part in copies(entry["parts"])])
     else:
+        # Keys that place a mesh are used below; all other keys are arguments of the function that
+        # makes it.
         name, given = (
             entry["mesh"],
             {key: value for key, value in entry.items() if key not in _PLACING},
         )
         mesh = mesh_of({**kinds[name], **given}, {}) if name in kinds else MESHES[name](**given)
+    # In this order: waves bend the mesh about its own origin, then come scale, turn and place.
     if "waves" in entry:
         mesh = bent(mesh[0], entry["waves"]), mesh[1]
     x, y, z = entry.get("at", (0.0, 0.0, 0.0))
@@ -245,7 +255,9 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
 
 
 def _medium(table: Table, shape: str = "") -> dict[str, Any]:
-    phase = phase_function(table.get("phase", "isotropic"), _DROPLETS)
+    # 20001 values of a tabulated phase function: glory and fogbow are blurred by less than 0.1
+    # degrees.
+    phase = phase_function(table.get("phase", "isotropic"), 20001)
     if "layers" in table:
         register_height_fog()
         return height_fog(
@@ -262,6 +274,8 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
         density, low, high = _density(shape, json.dumps(table["density"]))
     else:
         return medium
+    # A grid volume of Mitsuba fills the unit cube: `to_world` takes the cube to the corners of the
+    # voxels.
     box = mi.ScalarTransform4f().translate(low.tolist()).scale((high - low).tolist())
     grid = {"type": "gridvolume", "grid": mi.VolumeGrid(density[..., None]), "to_world": box}
     return medium | {"type": "heterogeneous", "sigma_t": grid}
@@ -274,7 +288,7 @@ def _density(mesh: str, given: str) -> Any:
     return hypertexture(MESHES[mesh](), **json.loads(given))
 
 
-#: The built-in scenes by name, and those of homogeneous fog with few lights.
+#: The built-in scenes by name; `FOG_SCENES` are the scenes of homogeneous fog with few lights.
 SCENES = {name: record for path in FILES for name, record in read_scenes(path).items()}
 FOG_SCENES = {
     name: record

@@ -11,7 +11,7 @@
 Each number of `error` and `standard_error` is the error of the same number of the light.
 
 The computation runs twice, the second time with three quarters of the streams and two nodes fewer
-in each panel of depth. The change is the error that is printed: it is that of the coarser run, so
+in each panel of depth. The change is the error that is printed. It belongs to the coarser run, so
 the printed numbers are better.
 
 Definitions: order n is light that was scattered n times. Lengths are in mean free paths.
@@ -42,15 +42,11 @@ from airlight.validation.slab.request import SlabRequest
 # light through a plane: amount, mean and rms displacement
 Exit = tuple[float | None, float | None, float | None]
 
-#: Streams in each hemisphere: the first of these that leaves less than `_RESOLVED` of the
-#: phase function to the peak.
+#: Streams in each hemisphere: the first of these that leaves less than 1e-4 of the phase function
+#: to the peak.
 STREAMS = (64, 96, 128)
-_RESOLVED = 1e-4
-_NODES = 8
 #: Keys of a row that identify it and are no numbers of the light.
 _GIVEN = ("orders", "depth", "mu", "phi")
-#: A scattering of a photon [s], measured on one thread of an AMD EPYC.
-_SCATTERING = 0.4e-6
 
 
 def slab_numbers(
@@ -62,9 +58,11 @@ def slab_numbers(
     tell = progress or (lambda fraction, what: None)
     tell(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
+    # The second run is coarser, and its change is the error of the first.
+    nodes = 8
     numbers, others = (
-        _numbers(request, streams, _NODES),
-        _numbers(request, 3 * streams // 4, _NODES - 2),
+        _numbers(request, streams, nodes),
+        _numbers(request, 3 * streams // 4, nodes - 2),
     )
     record: dict[str, Any] = {
         **{name: getattr(request, name) for name in ("tau", "sun", "albedo")},
@@ -74,6 +72,7 @@ def slab_numbers(
         "photons": None,
     }
     if photons:
+        # Photons are the other side: another code, with the errors of samples.
         slab = Slab(
             request.tau, request.mu0, request.albedo, request.phase.sampled(), request.depths
         )
@@ -91,14 +90,18 @@ def slab_numbers(
 
 def expected_seconds(request: SlabRequest, photons: int) -> float:
     """Return about how long photons take on one thread [s]."""
+    # A photon scatters about 3 + 2 tau times before it leaves, unless it is absorbed before.
     scatterings = min(3 + 2 * request.tau, 30 / max(1 - request.albedo, 1e-9))
-    return photons * scatterings * _SCATTERING
+    # A scattering of a photon takes 0.4e-6 s, measured on one thread of an AMD EPYC.
+    return photons * scatterings * 0.4e-6
 
 
 def needed_streams(phase: SlabPhase) -> int:
     """Return how many streams in each hemisphere a phase function needs."""
+    # N streams in each hemisphere resolve 2 N moments of the phase function; the next moment is the
+    # fraction that is left to the peak.
     moments = np.abs(phase.moments(2 * STREAMS[-1] + 1))
-    return next((count for count in STREAMS if moments[2 * count] < _RESOLVED), STREAMS[-1])
+    return next((count for count in STREAMS if moments[2 * count] < 1e-4), STREAMS[-1])
 
 
 def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
@@ -106,6 +109,7 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
     effort: dict[str, Any] = {"depths": request.depths, "streams": streams, "nodes": nodes}
     slab = SlabOrders(*given, **effort)
     chosen, total = order_sets(slab, request.ranges)
+    # The panels of depth end at the depths that were asked for; the nearest edge is the one.
     places = [int(np.argmin(np.abs(slab.panels.edges - depth))) for depth in request.depths]
     orders = [
         _order_row(
@@ -119,6 +123,7 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
     ]
     radiance: list[dict[str, float]] = []
     if request.depths and request.directions:
+        # `slab_radiance` is for unit flux across the beam; pi times it is for a flux of pi.
         azimuths = [(mu, math.radians(phi)) for mu, phi in request.directions]
         values = np.pi * slab_radiance(*given, directions=azimuths, **effort)
         radiance = [
@@ -126,7 +131,9 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
             for depth, row in zip(request.depths, values, strict=True)
             for (mu, phi), value in zip(request.directions, row, strict=True)
         ]
+    # Light that was never scattered leaves at the lower face, too.
     direct = math.exp(-request.tau / request.mu0)
+    # Fluxes of unit flux across the beam over mu0 are fractions of the flux that enters the slab.
     whole = {
         "reflectance": float(total[UP, 0, 0]) / request.mu0,
         "transmittance": float(total[DOWN, 0, -1]) / request.mu0 + direct,
@@ -145,6 +152,7 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
 
 def _exit(moments: Array, unit: float) -> Exit:
     amount, first, second = (float(moment) for moment in moments)
+    # The mean place of no light is not known.
     if amount <= 0.0:
         return 0.0, None, None
     return amount / unit, first / amount, math.sqrt(max(second / amount, 0.0))
@@ -195,6 +203,7 @@ def _order_row(
 
 def _differences(numbers: Any, others: Any) -> Any:
     """Return the same structure with the differences of its numbers; what a row is of stays."""
+    # Keys that identify a row stay; all else is compared, entry by entry.
     if isinstance(numbers, Mapping):
         return {
             name: value

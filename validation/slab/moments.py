@@ -78,8 +78,11 @@ class SlabOrders:
     ):
         self.mu0 = mu0
         self.streams: Streams = double_gauss(streams)
+        # Light along the flattest stream changes most with depth: the panels are as thin as it
+        # needs.
         narrowest = min(float(self.streams.mu[0]), mu0) / 2
         self.panels: DepthPanels = depth_panels(tau, narrowest, depths=depths, count=nodes)
+        # The beam is a stream of its own, the last, and travels downwards.
         mu = np.append(self.streams.mu, -mu0)
         self._transport = Transport(self.panels, mu)
         self._sines = np.sqrt((1 - mu) * (1 + mu))
@@ -93,9 +96,11 @@ class SlabOrders:
         mu, weights, albedo, moments = self.streams.mu, self.streams.weights, self.albedo, self.kept
         matrix = np.zeros((mu.size + 1, mu.size + 1))
         matrix[:-1, :-1] = albedo / 2 * mode_kernel(m, moments, mu, mu) * weights
+        # From the beam to the streams; nothing but the peak is scattered into the beam.
         matrix[:-1, -1] = (
             albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
         )
+        # Light scattered into the peak goes straight on, in every stream.
         return matrix + albedo * self.peak * np.eye(mu.size + 1)
 
     def beam(self) -> Array:
@@ -123,6 +128,8 @@ class SlabOrders:
         the way, and its moments.
         """
         light, lengths = np.empty_like(sources), self._sines
+        # Amounts first, then first moments, which gain sin theta times the amount of the other
+        # mode, then the second moment, which gains 2 sin theta A_1.
         light[[B0, B1]], (b0_edges, _) = self._transport(sources[[B0, B1]])
         light[[A0, A1]], (a0_edges, _) = self._transport(
             sources[[A0, A1]] + lengths * light[[B1, B0]]
@@ -133,6 +140,7 @@ class SlabOrders:
     def _edges(self, values: Array) -> Array:
         """Return fluxes and fluence of (3, P + 1, 2 N + 1) moments."""
         mu, weights = self.streams.mu, self.streams.weights
+        # Integrals over all azimuths: 2 pi times the mean mode, with the weights of the streams.
         diffuse, beam = 2 * np.pi * values[..., :-1] * weights, values[..., -1]
         upward = mu > 0
         up = (diffuse[..., upward] * mu[upward]).sum(-1)
@@ -140,11 +148,15 @@ class SlabOrders:
         return np.stack([up, down, diffuse.sum(-1) + beam])
 
     def rest(self, fields: Array) -> Array:
-        """Return the moments of the sum of all orders after that of `fields`."""
+        """Return the moments of the sum of all orders after the order of `fields`."""
         mean, wave = _AllOrders(self, 0), _AllOrders(self, 1)  # by azimuthal mode
+        # As in `_carried`, each moment from the one before, but for all orders after the last one
+        # together.
         b0, b1 = mean(fields[B0]), wave(fields[B1])
         a0, a1 = mean(fields[A0], self._sines * b1), wave(fields[A1], self._sines * b0)
         c0 = mean(fields[C0], 2 * self._sines * a1)
+        # X are the orders after `fields`, before they are carried: one more order of `fields` + X
+        # is the sum of all that follow.
         return self.following(fields + np.stack([b0, b1, a0, a1, c0]))[1]
 
 
@@ -166,8 +178,10 @@ class _AllOrders:
         """Return X = T (S (last + X) + gained), with T the way of light through
         the slab; all (Z, 2 N + 1).
         """
+        # The sources of the last order, and what the moments gain on the way.
         source = last @ self._scatter + gained
         beam = self._beam(source[None, :, -1:] / self._passing)[0][0]
+        # The beam of all orders scatters into the streams as the streams do among themselves.
         diffuse = source[:, :-1] + beam * self._scatter[-1, :-1]
         return np.concatenate(
             [self._modes.all_orders(self._transport, diffuse[None])[0], beam], axis=-1
@@ -180,6 +194,8 @@ def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[Arr
     `slab`: the slab; `sets`: first and last order of each set, the last one
     `math.inf` for a set without end.
     """
+    # As many orders are computed one by one as the sets need ends; all later orders are one sum,
+    # the last entry.
     finite = [int(last) for _, last in sets if math.isfinite(last)]
     finite += [first - 1 for first, last in sets if not math.isfinite(last)]
     fields, orders = slab.beam(), []
@@ -187,6 +203,7 @@ def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[Arr
         fields, edges = slab.following(fields)
         orders.append(edges)
     orders.append(slab.rest(fields))
+    # Entry n - 1 of the list is order n; a set without end takes the sum, too.
     ends = [int(last) if math.isfinite(last) else len(orders) for _, last in sets]
     chosen = [sum(orders[first - 1 : end]) for (first, _), end in zip(sets, ends, strict=True)]
     return np.array(chosen), np.asarray(sum(orders))

@@ -26,7 +26,6 @@ from airlight.validation.readers import read_csv
 
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe
 LARGEST_G = 0.98
-_TABLE = 20_000  #: rows of the table of droplets
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,7 @@ def phase_pair(name: str) -> PhasePair:
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
     known = phase_from_words(name)
+    # Henyey and Greenstein's function of g = 0 is isotropic.
     if isinstance(known, analytic.Isotropic | analytic.HenyeyGreenstein):
         g = known.g if isinstance(known, analytic.HenyeyGreenstein) else 0.0
         if abs(g) > LARGEST_G:
@@ -72,9 +72,12 @@ def _table(phase: analytic.PhaseFunction) -> Tabulated:
     """Return droplets as a table, by angles that resolve the peak, and the
     place where one is cut out.
     """
-    angles, edge = np.linspace(0.0, np.pi, _TABLE + 1), np.deg2rad(Modified.angle)
+    # Even angles; the lobe of the fit is so narrow that its angles are even in the logarithm, and
+    # where a peak is cut out both sides of the jump are entries.
+    rows = 20_000
+    angles, edge = np.linspace(0.0, np.pi, rows + 1), np.deg2rad(Modified.angle)
     if phase.name == "hg-draine":
-        angles = np.append(np.concatenate([[0.0], np.geomspace(1e-6, np.pi, _TABLE)])[:-1], np.pi)
+        angles = np.append(np.concatenate([[0.0], np.geomspace(1e-6, np.pi, rows)])[:-1], np.pi)
     if phase.name == "mie-modified":
         angles = np.unique(np.concatenate([angles, [edge * (1 - 1e-12), edge]]))
     return Tabulated(angles, phase.from_half(np.sin(angles / 2) ** 2, np.cos(angles / 2) ** 2))
@@ -83,6 +86,7 @@ def _table(phase: analytic.PhaseFunction) -> Tabulated:
 def read_phase_file(path: Path) -> tuple[Array, Array]:
     """Return angles [rad] and values of a CSV file."""
     rows = read_csv(path)
+    # A first line of names.
     if rows and not _is_number(rows[0][1][0]):
         rows = rows[1:]
     for number, cells in rows:
@@ -101,6 +105,7 @@ def read_phase_file(path: Path) -> tuple[Array, Array]:
         raise InputError(
             f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, expected 0 to 180 degrees"
         )
+    # The row that does not increase is the one after the difference.
     falling = np.flatnonzero(np.diff(degrees) <= 0)
     if falling.size:
         raise InputError(
@@ -112,6 +117,8 @@ def read_phase_file(path: Path) -> tuple[Array, Array]:
         raise InputError(
             f"{path}, line {number}: got the value {values[bad[0]]:g}, expected 0 to 1e30"
         )
+    # Values at 0 and 180 degrees alone would be a function without light, except where both are all
+    # that there is.
     if not values[1:-1].any() and not (len(values) == 2 and values.any()):
         raise InputError(
             f"{path}: all values are 0 between 0 and 180 degrees, expected a phase function"
@@ -164,6 +171,8 @@ def hg_draine_phase(diameter: float) -> AnglePhase:
 
     def heights(angles: Array) -> Array:
         down, cosines = np.sin(angles / 2) ** 2, np.cos(angles)
+        # 4 g sin^2(theta/2) + (1 - g)^2 is 1 + g^2 - 2 g cos theta, without cancellation near the
+        # peak.
         lobes = [(1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5 for g in (narrow, wide)]
         return fraction * lobes[0] + (constant + square * cosines**2) * lobes[1]
 

@@ -30,9 +30,6 @@ from airlight.realtime.clouds.slab_orders.discrete_ordinates import (
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 from airlight.validation.arrays import Array
 
-#: A mode below this fraction of the source, twice in a row, ends the sum over modes.
-_NEGLIGIBLE = 1e-10
-
 
 def slab_radiance(
     tau: float,
@@ -55,19 +52,23 @@ def slab_radiance(
     """
     rule = double_gauss(streams)
     moments = phase.moments(2 * streams + 1)
+    # f of the module: the moment that the streams cannot resolve. Depths shrink by 1 - albedo f.
     peak = float(moments[-1])
     passing = 1 - albedo * peak
     mu, phi = np.array(directions, dtype=np.float64).T
     narrowest = min(float(rule.mu[0]), mu0, float(np.min(np.abs(mu)))) / 2
     thickness, wanted = passing * tau, [passing * depth for depth in depths]
     panels = depth_panels(thickness, narrowest, depths=wanted, count=nodes)
+    # The moments without the peak, normalised again.
     kept = (moments[:-1] - peak) / (1 - peak)
     source = _diffuse_source(
         panels, rule, mu0, kept=kept, albedo=min(albedo * (1 - peak) / passing, 1.0), mu=mu, phi=phi
     )
+    # The last term: the beam scattered once, with the true phase function.
     cosines = -mu * mu0 + np.sqrt((1 - mu) * (1 + mu) * (1 - mu0) * (1 + mu0)) * np.cos(phi)
     beam = albedo / (4 * np.pi * passing) * phase.values(np.clip(cosines, -1.0, 1.0))
     source += np.exp(-panels.depths / mu0)[:, None] * beam
+    # The source is carried along each direction; the depths are edges of the panels.
     _, (edges,) = Transport(panels, mu)(source[None])
     places = [int(np.argmin(np.abs(panels.edges - depth))) for depth in wanted]
     return edges[places]
@@ -88,15 +89,18 @@ def _diffuse_source(
     total = np.zeros((panels.depths.size, mu.size))
     quiet = 0
     for m in range(kept.size):
+        # K_m from the streams to the directions, and from the beam to the streams.
         to_user = albedo / 2 * mode_kernel(m, kept, mu, rule.mu) * rule.weights
         from_beam = albedo / (4 * np.pi) * mode_kernel(m, kept, rule.mu, np.array([-mu0]))[:, 0]
         modes = Eigenmodes(rule, m, albedo=albedo, moments=kept, peak=0.0)
         field = modes.radiance(
             _beam_lines(modes, modes.decoupled(from_beam), mu0, panels.depths, tau)
         )
+        # Modes above 0 count twice: the sum is over m and -m.
         part = (2 if m else 1) * field @ to_user.T
         total += part * np.cos(m * phi)
-        quiet = quiet + 1 if np.max(np.abs(part)) <= _NEGLIGIBLE * np.max(np.abs(total)) else 0
+        # A mode below 1e-10 of the source, twice in a row, ends the sum.
+        quiet = quiet + 1 if np.max(np.abs(part)) <= 1e-10 * np.max(np.abs(total)) else 0
         if quiet == 2:
             break
     return total
@@ -105,6 +109,7 @@ def _diffuse_source(
 def _beam_lines(modes: Eigenmodes, source: Array, mu0: float, depths: Array, tau: float) -> Array:
     """Return e+ and e- at depths for the source exp(-z/mu0), (Z, 2 N)."""
     k = modes.rates
+    # Lines that go up and lines that go down, each with its rate k.
     plus, minus = np.split(source, 2)
 
     def upward(z: Array | float) -> Array:

@@ -14,7 +14,6 @@ SETS = ("1", "2", "3-4", "5-6", "7-8", "9-12", "13-18", "19-30", "31-inf")
 LARGEST_ORDER = 1000
 THICKEST = 1e4
 LARGEST_SUN = 89.999999  #: [degrees]; above, the cosine loses its digits
-_SMALLEST_TAU = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,10 @@ def slab_request(
     tau, sun, albedo = (
         _number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo))
     )
-    if not _SMALLEST_TAU <= tau <= THICKEST:
+    thinnest = 1e-6
+    if not thinnest <= tau <= THICKEST:
         raise InputError(
-            f"tau: got {tau:g}, expected a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean "
+            f"tau: got {tau:g}, expected a thickness of {thinnest:g} to {THICKEST:g} mean "
             "free paths"
         )
     if not 0 <= sun <= LARGEST_SUN:
@@ -81,6 +81,7 @@ def order_range(name: str) -> tuple[int, float]:
     """Return first and last order of a set by its name."""
     if name == "all":
         return 1, math.inf
+    # '3', '3-4' or '3-inf', with numbers short enough for `int`.
     form = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}|inf))?", name)
     if form is None:
         raise InputError(
@@ -96,6 +97,7 @@ def order_range(name: str) -> tuple[int, float]:
         raise InputError(
             f"orders: got {name!r}, which ends before it begins; write {form[2]}-{first}"
         )
+    # A set without an end needs the orders before it one by one; the rest is one sum.
     highest = first - 1 if math.isinf(last) else last
     if highest > LARGEST_ORDER:
         raise InputError(
@@ -112,6 +114,7 @@ def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
     names = [
         name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))
     ]
+    # Each is checked before anything is computed.
     for name in names:
         order_range(name)
     if not names:
@@ -120,6 +123,7 @@ def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
 
 
 def _depths(given: str | Sequence[float] | None, tau: float) -> tuple[float, ...]:
+    # Both faces.
     if given is None:
         return (0.0, tau)
     words = [word for word in given.split(",") if word.strip()] if isinstance(given, str) else given
@@ -144,6 +148,7 @@ def _directions(given: str | Sequence[tuple[float, float]]) -> tuple[tuple[float
                 f"directions: got {':'.join(pair)!r}, expected MU:PHI, for example 0.5:180,-1:0"
             )
         mu, phi = (_number("directions", word) for word in pair)
+        # Horizontal light never leaves the slab.
         if not 1e-6 <= abs(mu) <= 1:
             raise InputError(
                 f"directions: got mu = {mu:g}, expected -1 to 1, positive upwards, and not "

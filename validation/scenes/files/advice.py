@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Mistakes in a scene file, by the names of its parts, and what to do about
-those that Mitsuba finds.
+mistakes that Mitsuba finds.
 """
 
 import re
@@ -73,9 +73,11 @@ def in_words(error: Exception) -> str:
     """Return what Mitsuba says of a file that it cannot read, in one line,
     and what to do about it.
     """
+    # Mitsuba's messages have several lines.
     reason = " ".join(str(error).split())
     reason = re.sub(r".*Traceback .*?\w*Error: ", "", reason)  # what a plugin in Python said
     reason = re.sub(r' in property "_arg_\d+"', "", _PLACE.sub("", reason))
+    # The first that fits: special cases stand before general ones.
     for words, advice in _ADVICE:
         if match := re.search(words, reason):
             return f"{reason.rstrip('.!')}; {match.expand(advice)}"
@@ -91,10 +93,13 @@ def check_files(state: Any, path: Path) -> None:
         if "filename" not in props:
             continue
         file, plugin = str(props["filename"]), props.plugin_name()
+        # Reading the name here must not hide from Mitsuba that a plugin does not know it.
         props.mark_queried("filename", False)
         name = _name(state, index)
+        # As Mitsuba resolves it: beside the scene file, then in its own folders.
         place = Path(str(mi.file_resolver().resolve(file)))
         vdb = place.suffix.lower() in (".vdb", ".nvdb")
+        # A missing OpenVDB grid gets the second message: its format is refused anyway.
         if not place.is_file() and not (vdb and plugin == "gridvolume"):
             missing = (
                 "does not exist" if place.is_absolute() else f"is not in {path.parent.resolve()}"
@@ -132,6 +137,7 @@ def check_colours(state: Any) -> None:
             props.mark_queried(key, False)
             if np.all((colour >= 0) & (colour <= 1)):
                 continue
+            # Values up to 255 are bytes that a program wrote for colours.
             bits = ": divide them by 255" if colour.max() > 2 and colour.min() >= 0 else ""
             raise InputError(
                 f"{_name(state, index)} has {key} {', '.join(f'{value:g}' for value in colour)}; "
@@ -148,6 +154,7 @@ def _name(state: Any, index: int) -> str:
     part = kind(state, index).lower()
     if props.id() and not props.id().startswith("_"):
         return f"{'material' if part == 'bsdf' else part} '{props.id()}'"
+    # A material or texture without an id is named after the part of the scene that uses it.
     for holder in ("Shape", "Emitter", "Medium"):
         for at in of_kind(state, holder):
             if index in reached(state, at):

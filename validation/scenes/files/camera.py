@@ -15,11 +15,6 @@ import numpy as np
 from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 
-_USUAL_NEAR = 1e-2  # Mitsuba's own near plane [m], of which files say nothing
-# an optical depth: what is left of light beyond it is lost in the rounding of
-# float32, exp(-17) = 2^-24
-_OPAQUE = 17.0
-
 
 def check_camera(props: Any) -> None:
     """Refuse a camera that is no pinhole, by its properties in the file."""
@@ -63,9 +58,14 @@ def clip_notes(scene: Any) -> list[str]:
         before, beyond = (
             f" (an optical depth of {sigma_t * length:.3g})" for length in (near, far)
         )
-        unbounded &= sigma_t * far < _OPAQUE
+        # Beyond an optical depth of 17 the light is lost in the rounding of float32:
+        # exp(-17) = 2^-24.
+        unbounded &= sigma_t * far < 17.0
+    # The near plane cuts scattered light wherever there is a medium, and shapes wherever they are
+    # nearer than it; the far plane cuts the medium only if that is not opaque before it.
     lacks = []
-    if near > _USUAL_NEAR and (medium is not None or np.min(depth, initial=np.inf) < near):
+    usual_near = 1e-2  # Mitsuba's near plane [m] where the file gives none
+    if near > usual_near and (medium is not None or np.min(depth, initial=np.inf) < near):
         lacks.append(f"what is nearer than near_clip, {near:g} m{before}")
     if unbounded or np.max(depth, initial=-np.inf) > far:
         lacks.append(f"what is beyond far_clip, {far:g} m{beyond}")

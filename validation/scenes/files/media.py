@@ -34,6 +34,7 @@ def give_extinction(state: Any) -> list[str]:
         _refuse_names(props)
         if "strategy" in props:  # of sampling, in version 0.6
             del props["strategy"]
+        # Files of Mitsuba 3 give sigma_t: only a colour needs work, for its values above 1.
         given = [key for key in _OLD if key in props]
         if not given:
             if "sigma_t" in props and props.type("sigma_t") == mi.Properties.Type.Color:
@@ -70,9 +71,11 @@ def _make_homogeneous(state: Any, props: Any) -> None:
     """Make a heterogeneous medium homogeneous whose extinction is the same everywhere; an
     old one calls it density.
     """
+    # The name of version 0.5 and 0.6.
     if props.plugin_name() == "heterogeneous" and "density" in props and "sigma_t" not in props:
         props["sigma_t"] = props["density"]
         del props["density"]
+    # No volume at all means a plain number; `constvolume` is a volume with one value.
     volumes = [
         properties(state, at).plugin_name() for key, at in references(props) if key == "sigma_t"
     ]
@@ -126,6 +129,8 @@ def pass_where_no_material(state: Any) -> None:
     for index in of_kind(state, "Shape"):
         node = state.nodes[index]
         kinds = {kind(state, at) for _, at in references(node.props)}
+        # Before version 2 a shape with media and without a material let light pass; Mitsuba 3 gives
+        # it a diffuse one.
         if (
             "Medium" in kinds
             and not kinds & {"BSDF", "Emitter"}
@@ -161,6 +166,7 @@ def _extinction(props: Any) -> tuple[Array, Array]:
     """Return extinction and albedo of which two of scattering, absorption
     and extinction are given.
     """
+    # Any two of the three determine the third.
     known = {
         key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None
     }
@@ -172,6 +178,7 @@ def _extinction(props: Any) -> tuple[Array, Array]:
         )
     extinction = known["sigma_t"] if "sigma_t" in known else known["sigma_s"] + known["sigma_a"]
     scattering = known["sigma_s"] if "sigma_s" in known else extinction - known["sigma_a"]
+    # The albedo of a channel without extinction has no meaning, and is 0.
     return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
 
 
@@ -197,5 +204,6 @@ def _numbers(props: Any, key: str) -> Array | None:
 
 
 def _words(values: Array) -> str:
+    # A grey value is said once.
     values = values[:1] if np.ptp(values) <= 1e-6 * np.abs(values).max() else values
     return ", ".join(f"{value:.6g}" for value in values)

@@ -21,6 +21,8 @@ def references(props: Any) -> Iterator[tuple[str, int]]:
     for key in list(props.keys()):
         if props.type(key) == mi.Properties.Type.ResolvedReference:
             index = props[key].index()
+            # Mitsuba refuses a file with properties that nothing has read: looking at a reference
+            # must not count as a use.
             props.mark_queried(key, False)
             yield key, index
 
@@ -50,6 +52,8 @@ def reached(state: Any, index: int) -> list[int]:
     """
     found: dict[int, None] = {index: None}
     waiting = [index]
+    # Breadth first; a dictionary keeps the order and holds each node once, also where two shapes
+    # share a material.
     while waiting:
         for _, at in references(properties(state, waiting.pop(0))):
             if at not in found:

@@ -54,6 +54,8 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
     command can take are refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
+    # The resolver is global in Mitsuba: files beside this scene must not be found from the next
+    # one.
     resolver = mi.file_resolver()
     check_text(path)
     try:
@@ -94,11 +96,15 @@ def _built(config: Any, state: Any, path: Path, lobes: Mapping[str, float]) -> A
         return mi.parser.instantiate(config, state)
     _mend(state, path)
     give_lobes(state, lobes)
+    # The identity of the scene is that of the repaired description, before shapes are rewritten by
+    # what Mitsuba builds.
     digest = description_digest(state)
     with temporary_folder() as folder:
         notes = cylinders_as_meshes(state, folder)
         # which takes the nodes apart
         scene = mi.parser.instantiate(config, mi.parser.ParserState(state))
+        # Some repairs need built shapes: windows, lamps on meshes, media of walls. They change the
+        # description, of which the scene is then built again.
         rooms = rooms_as_boxes(state, scene.shapes())
         changed = [
             bool(rooms),
@@ -116,6 +122,8 @@ def _mend(state: Any, path: Path) -> None:
     """Change what a file says into what both readers take, and say so."""
     _leave_out_rendering(state)
     name_nodes(state)
+    # Names come before checks, whose messages use them; copies of instances come last, of parts
+    # that are repaired already.
     check_kinds(state)
     check_files(state, path)
     for note in [*give_extinction(state), *mirrored_grids(state)]:
@@ -136,6 +144,7 @@ def _leave_out_rendering(state: Any) -> None:
                 del node.props[key]
             elif kind(state, at) == "Film":
                 film = properties(state, at)
+                # Only the size of a film counts; its type may be one that Mitsuba 3 no longer has.
                 kept = mi.Properties("hdrfilm")
                 for name in _FILM:
                     if name in film:

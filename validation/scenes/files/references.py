@@ -20,14 +20,14 @@ from airlight.reference.scene.camera import camera_matrix
 from airlight.validation.scenes.files.nodes import child, kind, of_kind, properties, references
 from airlight.validation.scenes.files.shapes import samples
 
-_OFF = 1e-4  # of a shape's size: how far beside it
-_TOUCHES = 1e-5  # of a point's coordinates: how near to a bound it is in it
 _OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say so
 
 
 def leave_out_media(state: Any, scene: Any) -> bool:
     """Leave out the media of opaque shapes and of lamps; return whether there were any."""
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
+    # Light that passes a bound goes straight on: a glass with a medium inside has no method and no
+    # reference.
     for shape in scene.shapes():
         material = child(state, nodes[shape.id()], "BSDF") if shape.id() in nodes else None
         if (
@@ -42,6 +42,8 @@ def leave_out_media(state: Any, scene: Any) -> bool:
                 "expected 'null', which lets light pass straight on: replace the material, or "
                 "remove the media"
             )
+    # Opaque shapes and lamps with references to media; without a camera nobody says which medium is
+    # outside.
     shapes = [
         shape
         for shape in scene.shapes()
@@ -53,6 +55,8 @@ def leave_out_media(state: Any, scene: Any) -> bool:
     bounds = [
         shape for shape in others if shape.interior_medium() is not None and not _is_opaque(shape)
     ]
+    # The references are checked against the media that camera and bounds determine, unless a bound
+    # is open and determines nothing.
     if not any(shape.class_name() in _OPEN for shape in bounds):
         space = _Space(scene.sensors()[0], bounds)
         for shape in shapes:
@@ -85,12 +89,15 @@ def touching(scene: Any) -> list[str]:
         return []
     bodies = scene_of(bounds)
     points, normals = (np.concatenate(parts) for parts in zip(*map(samples, opaque), strict=True))
-    near = _TOUCHES * (1 + np.abs(points).max(axis=1, keepdims=True))
+    # A short ray through each point along its normal: a hit of a parallel face within this distance
+    # on either side means that the wall lies in the bound.
+    touches = 1e-5  # of a point's coordinates: how near to a bound it is in it
+    near = touches * (1 + np.abs(points).max(axis=1, keepdims=True))
     start, reach = mi.Point3f((points - near * normals).T), mi.Float(2 * near[:, 0])
     hit = bodies.ray_intersect(mi.Ray3f(start, mi.Vector3f(normals.T), reach, 0.0, []))
     parallel = (
         np.abs(np.array(hit.n, dtype=np.float64).reshape(3, -1).T * normals).sum(axis=1)
-        > 1 - _TOUCHES
+        > 1 - touches
     )
     found = (np.array(hit.is_valid()) & parallel).reshape(len(opaque), -1)
     return [
@@ -120,6 +127,8 @@ class _Space:
         self._bounds = scene_of(bounds) if bounds else None
         self._around = sensor.get_medium()
         if self._bounds is not None:
+            # The medium outside of all bounds, seen from the camera: a ray from far away towards
+            # the camera meets the bounds from outside, or none.
             camera = camera_matrix(sensor)[:3, 3]
             self._around = self._at(camera[None] + np.array([[1e6, 2e6, 3e6]]), camera[None])[0]
 
@@ -130,6 +139,8 @@ class _Space:
         way = np.broadcast_to(towards, start.shape) - start
         way /= np.linalg.norm(way, axis=1, keepdims=True)
         rays = mi.Ray3f(mi.Point3f(start.T), mi.Vector3f(way.T))
+        # The first bound on the way knows the media on both sides; the medium on the side of the
+        # ray's start is the one at the start.
         hit = self._bounds.ray_intersect(rays)
         media = hit.target_medium(-rays.d)
         dr.eval(media, hit)
@@ -142,7 +153,9 @@ class _Space:
         box = shape.bbox()
         size = float(np.linalg.norm(np.ptp([np.ravel(box.min), np.ravel(box.max)], axis=0)))
         for side, medium, sign in _media(shape):
-            beside = points + sign * _OFF * size * normals
+            # Points a little beside the shape, on the side of the reference; the direction to look
+            # along is arbitrary, away from the axes.
+            beside = points + sign * 1e-4 * size * normals
             for there in self._at(beside, beside + np.array([0.3, 0.5, 0.8])):
                 if there != medium:
                     found = f"medium '{there.id()}'" if there is not None else "no medium"

@@ -18,12 +18,9 @@ from airlight.reference.scene.transforms import matrix_of
 from airlight.validation.arrays import Array
 from airlight.validation.scenes.files.nodes import kind, of_kind, properties, references
 
-_FOOT, _HEAD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # of Mitsuba's cylinder
-
 # of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
 _FLAT = 1e-5
-_MOST = 64  # rectangles of a lamp
-_BEYOND = 1e-4  # of a room's size: how far its box of fog reaches beyond the walls
+
 _SIDES = 256  # of the mesh of a cylinder: it differs from it by 8e-5 of the radius
 _POINTS = 16  # of a shape, at which it is looked at
 
@@ -40,6 +37,7 @@ def write_out_instances(state: Any) -> None:
     ]
     for node in written:  # by now nothing holds a node: to append one may move them all
         state.nodes.append(node)
+    # Properties are looked up again: the nodes may have moved in memory.
     scene = properties(state, 0)
     for key, index in references(scene):
         if properties(state, index).plugin_name() in ("shapegroup", "instance", "merge"):
@@ -73,6 +71,7 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
         raise InputError(
             f"shape '{instance.id()}' is an instance of no shape group; expected a reference to one"
         )
+    # Mitsuba places a part by its own transform first, then by the instance's.
     place = instance.get("to_world", mi.ScalarAffineTransform4d())
     parts = [at for _, at in references(properties(state, group)) if kind(state, at) == "Shape"]
     for part in parts:
@@ -93,10 +92,13 @@ def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
             continue
         first, last = (
             np.array(old.get(name, end), dtype=np.float64)
-            for name, end in (("p0", _FOOT), ("p1", _HEAD))
+            # the foot and head of Mitsuba's cylinder where the file gives none
+            for name, end in (("p0", (0.0, 0.0, 0.0)), ("p1", (0.0, 0.0, 1.0)))
         )
         path = folder / f"cylinder-{index}.ply"
         _write_cylinder(path, first, last, float(old.get("radius", 1.0)))
+        # The new node keeps the name, the transform, and the references to material, media and
+        # emitter.
         new = mi.Properties("ply")
         new.set_id(old.id())
         new["filename"] = str(path)
@@ -115,10 +117,12 @@ def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
 def _write_cylinder(path: Path, first: Array, last: Array, radius: float) -> None:
     """Write the side of a cylinder with the normals of a round one, as a PLY file."""
     axis = last - first
+    # The axis of coordinates least parallel to the cylinder's gives the cross product most digits.
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     turn = 2 * np.pi * np.arange(_SIDES)[:, None] / _SIDES
     normal = np.cos(turn) * across + np.sin(turn) * np.cross(axis / np.linalg.norm(axis), across)
+    # One row for each vertex: position and normal; first all of one end, then all of the other.
     corners = np.concatenate(
         [np.concatenate([end + radius * normal, normal], axis=1) for end in (first, last)]
     )
@@ -161,6 +165,7 @@ def _rectangles(shape: Any) -> list[Array]:
         return []
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    # Vertices with the same coordinates are one: exporters write each triangle's corners apart.
     used, same = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
     halves: dict[tuple[int, int], list[list[int]]] = {}
     for face in same.reshape(-1, 3).tolist():
@@ -173,10 +178,13 @@ def _rectangles(shape: Any) -> list[Array]:
         halves.setdefault((min(first, second), max(first, second)), []).append(
             [first, second, last]
         )
+    # All triangles must pair into rectangles, and Mitsuba must sample the same surface: otherwise
+    # the lamp stays a mesh.
     side = -1.0 if shape.has_flipped_normals() else 1.0
     matrices = [_rectangle(used, pair, side) for pair in halves.values()]
     found = [matrix for matrix in matrices if matrix is not None]
-    if len(found) < len(matrices) or len(found) > _MOST or not _shine_alike(shape, found):
+    most = 64  # rectangles of a lamp
+    if len(found) < len(matrices) or len(found) > most or not _shine_alike(shape, found):
         return []
     return found
 
@@ -189,9 +197,13 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
     # counter-clockwise from the side of the normal
     across, up = 0.5 * (first - start), 0.5 * (second - start)
     size = float(np.linalg.norm(first - second))
+    # A rectangle: the fourth corner is first + second - start, the sides at `start` are
+    # perpendicular, and the second triangle runs along the diagonal the other way.
     closes = np.linalg.norm(first + second - start - corners[pair[1][2]]) <= _FLAT * size
     if not closes or abs(across @ up) > _FLAT * size**2 or pair[0][:2] != pair[1][1::-1]:
         return None
+    # Flipped normals: with the axes exchanged the normal of Mitsuba's rectangle points to the other
+    # side.
     across, up = (across, up) if side > 0 else (up, across)
     normal = np.cross(across, up)
     matrix = np.eye(4)
@@ -204,6 +216,8 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
 def samples(shape: Any) -> tuple[Any, Any]:
     """Return points of a shape and the normals there, evenly spread, (points, 3) each."""
     number = np.arange(_POINTS)
+    # An additive recurrence with the golden ratio: spread evenly over the unit square without
+    # random numbers.
     place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
     sample = shape.sample_position(0.0, place)
     points, normals = (
@@ -220,6 +234,8 @@ def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
     size = max(float(np.linalg.norm(matrix[:3, :2])) for matrix in matrices)
     found = np.zeros(_POINTS, dtype=bool)
     for matrix in matrices:
+        # Coordinates in the rectangle's own frame, in which it is the square from -1 to 1 at height
+        # 0.
         local = np.linalg.solve(matrix[:3, :3], (points - matrix[:3, 3]).T)
         inside = (np.abs(local[:2]) < 1 + 1e-3).all(axis=0) & (np.abs(local[2]) < 1e-3 * size)
         found |= inside & (normals @ matrix[:3, 2] > 1 - 1e-4)
@@ -235,6 +251,7 @@ def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
         rectangle.set_id(f"{name}-{number + 1}" if len(matrices) > 1 else name)
         rectangle["to_world"] = mi.ScalarAffineTransform4d(matrix)
         for key, at in parts:
+            # An emitter belongs to one shape: each further rectangle gets a copy of it.
             if number and kind(state, at) == "Emitter":
                 state.nodes.append(mi.parser.SceneNode(state.nodes[at]))
                 at = len(state.nodes) - 1
@@ -266,12 +283,14 @@ def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
         ]
         if not _is_null(shape) or len(inside) != 1:
             continue
+        # The interior medium of a rectangle lies on the side that its normal points away from.
         room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
         if room is None:
             continue
         box = mi.Properties("cube")
         box.set_id(shape.id())
         box["to_world"] = mi.ScalarAffineTransform4d(room)
+        # A box has its medium inside, whichever side of the window it was on.
         for key, at in references(properties(state, nodes[shape.id()])):
             box["interior" if kind(state, at) == "Medium" else key] = (
                 mi.Properties.ResolvedReference(at)
@@ -309,9 +328,12 @@ def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
     size = float(np.linalg.norm(front[0] - front[2]))
 
     def stands(face: Array) -> bool:
+        # The largest distance of a corner of the face from the nearest corner of a wall: the two
+        # are one rectangle if it is about 0.
         gaps = (np.linalg.norm(face[:, None] - wall, axis=2).min(axis=1).max() for wall in walls)
         return any(gap <= _FLAT * size for gap in gaps)
 
+    # The back wall is a wall at some depth behind the window; each wall's middle proposes a depth.
     depths = {float((wall.mean(axis=0) - window[:3, 3]) @ inward) for wall in walls}
     depth = next(
         (each for each in depths if each > _FLAT * size and stands(front + each * inward)), None
@@ -319,11 +341,15 @@ def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
     if depth is None:
         return None
     back = front + depth * inward
+    # The other four faces join an edge of the window to the same edge of the back wall.
     ends = [[number, (number + 1) % 4] for number in range(4)]
     if not all(stands(np.concatenate([front[pair], back[pair]])) for pair in ends):
         return None
-    across, up = ((1 + _BEYOND) * window[:3, axis] for axis in ((0, 1) if side > 0 else (1, 0)))
-    half = 0.5 * (depth + _BEYOND * size) * inward
+    # Mitsuba's cube goes from -1 to 1: half sides as columns. The axes are ordered so that the
+    # matrix has a positive determinant.
+    beyond = 1e-4  # of the room's size: how far its box of fog reaches beyond the walls
+    across, up = ((1 + beyond) * window[:3, axis] for axis in ((0, 1) if side > 0 else (1, 0)))
+    half = 0.5 * (depth + beyond * size) * inward
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([across, up, half, window[:3, 3] + half])
     return matrix

@@ -11,7 +11,6 @@ from xml.parsers import expat
 
 from airlight.errors import InputError
 
-_DEEPEST = 200  # elements in one another; a scene has about ten
 #: How files begin that people give in place of a scene, what they are, and what to do.
 _OTHERS = (
     (
@@ -51,11 +50,13 @@ def check_text(path: Path) -> None:
         raise InputError(
             f"{where}: the file is empty; expected a Mitsuba XML file: export it again"
         )
+    # Files of another kind are known by their first bytes.
     what, way = next(
         ((what, way) for start, what, way in _OTHERS if text.startswith(start)), ("", "")
     )
     if what:
         raise InputError(f"{where}: the file is {what}; expected a Mitsuba XML file: {way}")
+    # Text in UTF-16 begins with a mark of its byte order, not with '<'.
     if not text.startswith(_MARKS) and not text.lstrip().startswith(b"<"):
         raise InputError(
             f"{where}: the file is no XML, it begins with {text.lstrip()[:16]!r}; expected a "
@@ -73,6 +74,7 @@ def _check_elements(text: bytes, where: str) -> None:
         nonlocal depth, deepest
         depth += 1
         deepest = max(deepest, depth)
+        # Mitsuba takes an empty number for 0.
         for key, value in attributes.items():
             if name.lower() in _NUMBERS and key not in _WORDS and not value.strip():
                 raise InputError(
@@ -97,9 +99,10 @@ def _check_elements(text: bytes, where: str) -> None:
                 "that the first line "
                 "names, UTF-8 without one: save it as UTF-8"
             ) from None
-    if deepest > _DEEPEST:
+    most = 200  # elements in one another; a scene has about ten
+    if deepest > most:
         raise InputError(
-            f"{where}: its elements are nested {deepest} deep; expected at most {_DEEPEST}"
+            f"{where}: its elements are nested {deepest} deep; expected at most {most}"
         )
 
 

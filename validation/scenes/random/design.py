@@ -36,9 +36,8 @@ _SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', 
 
 #: The names of the coordinates of a point.
 COORDINATES: tuple[str, ...] = tuple(tomllib.loads(FILE.read_text(encoding="utf-8"))["coordinates"])
-_SCRAMBLING = 2417
+
 LARGEST_SEED = 10**9
-_HEAVIEST = 1e9  # weight of a choice
 
 
 class Draws:
@@ -46,6 +45,8 @@ class Draws:
 
     def __init__(self, seed: int, attempt: int = 0, part: str = "") -> None:
         self._seed, self._attempt = seed, attempt
+        # The name of a part is hashed by CRC-32, which is the same on all machines and in all
+        # versions of Python.
         entropy = [seed, attempt, zlib.crc32(part.encode())]
         self._bits = np.random.PCG64(np.random.SeedSequence(entropy))
         self._point = point(seed) if not part else {}
@@ -80,6 +81,8 @@ class Draws:
         """Return a whole number from `low` to `high`, of which small ones come
         more often than by `count`.
         """
+        # Evenly in the logarithm of the number would be `count`; the square of the fraction favours
+        # small numbers.
         span = math.log((high + 1.5) / (low + 0.5))
         return min(
             math.floor((low + 0.5) * math.exp(span * self.fraction(name) ** 2) - 0.5), int(high)
@@ -92,6 +95,7 @@ class Draws:
             left -= weight
             if left < 0:
                 return word
+        # Rounding may leave a remainder of 0 after the last weight.
         return [word for word, weight in weights.items() if weight > 0][-1]
 
     def vector(self) -> Array:
@@ -114,9 +118,12 @@ def point(seed: int) -> Mapping[str, float]:
         raise InputError(
             f"random scene: got the seed {seed}, expected a whole number from 0 to {LARGEST_SEED}"
         )
-    sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))
+    # Always the same scrambled sequence: a seed is the number of a point in it.
+    scrambling = np.random.default_rng(2417)
+    sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=scrambling)
     sequence.fast_forward(seed)
     values = sequence.random(1)[0]
+    # Away from 0 and 1: logarithms and inverse functions of coordinates stay finite.
     return dict(
         zip(COORDINATES, (float(min(max(value, 1e-9), 1 - 1e-9)) for value in values), strict=True)
     )
@@ -146,6 +153,7 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     none is above 0 are refused.
     """
     usual, limits = _defaults()
+    # A name with limits is a range; every other name is a table of weights.
     readers: dict[str, Reader] = {"meshes": _folder}
     readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
     readers |= {
@@ -172,7 +180,8 @@ def _range(what: str, value: Any, *, limits: tuple[float, float]) -> tuple[float
 
 
 def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, float]:
-    read = partial(read_number, least=0, most=_HEAVIEST, whole=False)
+    heaviest = 1e9  # weight of a choice
+    read = partial(read_number, least=0, most=heaviest, whole=False)
     weights = read_named(f"{what}.", read_table(what, value), dict.fromkeys(names, read))
     if not any(weights.values()):
         raise InputError(f"{what}: no weight is above 0; expected one at least")
@@ -183,7 +192,7 @@ def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, floa
 
 
 def is_random(name: str) -> bool:
-    """Return whether a name is that of a random scene."""
+    """Return whether a name names a random scene."""
     return name.startswith(PREFIX)
 
 

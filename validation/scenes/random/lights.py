@@ -15,10 +15,9 @@ from airlight.validation.scenes.random.design import Draws, Ranges
 from airlight.validation.scenes.random.media import Medium, depths, unit_airlight, view_rays
 
 AREA_KINDS = ("rectangle", "disk", "sphere")
-_FAR = 1e3  # where directional lights come from, in radii of the stage
+
 _DEEPEST = 7.0  # optical depth from a light to the camera by the nearest way
-_TRIES = 9
-_LEAST_CONE = 0.37  # radius of a spot's cone at its target, in radii of the stage
+
 _CLEAR = 0.19  # around the camera nothing of a light is nearer, in radii of the stage
 
 
@@ -63,6 +62,7 @@ def draw_lights(
 ) -> list[Light]:
     """Return the lights of a scene; their brightness is that on the rays of the camera."""
     rays = view_rays(camera, target)
+    # A directional light would pass an unbounded medium of infinite depth: nothing would arrive.
     unbounded = any(medium.bounds == "unbounded" for medium in media)
     kinds = ranges["light_kinds"] | ({"directional": 0.0} if unbounded else {})
     kinds = kinds if any(kinds.values()) else {"point": 1.0}
@@ -88,8 +88,12 @@ def _light(
     ball = math.hypot(*size) if kind == "rectangle" else max(size, default=0.0)
     # Where the camera sees light best: the middle of the stage, or nearer in thick fog.
     ahead = _ahead(media, camera, rays[0])
-    for attempt in range(_TRIES):
+    for attempt in range(9):
+        # The first try takes the coordinates of the point; later tries are drawn from the light's
+        # own stream.
         first = draws if attempt == 0 else stream
+        # Evenly over the part of the sphere above -17 degrees: the sine of the elevation is uniform
+        # there.
         elevation = math.asin(
             math.sin(math.radians(-17.0))
             + (1 + math.sin(math.radians(17.0)))
@@ -104,12 +108,16 @@ def _light(
         if kind == "directional":
             # Light from below the floor would reach nothing.
             direction[2] = 0.17 + abs(direction[2])
-            position = direction / np.linalg.norm(direction) * _FAR
+            # from a thousand radii of the stage away
+            position = direction / np.linalg.norm(direction) * 1e3
         else:
             distance = first.logarithmic(*ranges["light_distance"], name=f"light_distance-{number}")
             position = _nearer(media, camera, ahead, (distance + ball) * direction)
+        # Half of the tries aim at what the camera sees best, half at the middle of the stage.
         target = (ahead if attempt % 2 == 0 else np.zeros(3)) + 0.29 * stream.in_ball()
         unit = unit_airlight(media, camera, rays, position, directional=kind == "directional")
+        # Good enough: not around the camera, and bright enough that the optical depth can be
+        # overcome. After the last try the light stays as it is.
         if (
             np.linalg.norm(position - camera) > ball + _CLEAR
             and unit > 0
@@ -117,14 +125,17 @@ def _light(
         ):
             break
     colour = np.array([stream.between(0.53, 1.0) for _ in range(3)])
+    # Further lights are weaker. The intensity follows from the airlight that a unit intensity
+    # makes; 1e-7 keeps it finite where nothing arrives.
     brightness = draws.logarithmic(*ranges["brightness"], name=f"brightness-{number}") / (
         1 + 0.5 * (number - 1)
     )
     strength = brightness / max(unit, 1e-7)
     cutoff = beam = 0.0
     if kind == "spot":
-        # A narrow cone that begins near by would light next to nothing.
-        least = math.degrees(math.atan(_LEAST_CONE / float(np.linalg.norm(target - position))))
+        # A narrow cone that begins near by would light next to nothing: at its target it has a
+        # radius of 0.37 radii of the stage at least.
+        least = math.degrees(math.atan(0.37 / float(np.linalg.norm(target - position))))
         cutoff = max(
             draws.logarithmic(*ranges["cutoff"], name=f"cutoff-{number}"),
             min(least, ranges["cutoff"][1]),
@@ -161,6 +172,7 @@ def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
     optical depth is about 2.
     """
     far = float(np.linalg.norm(camera))
+    # From far to near: the first point that is not lost in fog.
     for fraction in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
         point = camera + fraction * far * axis
         if depths(media, camera, point).mean() < 2:
@@ -174,6 +186,7 @@ def _nearer(media: list[Medium], camera: Array, ahead: Array, position: Array) -
     """
     for fraction in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
         moved = ahead + fraction * (position - ahead)
+        # The way of light: from the light to the point that the camera sees, and on to the camera.
         way = depths(media, moved, ahead).mean() + depths(media, ahead, camera).mean()
         if way < _DEEPEST:
             return moved

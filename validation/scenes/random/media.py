@@ -27,9 +27,6 @@ _BALLS = {
     "gem": (1.0, 0.91),
     "box": (math.sqrt(3), 1.0),
 }
-_TRIES = 12
-_STEPS = 96
-_NEAR = 0.07  # light spreads from a ball of this radius at least, in radii of the stage
 
 
 @dataclass(frozen=True)
@@ -68,6 +65,8 @@ def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
     media = []
     if kind != "bounded":
         depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
+        # The optical depth is that from the camera to behind the stage, of radius 1: extinction is
+        # depth over this length.
         filling = _filling(
             draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1)
         )
@@ -88,8 +87,10 @@ def _filling(
     grey = draws.pick(ranges["extinctions"], "extinctions") == "one"
     spread = stream.between(*ranges["colour_spread"])
     offsets = np.array([stream.between(-1, 1) for _ in range(3)])
+    # Offsets have the mean 0: the mean of the three channels stays as drawn.
     sigma = np.full(3, mean) if grey else mean * (1 + spread * (offsets - offsets.mean()))
     middle = draws.between(*ranges["albedo"], name="albedo")
+    # Channels differ by half of the distance to the nearer end of the range, and stay within it.
     reach = 0.5 * min(middle - ranges["albedo"][0], ranges["albedo"][1] - middle)
     albedo = np.array([middle + reach * stream.between(-1, 1) for _ in range(3)])
     kind = draws.pick(ranges["phases"], "phase")
@@ -109,12 +110,14 @@ def _bounded(
         stream = draws.of(f"medium-{number}")
         # The point speaks for the first medium of the scene; others are of the stream.
         own = draws if first and number == 0 else stream
-        for _ in range(_TRIES):
+        for _ in range(12):
             # The first one's kind and size are of the point too; a stream has no names.
             kind = (draws if number == 0 else stream).pick(ranges["bounds_kinds"], "bounds_kind")
             around, within = _BALLS[kind]
             size = (draws if number == 0 else stream).logarithmic(*ranges["bounds"], name="bounds")
             holds_camera = inside and number == 0
+            # The ball within the body holds the camera: the size is at least 1.17 times what that
+            # needs.
             if holds_camera:
                 centre = (1 - stream.between(0.23, 0.67)) * camera + 0.31 * stream.in_ball()
                 size = max(
@@ -137,6 +140,7 @@ def _bounded(
                     around * float(half.max())
                 )
                 half = half * min(1.0, most)
+            # The balls around all bounds are disjoint, with a gap, or the body is drawn again.
             ball = around * float(half.max())
             if ball > 0.05 and all(
                 np.linalg.norm(centre - other) > ball + radius + 0.01 for other, radius in balls
@@ -186,17 +190,24 @@ def unit_airlight(
 
     A directional light, of unit irradiance, does not spread; it comes from a point very far away.
     """
-    edges = (float(np.linalg.norm(camera)) + 1.0) * (np.arange(_STEPS + 1) / _STEPS) ** 2
+    # Midpoint rule along each ray, with steps that grow with the distance from the camera.
+    steps = 96
+    edges = (float(np.linalg.norm(camera)) + 1.0) * (np.arange(steps + 1) / steps) ** 2
     middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     points = camera + middle[:, None] * directions[:, None]
+    # Attenuation from camera to point, later from point to light; inverse square in between.
     left = np.exp(-depths(media, np.broadcast_to(camera, points.shape), points))
     toward = light - points
     distance = np.linalg.norm(toward, axis=-1)
     depth = depths(media, points, np.broadcast_to(light, points.shape))
-    spread = np.ones_like(distance) if directional else 1 / np.maximum(distance, _NEAR) ** 2
+    # Light spreads from a ball of this radius at least, in radii of the stage: points at the light
+    # would have no limit.
+    near = 0.07
+    spread = np.ones_like(distance) if directional else 1 / np.maximum(distance, near) ** 2
     cosine = -np.sum(toward * directions[:, None], axis=-1) / np.maximum(distance, 1e-12)
     total = np.zeros(points.shape)
     taken = np.zeros(distance.shape, dtype=bool)
+    # Bounded media first: a point in one of them does not belong to the unbounded medium.
     for medium in sorted(media, key=lambda each: each.bounds == "unbounded"):
         inside = (
             np.linalg.norm(points - medium.centre, axis=-1) < medium.ball
@@ -205,6 +216,7 @@ def unit_airlight(
         )
         inside &= ~taken
         taken |= inside
+        # Values of phase functions have the mean 1; over 4 pi they are per steradian.
         phase = phase_from_words(medium.phase)(np.clip(cosine, -1, 1)) / (4 * np.pi)
         total += (inside * phase * spread)[..., None] * (medium.sigma_t * medium.albedo)
     return float((total * np.exp(-depth) * lengths[:, None] * left).sum(axis=1).max())

@@ -37,9 +37,8 @@ from airlight.validation.scenes.meshes import (
 from airlight.validation.scenes.random.design import Draws, Ranges
 from airlight.validation.scenes.random.lights import Light
 
-_TRIES = 24
 _CAMERA = 0.31  # an occluder is as far from the camera at least, in radii of the stage
-_LIGHT = 0.023  # and as far from a light
+
 _SCREENS = ("fence", "pierced", "sheet", "plate")
 
 
@@ -78,6 +77,7 @@ def draw_occluders(
     first light from the camera.
     """
     files = _files(ranges["meshes"])
+    # Meshes of a user need a folder; without any kind left, boxes.
     kinds = {
         kind: weight for kind, weight in ranges["occluder_kinds"].items() if kind != "mesh" or files
     }
@@ -85,6 +85,7 @@ def draw_occluders(
     occluders = [_shade(draws.of("shade"), camera, lights[0])] if in_shadow else []
     if draws.pick(ranges["cages"], "cages") == "yes":
         near = [light for light in lights if light.kind != "directional"]
+        # A cage is around a light at a place; a directional light has none.
         occluders += [_cage(draws.of("cage"), camera, near[0])] if near else []
     count = draws.count(*ranges["occluders"], name="occluders")
     size = draws.logarithmic(*ranges["occluder_size"], name="occluder_size")
@@ -93,7 +94,8 @@ def draw_occluders(
         kind = draws.pick(kinds, f"occluder_kind-{number}")
         if number == 1 and draws.pick(ranges["spheres"], "spheres") == "yes":
             kind = "ball"
-        for _ in range(_TRIES):
+        # An occluder that finds no free place is left out.
+        for _ in range(24):
             position, radius = _place(stream, ranges, kind, size, lights)
             if _is_clear(position, radius, camera, lights):
                 occluders.append(_occluder(stream, kind, position, radius, files))
@@ -108,12 +110,15 @@ def _place(
     low, high = ranges["occluder_size"]
     radius = min(max(size * stream.logarithmic(0.41, 2.43), low), high)
     if kind in _SCREENS and stream.fraction() < 0.4:
+        # Two screens of five stand between a light and the stage, where they cast shadows over all
+        # of it.
         light = lights[int(stream.fraction() * len(lights))]
         toward = light.position / np.linalg.norm(light.position)
         away = min(float(np.linalg.norm(light.position)), 2.3)
         return stream.between(0.29, 0.83) * away * toward + 0.23 * stream.in_ball(), min(
             2.1 * radius, 0.9
         )
+    # The stage is a little flat.
     position = stream.in_ball() * np.array([1.0, 1.0, 0.71])
     return position, radius
 
@@ -122,7 +127,9 @@ def _is_clear(position: Array, radius: float, camera: Array, lights: Sequence[Li
     if np.linalg.norm(position - camera) < radius + _CAMERA:
         return False
     return all(
-        np.linalg.norm(position - light.position) > radius + light.ball + _LIGHT for light in lights
+        # the least distance from a light, in radii of the stage
+        np.linalg.norm(position - light.position) > radius + light.ball + 0.023
+        for light in lights
     )
 
 
@@ -131,6 +138,7 @@ def _occluder(
 ) -> Occluder:
     reflectance = np.array([stream.between(0.07, 0.83) for _ in range(3)])
     upright = kind in ("fence", "vase", "pierced")
+    # Upright shapes turn about an axis near the vertical, others about any.
     axis = stream.vector() + (np.array([0.0, 0.0, 4.0]) if upright else 0)
     angle = stream.between(3.0, 357.0)
     turn = axis / np.linalg.norm(axis), angle
@@ -143,6 +151,8 @@ def _solid(stream: Draws, kind: str, files: Sequence[Path]) -> Mesh:
         case "box":
             return box(2 * _half(stream, 3))
         case "plate":
+            # The corner of half sides (0.31 to 1, normalised) stays near the unit ball with a thin
+            # third side.
             thin = stream.logarithmic(0.0013, 0.047)
             return box(2 * np.append(_half(stream, 2), thin))
         case "sheet":
@@ -154,6 +164,7 @@ def _solid(stream: Draws, kind: str, files: Sequence[Path]) -> Mesh:
         case "gem":
             return gem(stream.count(5, 17), stream.count(2, 7))
         case "torus":
+            # The outer radius, from the axis to the far side of the tube, is 1.
             tube = stream.between(0.09, 0.37)
             return torus(1 - tube, tube, (stream.count(17, 53), stream.count(7, 19)))
         case "star":
@@ -199,6 +210,7 @@ def _fence(stream: Draws) -> Mesh:
         stream.logarithmic(0.007, 0.11),
         rotation((0, 0, 1), stream.between(-67.0, 67.0)),
     )
+    # The bars fill the width from -0.67 to 0.67.
     pitch = 2 * 0.67 / bars
     bar = box((width * pitch, 2 * thickness, 2 * height))
     return joined(
@@ -212,6 +224,7 @@ def _pierced(stream: Draws) -> Mesh:
     fraction, thickness = stream.between(0.29, 0.79), stream.logarithmic(0.011, 0.13)
 
     def lines(holes: int, half: float) -> Array:
+        # Holes take the fraction of the side, ribs of equal width the rest.
         rib = (1 - fraction) / (holes + 1)
         widths = np.array([rib, *([fraction / holes, rib] * holes)])
         return 2 * half * np.concatenate([[0.0], np.cumsum(widths)])
@@ -240,6 +253,8 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     # Nearer to the camera than a directional light is, and beyond what an
     # area light reaches around.
     distance = min(stream.between(0.31, 0.57) * length, stream.between(0.9, 1.7))
+    # The plate may touch neither the camera nor the light; it is large enough to cover an area
+    # light as seen from the camera, as far as there is room.
     room = min(distance, length - distance - light.ball)
     needed = 1.3 * light.ball * distance / length
     radius = max(min(stream.between(0.29, 0.53), 0.8 * room), min(needed, 0.9 * room))
@@ -247,6 +262,7 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     axis, angle = turning(np.array([0.0, 0.0, 1.0]), forward / np.linalg.norm(forward))
     position = camera + distance * way / length
     reflectance = np.array([stream.between(0.07, 0.53) for _ in range(3)])
+    # A plate within the unit ball: its half diagonal is 1.
     half = 0.69 + 0.03 * stream.fraction()
     mesh = box((2 * half, 2 * math.sqrt(1 - half**2), 2 * stream.logarithmic(0.0017, 0.031)))
     return _placed("plate", mesh, position, radius, (axis, angle), reflectance)
@@ -254,6 +270,8 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
 
 def _cage(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return upright bars around a light."""
+    # The cage holds the whole light, and the camera stays outside of it, unless the light itself is
+    # too large.
     most = float(np.linalg.norm(light.position - camera)) - _CAMERA
     radius = max(min(max(stream.between(0.13, 0.31), 2.1 * light.ball), most), 1.3 * light.ball)
     bars, thickness = stream.count(5, 13), stream.between(0.029, 0.097)
@@ -300,6 +318,8 @@ def draw_ground(
     if kind == "room" and directional:
         kind = "floor-and-wall"
     near = [light for light in lights if light.kind != "directional"]
+    # Floor and room leave free what they must not cut: the camera, the lights, and the inner part
+    # of occluders, which may be cut by the ground.
     balls = [(camera, 0.13), *((light.position, light.ball + 0.07) for light in near)]
     balls += [(occluder.position, 0.31 * occluder.radius) for occluder in occluders]
     if kind == "room":
@@ -308,6 +328,7 @@ def draw_ground(
     normal = tilt / np.linalg.norm(tilt)
     ground = [_plane(stream, "floor", normal, balls)]
     if kind == "floor-and-wall":
+        # The wall faces the camera: its normal leans towards it, with some randomness.
         toward = camera * np.array([1.0, 1.0, 0.0]) + 0.6 * np.linalg.norm(
             camera
         ) * stream.vector() * [1.0, 1.0, 0.07]
@@ -323,6 +344,7 @@ def _plane(
     stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array, float]]
 ) -> Occluder:
     """Return a rectangle below all balls as its normal has it."""
+    # Below all balls along its normal, and wide enough to reach beyond all of them.
     lowest = min(float(position @ normal) - radius for position, radius in balls)
     lowest = min(lowest, -0.43) - stream.between(0.003, 0.11)
     extent = 1.3 + max(float(np.linalg.norm(position)) + radius for position, radius in balls)
@@ -342,12 +364,14 @@ def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Occluder:
     high = np.max([position + radius for position, radius in balls], axis=0) + stream.between(
         0.11, 0.31
     )
+    # Wider than the box of all balls by 13 %, since the room is turned by a few degrees.
     half = 0.5 * (high - low) * 1.13
     radius = float(np.linalg.norm(half))
     axis = stream.vector()
     reflectance = np.array([stream.between(0.11, 0.61) for _ in range(3)])
     vertices, faces = box(2 * half / radius)
     turn = axis, stream.between(0.3, 2.3)
+    # Reversed faces: the room is seen from inside.
     return _placed(
         "room", (vertices, faces[:, ::-1]), 0.5 * (low + high), radius, turn, reflectance
     )
@@ -366,6 +390,8 @@ def _user_mesh(path: Path) -> Mesh:
         raise InputError(
             f"meshes: {path} has no triangles or numbers that are not finite; expected a mesh"
         )
+    # The middle of the bounding box of the vertices that faces use; the farthest vertex is at the
+    # distance 1.
     used = vertices[np.unique(faces)]
     middle = 0.5 * (used.min(axis=0) + used.max(axis=0))
     size = float(np.linalg.norm(used - middle, axis=1).max())

@@ -41,11 +41,6 @@ from airlight.validation.scenes.random.media import Medium, draw_media
 from airlight.validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
 from airlight.validation.scenes.registry import Animation, SceneRecord
 
-_ATTEMPTS = 17
-_TABLE = 513  # values of a tabulated phase function
-# rays of the camera, and points on each, at which light is looked for
-_ACROSS, _UP, _ALONG = 7, 5, 3
-
 
 @dataclass(frozen=True)
 class RandomScene:
@@ -109,8 +104,9 @@ def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, Any]]:
     shapes of its occluders.
     """
     draws = []
-    for attempt in range(_ATTEMPTS):
+    for attempt in range(17):
         drawn = draw_scene(seed, ranges, attempt)
+        # The shapes are built once, for the test of the light and for the scene.
         shapes = {occluder.name: _shape(occluder) for occluder in drawn.occluders}
         drawn = with_reach(drawn, mi.load_dict({"type": "scene"} | shapes, optimize=False))
         draws.append((drawn, shapes))
@@ -132,11 +128,13 @@ def draw_scene(seed: int, ranges: Ranges, attempt: int = 0) -> RandomScene:
     occluders = draw_occluders(draws, ranges, origin, lights, in_shadow=in_shadow)
     occluders += draw_ground(draws, ranges, origin, lights, occluders)
     kinds = [occluder.kind for occluder in occluders]
+    # Names such as 'box-2' count the occluders of each kind.
     named = [
         replace(occluder, name=f"{occluder.kind}-{kinds[:number].count(occluder.kind) + 1}")
         for number, occluder in enumerate(occluders)
     ]
     stream = draws.of("place")
+    # An arbitrary place, away from the origin: no code may rely on a scene around it.
     centre = scale * np.array([stream.between(-2.3, 2.3) for _ in range(3)])
     inside = [medium.name for medium in media if medium.holds_camera]
     return RandomScene(
@@ -161,6 +159,7 @@ def _draw_view(draws: Draws, ranges: Ranges) -> tuple[Array, Array, float]:
     distance = draws.logarithmic(*ranges["camera_distance"], name="camera_distance")
     elevation = math.radians(draws.between(*ranges["camera_elevation"], name="camera_elevation"))
     azimuth = stream.between(0, 2 * math.pi)
+    # The camera is at a distance from the middle of the stage and looks near it.
     across = math.cos(elevation)
     origin = distance * np.array(
         [across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)]
@@ -175,8 +174,12 @@ def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
     directions = _directions(drawn)
     away = float(np.linalg.norm(drawn.origin - drawn.centre))
     hit = distance(occluders, np.broadcast_to(drawn.origin, directions.shape), directions)
+    # Rays that meet nothing end behind the stage.
     free = np.minimum(hit, away + drawn.scale)
-    fraction = (np.arange(_ALONG) + 0.5) / _ALONG
+    # The middles of equal parts of the free way of each ray, the points at which light is looked
+    # for.
+    along = 3  # points on each ray
+    fraction = (np.arange(along) + 0.5) / along
     points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(
         -1, 3
     )
@@ -191,8 +194,10 @@ def _directions(drawn: RandomScene) -> Array:
     left /= np.linalg.norm(left)
     up = np.cross(forward, left)
     tangent = np.tan(0.5 * np.deg2rad(drawn.fov))
-    x = tangent * (2 * (np.arange(_ACROSS) + 0.5) / _ACROSS - 1)
-    y = 0.75 * tangent * (2 * (np.arange(_UP) + 0.5) / _UP - 1)
+    # The centres of the pixels of a small image of 4 to 3.
+    columns, rows = 7, 5
+    x = tangent * (2 * (np.arange(columns) + 0.5) / columns - 1)
+    y = 0.75 * tangent * (2 * (np.arange(rows) + 0.5) / rows - 1)
     rays = (forward + x[:, None, None] * left + y[None, :, None] * up).reshape(-1, 3)
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
@@ -201,6 +206,7 @@ def _place(drawn: Light) -> LightPlace:
     """Return where a light is, or of a spot or flat light where it shines
     too; a sphere in its middle.
     """
+    # A spot shines within its cone, a flat light in front of its plane: a cosine of at least 0.
     axis = (drawn.target - drawn.position) / np.linalg.norm(drawn.target - drawn.position)
     cos_cutoff = math.cos(math.radians(drawn.cutoff)) if drawn.kind == "spot" else 0.0
     directed = drawn.kind in ("spot", "rectangle", "disk")
@@ -226,10 +232,13 @@ def _purpose(drawn: RandomScene) -> str:
 
 def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
     fillings = {medium.name: _filling(medium) for medium in drawn.media}
+    # Media are built once and shared: the camera, and both sides of each bound, reference the same
+    # medium.
     around = fillings.get("unbounded")
     sensor = camera(
         drawn.origin.tolist(), drawn.target.tolist(), fov=drawn.fov, size=(800, 600), in_fog=False
     )
+    # Mitsuba's clip planes in proportion to the scene, of any size.
     sensor |= {"near_clip": 1e-5 * drawn.scale, "far_clip": 1e5 * drawn.scale}
     own = fillings.get(drawn.inside, around)
     return {
@@ -250,7 +259,7 @@ def _filling(medium: Medium) -> Any:
     described = fog(
         sigma_t[0] if medium.grey else sigma_t,
         medium.albedo.tolist(),
-        phase_function(medium.phase, _TABLE),
+        phase_function(medium.phase, 513),  # values where it is tabulated
     )
     return mi.load_dict(described | {"id": f"{medium.name}-medium"})
 
@@ -269,6 +278,8 @@ def _boundary(medium: Medium, filling: Any, around: Any) -> Any:
             "bsdf": {"type": "null"},
             "interior": filling,
         } | outside
+    # Bodies of half sizes 1, which `half` scales; `media._BALLS` knows the radii of the balls about
+    # and within them.
     mesh = {"box": box((2.0, 2.0, 2.0)), "gem": gem(9, 4), "ellipsoid": icosphere(1)}[medium.bounds]
     mesh = placed(scaled(mesh, medium.half), medium.centre, rotation(*medium.turn))
     return medium_boundary(medium.name, mesh, filling, around)
@@ -287,6 +298,7 @@ def _light(drawn: Light) -> dict[str, Any]:
         if drawn.kind == "sphere":
             lamp["to_world"] = _ball(drawn.position, drawn.size[0])
         return lamp
+    # A spot that shines along the vertical needs another direction up.
     upright = abs(direction[2]) < 0.99 * np.linalg.norm(direction)
     cone = {"cutoff": drawn.cutoff, "beam": drawn.beam, "up": [0, 0, 1] if upright else [1, 0, 0]}
     return light(drawn.kind, colour, **where, **cone)
