@@ -29,6 +29,7 @@ def paper_tables(rows: Sequence[Claim], *, plain: bool = True) -> list[Table]:
     """
     made = []
     names = dict.fromkeys(row.paper for row in rows)
+    # First the verdicts of all papers, then their numbers without one.
     for judged, paper in itertools.product((True, False) if plain else (True,), names):
         several = [
             row for row in rows if row.paper == paper and (row.verdict is not None) == judged

@@ -36,6 +36,7 @@ def print_json(data: Any) -> None:
     import json
 
     try:
+        # JSON has no NaN: other programs could not read it.
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
         from airlight.errors import InputError
@@ -44,15 +45,11 @@ def print_json(data: Any) -> None:
             "a result is not finite, and is not printed; a number of the input may be too large"
         ) from None
     try:
+        # An output in ASCII gets escapes in place of the characters that it lacks.
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
         text = json.dumps(data, indent=2, allow_nan=False)
     print(text)
-
-
-#: Pictures narrower than this are enlarged by a whole factor, so that single pixels
-#: can be seen [CSS pixels].
-_NARROW = 240
 
 
 class Result:
@@ -101,6 +98,7 @@ class Result:
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
         """Return the claims, tables and lines for a terminal."""
+        # Claims above, tables, then lines, with an empty line between tables and lines.
         claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
         drawn = [text(table, width=width, styled=styled) for table in self.tables]
         lines = [*([""] if drawn and self.lines else []), *self.lines]
@@ -166,7 +164,9 @@ def bullets(items: Sequence[str]) -> str:
 
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
     """Return a PNG file of that width [pixels] as a figure that carries it inside."""
-    times = max(1, -(-_NARROW // width))
+    # A narrow picture is enlarged to 240 CSS pixels or more, so that single pixels can be seen; by
+    # a whole factor, so that each stays a square of one size.
+    times = max(1, -(-240 // width))
     style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return (
