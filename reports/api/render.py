@@ -546,7 +546,7 @@ def asked_configurations(
         parse_settings,
     )
 
-    # A setting kernel=NAME is one more kernel, a word for each other setting.
+    # A word kernel=NAME is one more kernel; every other word is a setting.
     named_kernels = several(kernels)
     if isinstance(settings, Mapping):
         given = dict(settings)

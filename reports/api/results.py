@@ -384,7 +384,7 @@ def write_image(
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped
 
-    # An EXR file gets the versions and the machine in its header.
+    # An EXR file gets the versions and the build in its header.
     if path.suffix.lower() == ".exr":
         write_exr(path, stamped(image))
     elif path.suffix.lower() == ".png":

@@ -259,8 +259,8 @@ def _part(
                     cells[0].chosen.label if len(cells) == 1 else f"times of {len(cells)} methods"
                 )
                 problems.append(Problem(cells[0].scene, what, outcome.status, outcome.reason))
-            # The Parquet is for whoever looks while the sweep runs; writing it whole for each row
-            # would take longer than the rows.
+            # The Parquet is for anyone who looks while the sweep runs; writing it whole for each
+            # row would take longer than the rows.
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()

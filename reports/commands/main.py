@@ -341,7 +341,7 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
             start_again_with(" ".join([*extras.split(), error.extra]))
         return _fail(str(error), MISSING)
     except OSError as error:
-        # A file that cannot be opened, or a full disk, is the user's to mend; every other OSError
+        # A file that cannot be opened, or a full disk, is for the user to fix; every other OSError
         # is a fault of the program.
         if error.filename is None and error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise

@@ -265,8 +265,7 @@ def _stability(old: Report, new: Report) -> Iterator[Finding]:
 
 def _growth(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the powers of the work with which times grow."""
-    # `other_power` is zero where the exponents agree within their errors, else the sign of the
-    # change.
+    # `other_power` is the change of the exponent, and zero where noise may explain it.
     for before, after in same_records(old.scaling, new.scaling):
         for name, growth in after.growth.items():
             if change := other_power(before.growth[name], growth):
@@ -291,7 +290,7 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
         name = f"{paper}, {item}"
         if now is None:
             yield Finding("worse", "", "", f"{name}: the row is gone")
-        # The paper did not change: whoever edits its figure changes the claim.
+        # The paper did not change: an edited figure is another claim.
         elif now.published != row.published:
             yield Finding(
                 "worse", "", "", f"{name}: the published figure", row.published, now.published

@@ -266,8 +266,8 @@ def try_kernel(variant: str) -> Kernel:
     """Run a kernel in a separate process; raises EndedError or
     MissingError where it does not work.
     """
-    # The time includes the start of the process and its imports. The first kernel on a GPU compiles
-    # OptiX's own: three minutes.
+    # The time includes the start of the process and its imports. The first kernel on a GPU also
+    # compiles OptiX's own, and gets three minutes for it.
     took = stopwatch()
     kernel = in_own_process(
         probe, what="the test kernel in", name=variant, limit=180, variant=variant

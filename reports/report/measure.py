@@ -105,8 +105,8 @@ def write_report(
 
     with fresh_results(since):
         for name in names:
-            # Every scene is opened once to be checked and to say how long it will take, and is not
-            # held: it is opened again when its turn comes.
+            # Every scene is opened once to be checked and to say how long it will take, and again
+            # when its turn comes.
             each = opened(name)
             notes += each.scene.features.notes
             of_scenes.append((f"{each.name}: ", each.seconds()))
@@ -299,8 +299,8 @@ def _move(hidden: Path, target: Path) -> None:
     with suppress(InputError):  # there was none, or of another version
         report, folder = load_report(target)
         before = {folder / name for name in named_files(report)}
-    # Images first, page and data last: whoever opens the page meanwhile finds every image that it
-    # names.
+    # Images first, page and data last: a reader who opens the page meanwhile finds every image that
+    # it names.
     for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
         place = target / path.relative_to(hidden)
         place.parent.mkdir(parents=True, exist_ok=True)

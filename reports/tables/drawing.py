@@ -131,7 +131,7 @@ def _fitted(
         for place, column in zip(places, cells)
     ]
     least = [min(wide, 30) if columns[place].words else wide for place, wide in zip(places, least)]
-    # The list of victims: its end is left out first, minor columns and quartiles before others,
+    # Columns are left out from the end of this list: minor columns and quartiles before others,
     # right before left.
     order = sorted(places[1:], key=lambda place: (columns[place].minor, place))
     left: list[int] = []

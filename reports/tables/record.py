@@ -52,6 +52,11 @@ def print_json(data: Any) -> None:
     print(text)
 
 
+#: Pictures narrower than this are enlarged by a whole factor, so that single pixels
+#: can be seen [CSS pixels].
+_NARROW = 240
+
+
 class Result:
     """The result of a function."""
 
@@ -164,9 +169,8 @@ def bullets(items: Sequence[str]) -> str:
 
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
     """Return a PNG file of that width [pixels] as a figure that carries it inside."""
-    # A narrow picture is enlarged to 240 CSS pixels or more, so that single pixels can be seen; by
-    # a whole factor, so that each stays a square of one size.
-    times = max(1, -(-240 // width))
+    # A whole factor, so that every pixel stays a square of one size.
+    times = max(1, -(-_NARROW // width))
     style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return (

@@ -186,7 +186,7 @@ class LiveScene:
         """Change the scene; names that are not given are as they were. If scene or method
         refuse, all is as it was.
         """
-        # Changes are absolute: all of them are applied again to the scene as it was read.
+        # Changes are absolute values: the old and the new ones are applied together.
         before, renderer = self.changes, self.renderer
         wanted = before | dict(changes)
         moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}

@@ -179,8 +179,8 @@ class Session:
         """
         changes: dict[str, Values] = {}
         messages = [message for sender, message in said if sender is page]
-        # A slider sends a value for every pixel of its way: only the last before another message
-        # counts. Changes are collected until a message that is none.
+        # A slider sends a value for every pixel of its way: only the last choice of one parameter
+        # counts. Changes of the scene are collected until another kind of message comes.
         for message, following in zip(messages, [*messages[1:], {}]):
             if message.get("kind") == "choose" and _chooses(message) == _chooses(following):
                 continue
