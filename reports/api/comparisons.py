@@ -239,7 +239,7 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     relative = relative_error(np.where(mask, reference, np.nan), test)
     compared = ~np.isnan(relative)
     # Programs that open the file expect finite values: pixels without a difference hold 0, and the
-    # attribute counts those of them that are not masked.
+    # attribute counts the unmasked ones.
     difference = np.subtract(test, reference, out=np.zeros_like(test), where=compared)
     shown = np.where(np.isfinite(relative), relative, 0)
     attributes: dict[str, str | int | float] = {

@@ -329,7 +329,7 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     from airlight.validation.study.run import layered_frame
     from airlight.validation.study.turns import time_alone
 
-    # `_ready` estimates the work of all frames of this command, those of the timing included.
+    # `_ready` estimates the work of all frames of this command, frames of the timing included.
     variant, chosen = activate(), asked.chosen
     loaded, read, renderer, layered = _ready(
         asked, samples + (TIMED if timed else 0), samples == 1, progress

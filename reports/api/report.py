@@ -241,7 +241,7 @@ def _command(
     """Return what makes a report again: a command where all has a name,
     else the call from Python.
     """
-    # Settings from Python may be a mapping, those of a command line are words.
+    # Settings from Python may be a mapping, settings of a command line are words.
     values = (
         [f"{name}={value}" for name, value in settings.items()]
         if isinstance(settings, Mapping)

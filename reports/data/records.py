@@ -203,7 +203,7 @@ class Report:
 
 
 def read_report(path: Path | str) -> Report:
-    """Read a report.json of the current schema, or that of a folder."""
+    """Read a report.json of the current schema, by its path or its folder."""
     file = _report_file(path)
     data = read_json(file, f"what `airlight report -o {file.parent}` writes")
     # Another schema is refused by its name: its values could fit these types and mean something

@@ -151,7 +151,7 @@ def _scene(report: Report, name: str | None) -> Scene:
 
 
 def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
-    """Return the methods to show: those that were asked for, or the most accurate of each."""
+    """Return the methods to show: the requested ones, or the most accurate of each."""
     known = {
         entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)
     }

@@ -4,7 +4,7 @@
 Dr.Jit knows whether (`dr.has_backend`), but not why not, and it loads OptiX
 when the first ray is cast.
 
-The rules are those of drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which
+The rules come from drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which
 is driver 535, or newer; for OptiX not CUDA 12.7 (drivers 565 to 569, refused as miscompiling);
 compute capability 7.5 for the kernels that it ships.
 """

@@ -145,7 +145,7 @@ def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
     exact = thin(reference)
     exact.setdefault("surface", np.zeros_like(exact["airlight"]))
     codes = {name: reference_codes(exact[name]) for name in LAYERS}
-    # The floors are those of the whole image, so that they do not depend on which pixels are kept.
+    # Floors come from the whole image: they must not depend on which pixels the page holds.
     whole = dict(reference)
     whole[TOTAL] = whole["airlight"] + whole.get("surface", 0)
     floors = {name: _floor(whole.get(name)) for name in (*LAYERS, TOTAL)}

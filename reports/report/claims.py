@@ -103,7 +103,7 @@ def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
 
 
 def _entries(scenes: Scenes) -> list[tuple[str, Row]]:
-    """Return the scene's name with every entry: those of methods, then the images of engines."""
+    """Return the scene's name with every entry: first methods, then images of engines."""
     entries = [(scene.name, entry) for scene in scenes for entry in scene.methods]
     return sorted(entries, key=lambda pair: pair[1].kind == "image")
 

@@ -217,7 +217,7 @@ def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None
 def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuration, str]:
     """Render a small frame with every user method: what is at fault there is said before the work.
 
-    Returns those that ended their process, with how: they are not called again.
+    Returns the methods that ended their process, with how: they are not called again.
     """
     # A small frame shows most faults of code. Refusals of this scene are no faults.
     ended = {}

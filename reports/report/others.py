@@ -62,7 +62,7 @@ def other_parts(study: Study) -> list[OtherPart]:
     return parts
 
 
-# The modules of these inputs are those that compute, not the reports that show.
+# The modules of these inputs compute; the reports that show results are not among them.
 
 
 # --- kernels --------------------------------------------------------------------------------------

@@ -112,7 +112,8 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
             label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
             times = [cost.frame.median_ms for cost in costs]
             panel.plot([cost.work for cost in costs], times, label=label, **styles[record.label])
-        # The camera rays are the same for all methods: those of the last one stand for all.
+        # The camera rays are the same for all methods: the times beside the last method stand for
+        # all.
         rays = [cost.rays.median_ms for cost in costs]
         panel.plot(
             [cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays"

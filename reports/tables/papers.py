@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The claims of papers with their verdicts, and the numbers that papers print beside ours.
 
-Rows are those that stand under `papers` of report.json.
+The rows stand under `papers` in report.json.
 """
 
 import itertools

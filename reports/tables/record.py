@@ -121,7 +121,7 @@ class Said(Result):
     """A result that is worked out as a whole."""
 
     name: str
-    data: Any = None  #: as JSON has them; by default those of the record
+    data: Any = None  #: as JSON has them; by default the data of the record
     claims: Sequence[str] = ()
     tables: Sequence[Table] = ()
     lines: Sequence[str] = ()

@@ -173,7 +173,7 @@ class LiveScene:
         """Render by the shader as it is in its file now; if that is at fault, all is as it was."""
         known = defaults(find_method(self.chosen.method))
         given = {name: value for name, value in self.chosen.parameters if name in known}
-        # The new text may have other parameters: values of those that stayed are kept.
+        # The new text may have other parameters: parameters that stayed keep their values.
         chosen = configuration(self.chosen.method, None, given)
         made = prepared(self.scene, chosen)
         self.chosen, self.renderer, self._other_method = chosen, made, True
