@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of what is shown: in which order its pixels come, and the process that computes it.
 
-Pixels of a coarse grid come first, then pixels of grids of half its step. Within a grid the order is
-random, so that what is known is a fair sample of the image at any time, and the picture of it grows
-sharper. The process yields the processor to the view. A new task ends the one before it, at the
-next of its chunks; the process ends with the other end of its pipe, however the view has ended.
+Pixels of a coarse grid come first, then pixels of grids of half its step. Within a grid the order
+is random, so that what is known is a fair sample of the image at any time, and the picture of it
+grows sharper. The process yields the processor to the view. A new task ends the one before it, at
+the next of its chunks; the process ends with the other end of its pipe, however the view has ended.
 """
 
 import os
