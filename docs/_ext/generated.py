@@ -35,6 +35,7 @@ def fill(text: str) -> str:
 
 
 def _part(match: re.Match[str]) -> str:
+    # Only functions that the module defines count: an imported one of the same name is no part.
     name = match[1].replace("-", "_")
     for module in (listed, measured, shown, tested):
         function = getattr(module, name, None)
@@ -50,6 +51,7 @@ def _code(link: re.Match[str]) -> str:
 def _notebook(text: str) -> str:
     """Return the cells of a notebook with their output as Markdown."""
     parts = []
+    # Sources as code, outputs as HTML where they have it, as a notebook shows them.
     for cell in json.loads(text)["cells"]:
         source = "".join(cell["source"])
         parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
@@ -67,6 +69,8 @@ def _notebook(text: str) -> str:
 
 
 def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
+    # First a notebook becomes Markdown; links are changed before the parts are filled in, which
+    # have links of their own.
     if app.env.doc2path(docname).suffix == ".ipynb":
         content[0] = _notebook(content[0])
     text = _SOURCE.sub(_code, content[0])
@@ -86,6 +90,7 @@ def _escape(
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Fill every page when it is read."""
+    # Made once here, before Sphinx starts processes that would each make it.
     listed.commands()
     app.connect("source-read", _replace)
     app.connect("autodoc-process-docstring", _escape, priority=900)

@@ -54,6 +54,7 @@ def _homes() -> dict[str, str]:
     """Return the module of each public name."""
     import airlight
 
+    # The stub lists what is public; values are imported when somebody asks for them.
     stub = ast.parse(Path(airlight.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
     lines = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
     return {name.name: f"airlight.{line.module}" for line in lines for name in line.names}
@@ -79,6 +80,7 @@ def signatures() -> str:
     """Return the functions and classes of `import airlight` with their docstrings, and the
     results that they return.
     """
+    # Classes that functions return belong to the reference of the API, though nobody imports them.
     paths = {
         f"{each.__module__}.{each.__name__}": each
         for each in _public().values()
@@ -159,6 +161,7 @@ def _parameter(item: Any) -> tuple[str, str]:
     from airlight.realtime.parameters import limits_of, wanted_values
 
     limits = limits_of(item)
+    # The default first, then the other choices, each once.
     if isinstance(item.default, str) and limits.choices:
         values = ", ".join(
             f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices))
@@ -166,6 +169,7 @@ def _parameter(item: Any) -> tuple[str, str]:
     else:
         values = f"{item.default}; {wanted_values(item)}"
     what = _cell(limits.help)
+    # Words in the help may have a section of the documentation.
     for words, link in LINKS.items():
         what = what.replace(words, f"[{words}]({link})")
     return _cell(values), what
@@ -199,6 +203,7 @@ def commands() -> str:
     from airlight.reports.commands.main import command_names, find_command
 
     shown = []
+    # Cyclopts writes a heading of its own, which is cut off.
     for words in command_names():
         name = " ".join(["airlight", *words])
         _, _, text = find_command(words).generate_docs(usage_name=name).partition("\n")
@@ -211,6 +216,7 @@ def report_keys(*parts: str) -> str:
     itself, from its records.
     """
     found = []
+    # A part is named by its record, in lower case with hyphens.
     for part in parts or ("report",):
         record = record_types()[part.title().replace("-", "")]
         rows = [(f"`{name}`", what) for name, what in meanings(record).items()]

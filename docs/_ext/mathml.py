@@ -30,6 +30,8 @@ def markup(latex: str, *, block: bool) -> str:
     cannot be read ends the build.
     """
     try:
+        # The XML parser knows no HTML entities, and names without the namespace are shorter to
+        # compare.
         formula = tex2mathml(latex, as_block=block).replace("&ApplyFunction;", _APPLIED)
     except Exception as error:  # a MathError, or an exception inside docutils
         raise ExtensionError(f"formula {latex!r}: {error}") from error
@@ -55,6 +57,7 @@ def _spaced(row: list[ElementTree.Element]) -> list[ElementTree.Element]:
     spaced: list[ElementTree.Element] = []
     for element, following in zip(row, [*row[1:], None]):
         if element.text == _APPLIED:
+            # No space before a bracket or another operator.
             if following is not None and following.tag != "mo":
                 spaced.append(ElementTree.Element("mspace", width=_WIDTH))
             continue

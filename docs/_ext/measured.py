@@ -52,6 +52,7 @@ def kept_scenes() -> tuple[KeptScene, ...]:
     """
 
     def row(entry: Mapping[str, Any]) -> dict[str, Any]:
+        # The kept file leaves out what no page shows.
         error = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
         return {**entry, "error": error}
 
@@ -64,6 +65,7 @@ def kept_scenes() -> tuple[KeptScene, ...]:
 
 def provenance() -> str:
     """Return on what machine, when and how the numbers of a page were measured."""
+    # The folder of the report is left out of its command: a reader has another.
     report = data()["report"]
     versions = report["versions"]
     command = report["command"].split(" -o ")[0]
@@ -97,6 +99,7 @@ def method(name: str) -> str:
     """Return a method's costs and errors in every scene."""
     rows, notes = [], []
     for scene in kept_scenes():
+        # Numbers in a table; refusals and times that were not measured as a list below.
         for entry in scene.methods:
             if entry.method != name:
                 continue
@@ -136,12 +139,14 @@ def kernel_costs(phase: str) -> str:
         return "No costs of kernels are at hand: `airlight study kernels` measures them."
     costs = []
     for cost in (record_of(each, KernelCost) for each in kernels["costs"]):
+        # A kernel with a number is shown at its default only.
         default = (
             next(iter(KERNELS[cost.family].parameters.values()), None)
             if cost.family in KERNELS
             else None
         )
         if cost.phase == phase and cost.size in (default, None):
+            # Whichever time the study could take stands in the column.
             costs.append(replace(cost, device=cost.time))
     return markdown(
         cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max")
@@ -173,6 +178,7 @@ def scenes() -> str:
 def _scene(record: Any, kept: KeptScene | None) -> str:
     words = [f"## `{record.name}`", "", scene_picture(record.name)]
     words += [record.purpose, "", f"- Published: {record.published}."]
+    # A scene that the kept report did not measure has its picture and its purpose only.
     if kept:
         count, lights = kept.counts, kept.plan["lights"]
         words.append(
@@ -195,6 +201,8 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
 def cycles() -> str:
     """Return the faults that were set in Blender's Cycles, and what the diagnosis said of each."""
     record = json.loads((DATA / "cycles-faults.json").read_text(encoding="utf-8"))
+    # Faulty and right images are counted apart: naming a fault and calling a right image right are
+    # two abilities.
     faults = [row for row in record["rows"] if row["injected"] != "right"]
     right = [row for row in record["rows"] if row["injected"] == "right"]
     said = (
@@ -251,6 +259,7 @@ def diagnosis_limits() -> str:
 
 def _counted(counts: dict[str, Any], key: str) -> list[str]:
     cells = []
+    # The scenes by which the limits were chosen, then others.
     for name in ("calibrated", "measured"):
         count = counts[name][key]
         cells += [f"{count['false']} of {count['right']}", f"{count['found']} of {count['faulty']}"]
@@ -259,6 +268,7 @@ def _counted(counts: dict[str, Any], key: str) -> list[str]:
 
 def _faults(said: str, rows: list[dict[str, Any]]) -> str:
     head = ("injected fault", "expected name", "named first", "words", "error", "left")
+    # A record of several scenes has a column for them.
     several = "scene" in rows[0]
     cells = [[*([row["scene"]] if several else []), *_diagnosed(row)] for row in rows]
     return f"{said}\n\n" + table([*(["scene"] if several else []), *head], cells, 4 + several)
@@ -266,6 +276,7 @@ def _faults(said: str, rows: list[dict[str, Any]]) -> str:
 
 def _diagnosed(row: dict[str, Any]) -> list[str]:
     """Return the cells of an injected fault and of what the diagnosis said."""
+    # A wrong answer is bold.
     first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
     says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
     errors = (f"{100 * row[key]:.2g} %" for key in ("residual", "left"))

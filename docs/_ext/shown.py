@@ -27,6 +27,7 @@ def strip() -> str:
 
 def pictures(method: str) -> str:
     """Return the picture of a method, its error and its sketch, side by side, with captions."""
+    # A method may lack a sketch or an error; without any picture the section has none.
     shown = {kind: _of_method(method, kind) for kind in _METHODS}
     present = {kind: entry for kind, entry in shown.items() if entry}
     if not present:
@@ -48,6 +49,7 @@ def _of_method(method: str, kind: str) -> dict[str, Any] | None:
 
 
 def _caption(present: dict[str, dict[str, Any]]) -> str:
+    # The caption names what stands there, from left to right.
     rendered, error = present["method"], present.get("error")
     if error is None:
         return f"Rendered by `{rendered['command']}`."

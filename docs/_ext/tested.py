@@ -22,6 +22,7 @@ def tested_claims() -> str:
     """
     topics = tomllib.loads((ROOT / "docs/claims.toml").read_text(encoding="utf-8"))
     tests: dict[str, list[str]] = {}
+    # Tests are read, not imported: the page needs no Mitsuba.
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
         for claim, line in _marks(path):
             tests.setdefault(claim, []).append(line)
@@ -30,6 +31,7 @@ def tested_claims() -> str:
         raise ExtensionError(
             f"docs/claims.toml: claims without a test, or tests of no claim: {', '.join(wrong)}"
         )
+    # Topics and claims in the order of the file.
     lines = []
     for topic, claims in topics.items():
         lines += [f"## {topic}", ""]
@@ -42,6 +44,7 @@ def _marks(path: Path) -> Iterator[tuple[str, str]]:
     """Yield each claim that a file of tests names, with a line on the test."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     module = path.relative_to(ROOT).as_posix()
+    # Marks of a module hold for each of its tests, marks of a test for itself.
     of_all = [
         node
         for node in tree.body
@@ -54,6 +57,7 @@ def _marks(path: Path) -> Iterator[tuple[str, str]]:
     ]
     for name, expressions in marked:
         words = " ".join(ast.unparse(each) for each in expressions)
+        # The tier of a test may come from the mark of its module.
         tiers = [tier for tier in ("statistical", "slow") if f"mark.{tier}" in words] or ["default"]
         for call in (
             node for each in expressions for node in ast.walk(each) if isinstance(node, ast.Call)

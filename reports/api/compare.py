@@ -121,11 +121,14 @@ def compare(
     >>> abs(fitted["sigma_t"].value / 0.173 - 1) < 1e-4
     True
     """
+    # NAME=airlight names a layer and says which light it contains.
     layer, _, holds = (layer or "").partition("=") if "=" in (layer or "") else (layer, "", None)
     if holds not in (None, "airlight", "surface", "total"):
         raise InputError(
             f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total"
         )
+    # A name or an XML file is a scene; a file that exists is an image, and so is an array. Two
+    # arguments in the wrong order are refused before a file is opened.
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and (_is_xml(test) or not Path(str(test)).is_file()):
         raise InputError(
@@ -136,6 +139,8 @@ def compare(
         "margin": margin,
         "all_metrics": all_metrics,
     }
+    # Which options go together is decided here, before any file is read, so that a mistake costs no
+    # waiting.
     if scene is None:
         of_scenes = {
             "the content of the layer": holds,
@@ -152,6 +157,9 @@ def compare(
         )
     if fit is not None:
         exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
+    # Several files: frames of an animation with frames.json, or independent renders of one frame.
+    # Both are judged as a whole, so that a choice of pixels or a diagnosis of one image has no
+    # place.
     if frames is not None or (scene is not None and _are_several(test)):
         if diagnose or fit is not None:
             option = "diagnose" if diagnose else "fit"
@@ -164,15 +172,19 @@ def compare(
         )
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         return _several(str(scene), test, frames, progress=progress, **how)
+    # One image from here on.
     files = output_files(output, ".exr (values)", ".png (a picture)")
+    # A fit activates Mitsuba itself, once it has read the image.
     if fit is not None:
         return _fit(
             scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress
         )
+    # Two images need no Mitsuba, whose start takes seconds.
     options: dict[str, Any] = {"mask": mask, "margin": margin, "all_metrics": all_metrics}
     if scene is None:
         return _two_images(reference, test, layer, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel}
+    # The diagnosis and the comparison with a scene read files; an array is written to one.
     with _as_file(test) as (path, name):
         from airlight.reference.storage.exr import read_exr
         from airlight.reports.machine.environment import activate
@@ -191,6 +203,7 @@ def _are_several(test: Any) -> bool:
 
 def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "Said":
     """Compare frames that `frames` tells of, or independent renders."""
+    # The number of a frame is read from the name of its file.
     if not isinstance(test, str | os.PathLike):
         raise InputError(
             "frames: expected the files of all frames, such as 'frames/####.exr'; save the images "
@@ -218,6 +231,8 @@ def _is_scene(word: Any) -> bool:
     """
     if not isinstance(word, str | os.PathLike):
         return False
+    # A name without suffix that no file has is meant as a scene: a misspelt scene is then answered
+    # with the names of scenes and not with a missing file.
     path, name = Path(word), str(word)
     known = name in scene_names() or name.startswith("random:")
     return known or _is_xml(word) or not (path.suffix or path.exists())
@@ -238,6 +253,7 @@ def _as_file(image: Any) -> Iterator[tuple[Path, str]]:
     from airlight.reference.storage.exr import write_exr
     from airlight.reference.storage.files import temporary_folder
 
+    # Values that are not finite are written as they are: the comparison has to find them.
     layers, name = as_image(image, "airlight", "the test image")
     with temporary_folder() as folder:
         path = folder / "image.exr"
@@ -258,12 +274,15 @@ def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     from airlight.reference.storage.exr import Image, read_exr
     from airlight.reports.api.results import LayeredImage
 
+    # A result of `render` or `reference` keeps its layers, and its total becomes one of them, so
+    # that it can be compared with an image that has the total alone.
     if isinstance(image, LayeredImage):
         return image.with_total(), image.title
     if isinstance(image, str | os.PathLike):
         return read_exr(image), Path(image).name
     if isinstance(image, Image):
         return image, name
+    # Anything else must be an array of numbers; booleans and objects are mistakes.
     values = np.asarray(image)
     if values.dtype.kind not in "fiu":
         raise InputError(
@@ -292,9 +311,11 @@ def _two_images(
     from airlight.reports.api.comparisons import ImageComparison, write_difference
     from airlight.validation.comparison.images import compare_images
 
+    # The sides may be of different kinds: a file with a result, an array with a file.
     exact, exact_name = as_image(reference, layer, "the reference")
     tested, test_name = as_image(test, layer, "the test image")
     chosen, names = _mask(mask), (exact_name, test_name)
+    # Messages name a file by its whole path, a result by its title.
     paths = [
         str(each) if isinstance(each, str | os.PathLike) else name
         for each, name in zip((reference, test), names)
@@ -302,18 +323,20 @@ def _two_images(
     comparison = compare_images(
         exact, tested, layer=layer, mask=chosen, names=(paths[0], paths[1]), **options
     )
-    kept: dict[str, Any] = {
+    # The result also holds the compared layer of both images, for pictures and for the error of
+    # each pixel.
+    fields: dict[str, Any] = {
         field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)
     }
-    kept |= {
+    fields |= {
         each: image_layer(image, comparison.layer)
         for each, image in (("reference", exact), ("test", tested))
     }
     said = tuple(
-        (str(path), write_difference(path, kept["reference"], kept["test"], kept=chosen))
+        (str(path), write_difference(path, fields["reference"], fields["test"], kept=chosen))
         for path in files
     )
-    return ImageComparison(**kept, names=names, files=said)
+    return ImageComparison(**fields, names=names, files=said)
 
 
 def _with_scene(
@@ -329,14 +352,16 @@ def _with_scene(
     from airlight.reports.api.comparisons import scene_comparison, write_difference
     from airlight.validation.engine.judge import compare_scene
 
+    # The command that the result prints names the mask as a file.
     if mask is not None and not isinstance(mask, str | os.PathLike):
         raise InputError(
             "mask: an image is compared with a scene under a mask that is an EXR file; save it "
             "first"
         )
     with telling(progress, "the reference") as tell:
-        found = compare_scene(scene, path, mask=mask, progress=tell, **options)
-    compared = dataclasses.replace(found, path=name)
+        comparison = compare_scene(scene, path, mask=mask, progress=tell, **options)
+    # The image may lie in a temporary file, which no user knows: the result has its title instead.
+    compared = dataclasses.replace(comparison, path=name)
     images = compared.reference, compared.image
     said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
     return scene_comparison(compared, said)
@@ -361,6 +386,7 @@ def _fit(
     progress: Any,
     **how: Any,
 ) -> "Fitted":
+    # sigma_t=0.1 is a parameter and where its search starts; a name alone starts at the scene.
     words = listed("fit", parameters)
     names = [word.partition("=")[0].strip() for word in words]
     starts = named_values(
@@ -377,10 +403,11 @@ def _fit(
     from airlight.validation.engine.seen import judged_layer, scene_of_size
     from airlight.validation.fit.fit import fit_image
 
+    # The scene is loaded at the size of the image, whose pixels the fit explains.
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
     loaded = scene_of_size(str(scene), size, name)
     with telling(progress, "fit") as tell:
-        found = fit_image(
+        result = fit_image(
             layers,
             loaded,
             names,
@@ -391,4 +418,4 @@ def _fit(
             progress=tell,
             **how,
         )
-    return fitted(found)
+    return fitted(result)

@@ -82,6 +82,7 @@ class ImageComparison(Comparison, Pictured):
         return error_map(reference, test)
 
     def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        # A layer of one value a pixel, (height, width), is shown as grey.
         shape = (*self.reference.shape[:2], -1)
         reference, test = (
             np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test)
@@ -92,6 +93,8 @@ class ImageComparison(Comparison, Pictured):
         from airlight.reports.tables.record import block, bullets, picture
 
         reference, test = self._colours()
+        # Both images are shown in the exposure of the reference: a test image of another brightness
+        # must look brighter or darker, not alike.
         factor, width = exposure(reference), reference.shape[1]
         shown = [
             picture(
@@ -153,6 +156,8 @@ def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
     """Return what is wrong with an image: with each of airlight and surfaces
     where it has both as layers.
     """
+    # JSON has the first diagnosis under `diagnosis`, and all of them under `layers` where there are
+    # several.
     several = plain(diagnoses)
     first, *others = (diagnosis.lines for diagnosis in diagnoses)
     return Said(
@@ -188,6 +193,7 @@ class Fitted(Said):
 def fitted(fit: Fit) -> Fitted:
     """Return a fit as a result."""
     values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
+    # A row is a parameter: the fitted value and its 95 % interval, beside the value in the scene.
     columns = numbers(
         value="value", interval="95 % interval", scene="in the scene", how={"digits": 6}
     )
@@ -216,9 +222,11 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     width), and in EXR files those that are not finite, have no difference.
     """
     reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
-    seen = np.ones_like(reference, dtype=bool) if kept is None else np.asarray(kept)[..., None]
+    # A mask has one truth value a pixel; the new axis spreads it over the colours.
+    mask = np.ones_like(reference, dtype=bool) if kept is None else np.asarray(kept)[..., None]
+    # Masked pixels get the values of the reference, which the error map draws as no difference.
     if path.suffix.lower() == ".png":
-        write_png(path, error_map(reference, np.where(seen, test, reference)))
+        write_png(path, error_map(reference, np.where(mask, test, reference)))
         return (
             "signed relative error, blue too dark, red too bright, "
             f"from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
@@ -226,13 +234,17 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped
 
-    relative = relative_error(np.where(seen, reference, np.nan), test)
+    # Masked pixels become NaN in the reference, so that one test finds masked pixels and pixels
+    # whose difference is not a number.
+    relative = relative_error(np.where(mask, reference, np.nan), test)
     compared = ~np.isnan(relative)
+    # Programs that open the file expect finite values: pixels without a difference hold 0, and the
+    # attribute counts the unmasked ones.
     difference = np.subtract(test, reference, out=np.zeros_like(test), where=compared)
     shown = np.where(np.isfinite(relative), relative, 0)
     attributes: dict[str, str | int | float] = {
         "airlight:difference": "test - reference",
-        "airlight:not_finite": int((seen & ~compared).any(axis=-1).sum()),
+        "airlight:not_finite": int((mask & ~compared).any(axis=-1).sum()),
     }
     write_exr(path, stamped(Image({"total": difference, "relative": shown}, attributes=attributes)))
     return "test - reference in R, G, B, over the reference in the layer relative"

@@ -53,6 +53,7 @@ def describe(
     InputError
         For a scene without a reference, with the name of what is in the way.
     """
+    # The names of the files are checked before Mitsuba starts.
     files = output_files(output, ".glb", ".vol")
     from airlight.reports.machine.environment import activate
 
@@ -62,6 +63,7 @@ def describe(
     from airlight.reports.interchange.scene import describe_scene
 
     loaded = opened(scene, size)
+    # A .vol file holds a medium that varies, sampled to a grid; every other file is glTF.
     described = describe_scene(loaded)
     volumes = [path for path in files if path.suffix.lower() == ".vol"]
     written = [write_gltf(path, loaded) for path in files if path not in volumes]
@@ -76,9 +78,12 @@ def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid:
     """
     from airlight.reports.interchange.words import description_table
 
+    # The next step of the user, who renders the scene elsewhere and judges the image here.
     command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
     lines = [f"to judge it: {command}"]
     if written is not None:
+        # glTF knows triangles only: shapes that Mitsuba intersects in closed form have become
+        # meshes, which the user must know when the silhouettes differ.
         cut = ", ".join(written["tessellated"])
         more = f"; cut into triangles: {cut}" if cut else ""
         lines.append(f"{written['path']}: {written['triangles']} triangles{more}")
@@ -93,6 +98,7 @@ def _write_grid(path: Path, scene: Any) -> str:
     from airlight.reference.scene.varying import GridMedium, HeightMedium
     from airlight.reports.interchange.fog_grid import write_fog_grid
 
+    # A homogeneous medium needs no grid: its numbers stand in the description.
     medium = read_reference(scene).medium
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
@@ -144,11 +150,13 @@ def view(
     from airlight.reports.machine.environment import activate, require
 
     require("websockets", "view", "the live view")
+    # An IPv6 host has colons of its own: the port stands behind the last.
     host, _, digits = address.rpartition(":")
     if not host or not digits.isdecimal() or not (port := int(digits)) <= 65535:
         raise InputError(
             f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535"
         )
+    # Mistakes in words are found before Mitsuba starts.
     chosen = configuration_of(method, kernel, parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
@@ -157,6 +165,8 @@ def view(
     from airlight.reports.view.widgets import ViewState
 
     assert pixels is not None
+    # The session owns the scene and its threads, the server only passes messages on; the session
+    # must end its reference whether or not the server could listen.
     session = Session(ViewState(str(scene), pixels, chosen, changes), variant)
     try:
         try:
@@ -171,6 +181,7 @@ def view(
             ) from error
         server.start()
         print(f"{server.address}\nCtrl-C ends the view.", flush=True)
+        # Frames are rendered in this thread until Ctrl-C: Dr.Jit records in the thread that calls.
         session.run()
     finally:
         session.reference.end()

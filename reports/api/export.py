@@ -85,14 +85,19 @@ def export(
     from airlight.realtime.scene.phase import named_phase
     from airlight.reference.storage.files import write_text
 
+    # The text takes g as an argument, and it has no room for tables: phase functions with tables or
+    # with a value of g cannot be exported.
     if phase.startswith(("hg:", "tabulated", "mie")):
         raise InputError(
             f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg (g is an "
             "argument) or hg-draine:D"
         )
     files = output_files(output)
+    # With --test the text also holds certified rays, by which the user tests it on the user's own
+    # device.
     rows = _rows(phase) if test else ()
     code = kernel_text(kernel, named_phase(phase), language, rows)
+    # The head says the error of the text as it was measured, and does not promise one that was not.
     error, words = _measured(kernel, phase)
     text = _head(kernel, language, phase, words) + code
     for path in files:
@@ -116,6 +121,7 @@ def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
     """Return the largest error of a kernel that was measured, and a sentence."""
     from airlight.realtime.export.text import CONFORMING
 
+    # Errors are per kernel and phase function; a pair that the file lacks was not measured.
     data = json.loads(MEASURED.read_text(encoding="utf-8"))
     entry = data["errors"].get(kernel, {}).get(phase)
     if entry is None:
@@ -126,6 +132,8 @@ def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
         )
     error, count = entry["error"], entry["rays"]
     words = f"Largest relative error of J: {error:.1e} on {count} certified rays, GLSL on {data['device']}"
+    # Only the text of the exact kernel was also run by a simulated device that rounds as badly as
+    # Vulkan permits.
     if kernel == "exact":
         words += f";\n// on any device that keeps the bounds of Vulkan at most {CONFORMING:.0e}, by simulation"
     return error, f"{words}."
@@ -145,16 +153,21 @@ def _rows(phase: str) -> list[tuple[float, ...]]:
     cases = read_cases(certified_data("airlight_integral.csv"))
     assert cases.tag is not None
     assert cases.value is not None
-    own = phase if phase in cases.phase else "isotropic"
+    # The certified file has rays for some phase functions. For another one the isotropic rays give
+    # the geometry, and the values are integrated below.
+    certified_phase = phase if phase in cases.phase else "isotropic"
     # Values that float32 holds well: those beyond 60 optical depths are
     # close to its smallest number.
-    picked = np.array(cases.phase) == own
+    picked = np.array(cases.phase) == certified_phase
     picked &= cases.value > 1e-20
-    at = [np.flatnonzero(picked & (np.array(cases.tag) == kind))[0] for kind in _KINDS]
+    # One ray of each kind: a shader can be right on generic rays and wrong beside the light.
+    indices = [np.flatnonzero(picked & (np.array(cases.tag) == kind))[0] for kind in _KINDS]
     foot, height, x0, x1, sigma_t, g, values = (
-        getattr(cases, name)[at] for name in ("foot", "height", "x0", "x1", "sigma_t", "g", "value")
+        getattr(cases, name)[indices]
+        for name in ("foot", "height", "x0", "x1", "sigma_t", "g", "value")
     )
-    if own != phase:
+    # Gauss-Kronrod panels stand for the certified value here, to 1e-10.
+    if certified_phase != phase:
         values, _ = airlight_segments(foot, height, x0, x1, sigma_t, phase_from_words(phase))
     return list(
         zip(

@@ -98,6 +98,8 @@ def with_kernels(function: Callable[_P, _R]) -> Callable[_P, _R]:
 @functools.cache
 def scene_names() -> tuple[str, ...]:
     """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""
+    # A scene is a table with a purpose. Its TOML file is read here, because the registry of scenes
+    # imports Mitsuba and `airlight --help` must not.
     files = (Path(__file__).resolve().parents[2] / "validation" / "scenes").glob("*.toml")
     tables = (
         item for file in files for item in tomllib.loads(file.read_text(encoding="utf-8")).items()
@@ -139,16 +141,19 @@ def output_files(output: Any, *endings: str) -> list[Path]:
 
     files = [Path(path) for path in several(output)]
     for path in files:
+        # The suffix decides the format: an unknown one has none.
         if endings and path.suffix.lower() not in [words.split()[0] for words in endings]:
             raise InputError(
                 f"output: got {str(path)!r}, expected a name that ends in {' or '.join(endings)}"
             )
+        # A run of an hour must not fail when it writes its result.
         ensure_writable(path)
     return files
 
 
 def listed(name: str, words: Any) -> list[str]:
     """Return the words of a list, or of a text with commas between them; none may be empty."""
+    # A command line has one text, Python may also give a list.
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]
     parts = [part.strip() for part in parts]
     if not all(parts):
@@ -160,11 +165,13 @@ def listed(name: str, words: Any) -> list[str]:
 
 def pixels_of(size: Any) -> tuple[int, int] | None:
     """Return two whole numbers or 'WxH' as width and height [pixels], None for None."""
+    # WxH is parsed where scenes are loaded, which has its messages.
     if size is None or isinstance(size, str):
         from airlight.validation.scenes.loading import parse_size
 
         return None if size is None else parse_size(size)
     try:
+        # Two values, each whole: 640.0 passes, 640.5 and a single number do not.
         width, height = size
         if not (int(width) == width and int(height) == height):
             raise ValueError
@@ -179,6 +186,8 @@ def changes_of(change: Any) -> dict[str, tuple[float, ...]]:
     """Return the changes of a scene by name."""
     from airlight.validation.scenes.changes import parse_changes
 
+    # A mapping is written as words, so that Python and the command line share one parser and its
+    # messages.
     if isinstance(change, Mapping):
         change = [f"{name}={_numbers(value)}" for name, value in change.items()]
     return parse_changes(several(change))
@@ -195,6 +204,8 @@ def kernel_name(kernel: Any) -> str | None:
     if kernel is None or isinstance(kernel, str):
         return kernel
     module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")
+    # Other processes import the kernel by this name: a lambda or a function inside a function
+    # cannot be imported.
     if not callable(kernel) or getattr(sys.modules.get(module), name, None) is not kernel:
         raise InputError(
             f"kernel: got {kernel!r}, expected a name or a function at the top of a module: give "
@@ -211,6 +222,7 @@ def configuration_of(method: Any, kernel: Any, parameters: Any) -> "Configuratio
 
     if not isinstance(method, Configuration):
         return configuration(method, kernel_name(kernel), parameters or {})
+    # Parameters count as given by their names, whatever their values are, 0 and None included.
     beside = {"kernel": kernel, **dict.fromkeys(parameters or (), True)}
     exclude("method", "a configuration has its own kernel and parameters", beside)
     return method
@@ -221,6 +233,7 @@ def telling(progress: Any, title: str) -> Iterator[Callable[[float, str], None]]
     """Yield a function (fraction done, what) that calls `progress`, shows a bar for True,
     or does nothing for None.
     """
+    # The command line shows a bar; a caller from Python gets the numbers.
     if progress is True:
         with progress_bar(title) as callback:
             yield callback

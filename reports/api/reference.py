@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from airlight.validation.estimates.images import Budget
     from airlight.validation.scenes.loading import LoadedScene
 
-USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
-USUAL_CLOUD_SAMPLES = 256  #: of one that traces clouds
 _ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 
 
@@ -114,7 +112,9 @@ def reference(
     """
     files = [Path(path) for path in several(merge)]
     budgets = {"samples": samples, "error": error, "seconds": seconds}
+    # Merging joins the samples of files that exist: options of tracing would have no effect.
     if files:
+        # A seed of 0 is the default and counts as not given.
         of_tracing = {
             "size": size,
             "seed": seed or None,
@@ -130,10 +130,13 @@ def reference(
             f"estimator: got {estimator!r}, expected one of {', '.join(_ESTIMATORS)}"
             + nearest(estimator, _ESTIMATORS)
         )
+    # Only estimators that trace multiple scattering have orders to choose.
     if orders is not None and estimator not in ("volpath", "cloud-paths"):
         raise InputError(
             f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath"
         )
+    # Workers: what they compute must not depend on how fast they are, or the same command would
+    # give other bytes.
     place = None
     if cluster is not None:
         from airlight.reports.cluster.connect import parse_place
@@ -146,7 +149,9 @@ def reference(
         if not isinstance(scene, str):
             raise InputError("cluster: workers load a scene by its name or path; give that")
         place = parse_place(cluster)
+    # A budget belongs to estimators that draw samples; the quadrature has none.
     budget = None
+    # cloud-paths without orders reports sets of orders.
     wanted = orders or ("sets" if estimator == "cloud-paths" else None)
     if estimator != "quadrature":
         if pixel != "centre":
@@ -154,9 +159,11 @@ def reference(
                 f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take "
                 "quadrature"
             )
-        budget = _budget(budgets, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
+        # Samples a pixel where no budget is given; an estimator that traces clouds gets fewer.
+        budget = _budget(budgets, usual=2048 if wanted is None else 256)
     else:
         exclude("quadrature", "draws no samples", {**budgets, "seed": seed or None})
+    # All words are checked; now Mitsuba starts.
     changes = changes_of(change)
     from airlight.reports.machine.environment import activate
 
@@ -166,8 +173,10 @@ def reference(
 
     loaded = opened(scene, pixels_of(size), changes)
     note(progress, scene_notes(loaded.scene))
+    # A run that would take days is refused with an estimate; a long one begins with a note.
     note(progress, _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None))
 
+    # Workers fill the cache, then the same code as without workers reads it: the bytes agree.
     def compute(tell: Callable[[float, str], None], workers: "Client | None" = None) -> "Reference":
         elsewhere = None
         if workers is not None:
@@ -181,6 +190,7 @@ def reference(
         )
 
     with telling(progress, f"{loaded.name}: {estimator}") as tell:
+        # This process computes all.
         if place is None:
             return compute(tell)
         from airlight.reports.cluster.connect import connected
@@ -195,14 +205,19 @@ def _check_work(
     """Refuse what takes too long, and return what a user should know of the time."""
     from airlight.validation.study.cost import check_work, reference_work, sampled_work
 
+    # A scene without a camera is counted as one pixel here, and is refused by name where it is
+    # read.
     size = loaded.size if loaded.scene.sensors() else (1, 1)
     if budget is None:
         emitters = loaded.scene.emitters()
+        # An area light costs the quadrature many light samples, so that the two kinds are counted
+        # apart.
         area_lights = sum(emitter.class_name() == "AreaLight" for emitter in emitters)
         work = reference_work(
             size, lights=len(emitters) - area_lights, area_lights=area_lights, pixel=pixel
         )
     else:
+        # A budget of error or of seconds names no number of samples: 64 a pixel stand for it.
         work = sampled_work(size, budget.samples or 64, clouds=clouds)
     kind = f"{estimator} of areas" if pixel == "area" else estimator
     return check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {kind}", [work])
@@ -224,12 +239,16 @@ def _elsewhere(
     from airlight.reports.cluster.references import bring_references, image_of, tracing
     from airlight.validation.estimates.images import batch_plan, cloud_orders
 
+    # Workers are told the size, since a change of the scene or its own default may decide it.
     width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
     image = image_of(loaded, (width, height), changes)
+    # A worker computes the quadrature now, and it is then in the cache of this machine.
     if budget is None:
         bring_references(workers, [image], pixel=pixel)
         return None
     batches, samples = batch_plan(budget, width * height)
+    # With a number of samples all batches are known before the first is traced; with an error they
+    # are asked for until it is reached.
     known = None if budget.samples is None else batches
     chosen = cloud_orders(orders) if orders else None
     return tracing(workers, image, estimator, samples=samples, batches=known, orders=chosen)
@@ -243,13 +262,14 @@ def _quadrature(
     from airlight.validation.estimates.images import layered_reference
     from airlight.validation.estimates.quadrature import reference_image
 
-    found = reference_image(
+    # The whole image, from the cache where it was computed before.
+    quadrature = reference_image(
         loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what)
     )
-    said = reference_record(found)
+    said = reference_record(quadrature)
     return Reference(
         scene=loaded.name,
-        image=sealed(layered_reference(loaded, found, pixel=pixel)),
+        image=sealed(layered_reference(loaded, quadrature, pixel=pixel)),
         estimator="quadrature",
         relative_error=float("nan") if said.relative_bound is None else said.relative_bound,
         how=said,
@@ -269,6 +289,7 @@ def _sampled(
     from airlight.reports.api.results import Reference, sealed
     from airlight.validation.estimates.images import cloud_orders, monte_carlo_reference
 
+    # None for an estimator of single scattering.
     chosen = cloud_orders(orders) if orders else None
     found = monte_carlo_reference(
         loaded,
@@ -279,6 +300,7 @@ def _sampled(
         progress=tell,
         elsewhere=elsewhere,
     )
+    # Both places that hold the image must hold the sealed one.
     found = replace(found, image=sealed(found.image))
     return Reference(
         scene=loaded.name,
@@ -295,6 +317,7 @@ def _merged(scene: str, files: list[Path]) -> "Reference":
     from airlight.reports.api.results import Reference, sealed
     from airlight.validation.estimates.merge import merged_references
 
+    # The command names a scene as every command does; files of another one are a mistake.
     image = merged_references([(str(path), read_exr(path)) for path in files])
     made = str(image.attributes["airlight:scene"])
     if made != Path(scene).stem and made != scene:

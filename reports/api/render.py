@@ -156,8 +156,10 @@ def render(
     >>> frame.airlight.shape, frame.airlight.dtype.name
     ((24, 32, 3), 'float32')
     """
+    # All words are checked first; then Mitsuba starts, which takes seconds.
     files = output_files(output, ".exr (all layers)", ".png (a picture)")
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
+    # Both select random numbers and have to fit a signed 32-bit number.
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:
             raise InputError(
@@ -169,13 +171,18 @@ def render(
     from airlight.realtime.methods.shader.source import is_shader
     from airlight.reports.plotting.pictures import tone_curve
 
+    # `apart` says that the method is user code that is named and can be imported elsewhere.
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
     if is_shader(chosen.method):
         exclude("method", "a shader computes in float32", {"precision": precision != "single"})
+    # Everything that another process needs to render the same frame; it can be pickled if the scene
+    # is a name.
     asked = _Asked(scene, pixels_of(size), changes_of(change), precision, chosen, run, frame)
     shown = progress if isinstance(progress, bool) else None
     call: Any = operator.call
+    # A loaded scene cannot leave this process, so that user code runs here then. A callback cannot
+    # cross either: the other process shows the bar itself.
     if apart and isinstance(scene, str):
         from airlight.reports.machine.own_process import in_own_process
 
@@ -184,9 +191,11 @@ def render(
         return call(_plan, asked)
     if frames is not None:
         return call(_animation, asked, files, frames, animate, progress)
+    # The other process returns arrays; files are written here, where the result is.
     rendered: Rendering = call(_frame, asked, samples, timed, progress)
     for path in files:
         rendered.save(path)
+    # The record says how a picture was toned, which a PNG file cannot.
     curve = (
         tone_curve(rendered.total).words
         if any(path.suffix.lower() == ".png" for path in files)
@@ -231,6 +240,7 @@ def _check(
     timed: bool,
 ) -> None:
     """Refuse options that do not go together before any work."""
+    # Numbers by themselves come before pairs of options.
     for name, value in (("samples", samples), ("frames", frames)):
         if value is not None and value < 1:
             raise InputError(f"{name}: got {value}, expected 1 or more")
@@ -243,6 +253,8 @@ def _check(
         raise InputError(
             "frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png"
         )
+    # An animation reports medians over its frames and writes many files: averaging rays or timing
+    # one frame belongs to a still frame.
     if frames is not None:
         single = {"samples": samples > 1, "timed": timed}
         exclude("frames", "an animation has one ray a pixel and says what its frames cost", single)
@@ -259,10 +271,14 @@ def checked_configuration(
     from airlight.reports.machine.opengl import require_opengl
     from airlight.validation.study.configuration import Configuration, configuration
 
+    # A configuration was checked when it was made.
     if isinstance(method, Configuration):
         return configuration_of(method, kernel, parameters), method.own
+    # A GLSL file needs a driver, whose absence is a matter of the machine and has its own exit
+    # status.
     if isinstance(method, str) and is_shader(method):
         require_opengl()
+    # A colon separates module and name: only user code has one.
     apart = (isinstance(method, str) and ":" in method) or (
         isinstance(kernel, str) and ":" in kernel
     )
@@ -270,6 +286,8 @@ def checked_configuration(
         return configuration_of(method, kernel, parameters), False
     from airlight.reports.machine.own_process import in_own_process
 
+    # An import may crash or never end, so that the process that checks user code is one that can be
+    # ended.
     return in_own_process(
         configuration, method, kernel_name(kernel), parameters or {}, name=method
     ), True
@@ -284,14 +302,18 @@ def _ready(
     from airlight.realtime.methods.registry import find_method
     from airlight.validation.study.configuration import prepared
 
+    # The costs and the notes need the scene, and come before any kernel compiles.
     loaded, read = asked.read()
     _check_work(loaded.name, read, asked.chosen, frames)
     note(progress, read.features.notes)
+    # Only methods of clouds have further layers, and they cost time: a caller says whether it can
+    # use them.
     layered = layers and find_method(asked.chosen.method).renders_clouds
-    made = prepared(read, asked.chosen, extra_layers=layered)
-    if not made.method.noisy:
+    renderer = prepared(read, asked.chosen, extra_layers=layered)
+    # A run or a frame number would change nothing, and the user expects new noise.
+    if not renderer.method.noisy:
         exclude("method", f"{asked.chosen.label} draws no random numbers", asked.random)
-    return loaded, read, replace(made, run=asked.run, frame=asked.frame), layered
+    return loaded, read, replace(renderer, run=asked.run, frame=asked.frame), layered
 
 
 def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Rendering":
@@ -307,22 +329,26 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     from airlight.validation.study.run import layered_frame
     from airlight.validation.study.turns import time_alone
 
+    # `_ready` estimates the work of all frames of this command, frames of the timing included.
     variant, chosen = activate(), asked.chosen
     loaded, read, renderer, layered = _ready(
         asked, samples + (TIMED if timed else 0), samples == 1, progress
     )
+    # Warnings belong before the work, the bar after them.
     warnings = _warnings(renderer)
     with telling(progress, f"{loaded.name}: {samples} rays a pixel") as tell:
         frame = render_samples(renderer, samples, lambda done: tell(done, "the picture"))
     image = layered_frame(loaded.name, chosen, frame)
-    made = {"airlight:pixel": "area", "airlight:samples": str(samples)} if samples > 1 else {}
+    # The header of the file says what a pixel is and which numbers repeat the noise.
+    attributes = {"airlight:pixel": "area", "airlight:samples": str(samples)} if samples > 1 else {}
     if renderer.method.noisy:
-        made |= {"airlight:run": str(asked.run), "airlight:frame": str(asked.frame)}
-    image = replace(image, attributes=dict(image.attributes) | made)
+        attributes |= {"airlight:run": str(asked.run), "airlight:frame": str(asked.frame)}
+    image = replace(image, attributes=dict(image.attributes) | attributes)
     times, device = None, f"{variant}, {dr.thread_count()} threads"
     if timed:  # the further layers of a method do not belong to what a frame costs
-        found = time_alone(prepared(read, chosen) if layered else renderer)
-        times, device = found.times, found.device or device
+        cost = time_alone(prepared(read, chosen) if layered else renderer)
+        times, device = cost.times, cost.device or device
+    # The record holds what a caller needs to render the frame again, besides the image.
     return Rendering(
         scene=loaded.name,
         image=sealed(image),
@@ -360,21 +386,30 @@ def _animation(
     from airlight.validation.study.run import layered_frame
 
     variant, chosen = activate(), asked.chosen
+    # --animate replaces the motion that the scene names.
     moved_by = None if moves is None else parse_moves(moves)
+    # A picture has no room for further layers, an EXR file has.
     layers = any(path.suffix.lower() == ".exr" for path in files)
     loaded, read, renderer, _ = _ready(asked, frames, layers, progress)
     animation = loaded.animation if moved_by is None else replace(loaded.animation, moves=moved_by)
     _warnings(renderer)
+    # Per frame: milliseconds to move the scene and to render it, and the changes that NAME.json
+    # repeats.
     costs: list[tuple[float, float]] = []
     changes_by_frame: list[dict[str, tuple[float, ...]] | None] = []
     # all frames share the tone curve of the first, so that a light that fades looks it
-    kept = curve = None
+    reusable = curve = None
     shapes = frame_objects(renderer.scene, animation, frames)
+    # The generator moves the scene when it is asked for the next frame: the time from here to the
+    # first line of the loop is the time to move.
     moving = stopwatch()
     with telling(progress, f"{loaded.name}: {frames} frames") as tell:
         for number, moved in enumerate(animate(renderer.scene, animation, frames), 1):
             to_move = moving().ms
-            frame, kept, to_render = timed_image(renderer, moved, kept, **moved_parts(animation))
+            # `reusable` is what the last frame prepared and this one may reuse, as an engine does.
+            frame, reusable, to_render = timed_image(
+                renderer, moved, reusable, **moved_parts(animation)
+            )
             costs.append((to_move, to_render))
             changes_by_frame.append(frame_changes(moved, animation))
             curve = curve or tone_curve(frame.airlight + frame.surface)
@@ -387,13 +422,16 @@ def _animation(
             del frame  # the next one needs its room
             tell(number / frames, f"frame {number} of {frames}")
             moving = stopwatch()
+    # NAME.json lies beside EXR files only, the files that `compare --frames` reads.
     about = [
         written
         for path in files
         if path.suffix.lower() == ".exr"
         for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
+    # The first frame compiles kernels and is left out of the medians, unless it is the only one.
     move_ms, render_ms = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
+    # The recordings tell a developer whether motion made a stage compile again.
     return RenderedFrames(
         scene=loaded.name,
         method=chosen.label,
@@ -430,6 +468,8 @@ def _write_frames(
     from airlight.reference.storage.files import write_text
     from airlight.validation.motion.frames_file import FramesRecord
 
+    # A change without a name cannot be repeated by `compare`: such an animation has no record, and
+    # neither has a single frame.
     named = [each for each in changes if each is not None]
     if len(named) < max(len(changes), 2):
         return ()
@@ -443,6 +483,7 @@ def _write_frames(
 
 def _numbered(path: Path, number: int, frames: int) -> Path:
     """Return name-0001.exr for name.exr; the first frame has the number 1."""
+    # At least four digits, so that `frames/####.exr` names them.
     digits = max(4, len(str(frames)))
     return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
 
@@ -464,6 +505,8 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
 
     from airlight.realtime.methods.published.biri2006.method import PaperPreparation
 
+    # Only the published order of Biri et al. 2006 can fail in this way; other methods have no
+    # warnings.
     preparation = renderer.stages.prepare
     warnings: tuple[str, ...] = (
         preparation.warnings if isinstance(preparation, PaperPreparation) else ()
@@ -503,6 +546,7 @@ def asked_configurations(
         parse_settings,
     )
 
+    # A word kernel=NAME is one more kernel; every other word is a setting.
     named_kernels = several(kernels)
     if isinstance(settings, Mapping):
         given = dict(settings)
@@ -512,10 +556,12 @@ def asked_configurations(
         ]
         given = parse_settings([word for word in several(settings) if not word.startswith(_KERNEL)])
     option = "set" if given else "kernel" if named_kernels else ""
+    # `apart` stays true as long as every method can be imported by its name in another process.
     chosen: list[Configuration] = []
     apart = True
     for method in several(methods) or ["all"]:
         if method == "all":
+            # A kernel or a setting that only some of all methods know would be dropped in silence.
             if option:
                 raise InputError(
                     f"{option}: got no single method that it is for; name methods by --method"
@@ -523,16 +569,20 @@ def asked_configurations(
             chosen += chosen_configurations() if usual is None else usual
         elif isinstance(method, Configuration):
             chosen.append(method)
+        # A function of Python: it cannot be imported by name, so that it runs here.
         elif not isinstance(method, str):
             chosen += [
                 configuration(method, kernel_name(kernel), given)
                 for kernel in named_kernels or (None,)
             ]
             apart = False
+        # A user's method, or a built-in one with settings: one configuration for each kernel.
         elif option or is_users(method):
             chosen += [checked_configuration(method, k, given)[0] for k in named_kernels or (None,)]
         else:
             chosen += chosen_configurations([method])
+    # Two words may name one configuration, which is measured once. A kernel that is a function also
+    # keeps all of it in this process.
     return list(dict.fromkeys(chosen)), apart and not any(
         callable(kernel) for kernel in named_kernels
     )

@@ -192,6 +192,8 @@ def report(
     >>> report.claims[0]  # doctest: +SKIP
     'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
+    # An old report is drawn again: nothing is measured, and options of measurement are mistakes.
+    # With --figures, scenes and methods choose what the strip shows.
     if from_ is not None:
         beside = {
             "quick": quick,
@@ -208,10 +210,12 @@ def report(
         )
     if quick:
         exclude("quick", "names the effort", {"full": full})
+    # Sizes, methods and repetitions follow from the effort or from a study file.
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
     asked = (several(scenes), several(method), several(kernel), settings)
     places = {"images": images, "output": output, "figures": figures, "cluster": cluster}
+    # report.json says how to make it again.
     command = _command(*asked, {"quick": quick, "full": full, "fresh": fresh, **places})
     data = _measured(
         target,
@@ -237,13 +241,17 @@ def _command(
     """Return what makes a report again: a command where all has a name,
     else the call from Python.
     """
+    # Settings from Python may be a mapping, settings of a command line are words.
     values = (
         [f"{name}={value}" for name, value in settings.items()]
         if isinstance(settings, Mapping)
         else settings
     )
     named = {"method": methods, "kernel": kernels, "set": several(values)}
+    # Defaults are left out of the command.
     given = {name: value for name, value in options.items() if value}
+    # Words can be typed on a command line. A function or a loaded scene cannot: the call from
+    # Python stands there instead.
     if all(isinstance(each, str | os.PathLike) for each in (*scenes, *methods, *kernels)):
         words = ["airlight", "report", *map(str, scenes)]
         words += [
@@ -288,12 +296,17 @@ def _redrawn(
     from airlight.reports.data.records import load_report, named_files
     from airlight.reports.page.render import render_page
 
+    # The page itself shows all scenes of the report.
     if len(scenes) > 1:
         raise InputError("report: the strip shows one scene; name one of them")
     data, folder = load_report(path)
     target = ensure_folder(output or folder)
+    # The page is drawn before anything is written: a report that cannot be drawn leaves the target
+    # as it is.
     page = render_page(data, folder)
+    # Two commands that write the same folder at a time would mix their files.
     with alone(target):
+        # Into another folder the whole report is copied, so that its page finds the images.
         if not target.samefile(folder):
             for name in ("report.json", *named_files(data)):
                 write_bytes(target / name, (folder / name).read_bytes())
@@ -321,6 +334,7 @@ def _measured(
 
     from airlight.reports.machine.environment import activate
 
+    # The address of a cluster is checked here, and connected to only when the work begins.
     place = None
     if cluster is not None:
         from airlight.reports.cluster.connect import connected, parse_place
@@ -333,12 +347,17 @@ def _measured(
     from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
     from airlight.validation.study.study import RandomScenes, read_study, standard_study
 
+    # A study file replaces the effort: it says scenes, sizes and methods.
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
         exclude(asked[0], "the study says how much is measured", {effort: effort != "default"})
         study, asked = read_study(Path(asked[0])), []
+    # Images from elsewhere decide the scenes where none is named.
     names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
+    # With `apart` user code runs in other processes, which can be ended when a method hangs.
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
+    # A newcomer expects the built-in methods beside the new one; measuring them takes minutes, so
+    # that the user decides.
     if methods and all(isinstance(name, str) and is_users(name) for name in methods):
         note(
             progress,
@@ -354,6 +373,7 @@ def _measured(
     # modules live as long as the process: what looks for garbage before each
     # frame need not look there
     gc.freeze()
+    # Workers are connected last, and let go whether the report succeeds or not.
     with ExitStack() as stack, telling(progress, "report") as tell:
         return write_report(
             target,
@@ -384,9 +404,13 @@ def _scenes_of_images(
     from airlight.validation.scenes.loading import scene_stem
     from airlight.validation.scenes.registry import SCENES
 
+    # A file is matched by the stem of a scene: the built-in scenes, and the files that the command
+    # names.
     shown = find_images(images, {scene_stem(name): name for name in [*SCENES, *asked]})
     names = list(asked or shown)
     wanted = {scene_stem(name) for name in names}
+    # A folder without an image of these scenes is a mistake; one with images of some of them is
+    # not.
     if not wanted & set(shown):
         raise InputError(
             f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of "
@@ -432,15 +456,16 @@ def diff(
     from airlight.reports.data.records import read_report
     from airlight.reports.diff.compare import compare_reports, difference_lines, difference_tables
 
+    # An infinite tolerance leaves times out.
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
-    found = compare_reports(*reports, time_tolerance=tolerance)
+    comparison = compare_reports(*reports, time_tolerance=tolerance)
     return Said(
         name=f"{new} against {old}",
-        tables=difference_tables(found),
-        lines=difference_lines(found),
-        good=not found.worse,
-        of=found,
+        tables=difference_tables(comparison),
+        lines=difference_lines(comparison),
+        good=not comparison.worse,
+        of=comparison,
     )
 
 
@@ -484,12 +509,15 @@ def paper(
     from airlight.validation.columns import plain
     from airlight.validation.papers.claims import claims, papers
 
+    # The names are known without Mitsuba.
     if name is not None and name not in papers():
         raise InputError(
             f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers())
         )
     chosen = [claim for claim in claims() if name in (None, claim.paper)]
     activate()
+    # Measurements come from the cache where code and scenes are the same. With `quick` only rows
+    # that need no image are measured.
     with telling(progress, "paper") as tell:
         rows = measure_claims(chosen, quick=quick, progress=tell)
     written: tuple[str, ...] = ()
@@ -498,7 +526,9 @@ def paper(
 
         with telling(progress, "figures") as tell:
             written = write_figures(Path(figures), name, quick=quick, progress=tell)
+    # Rows that `quick` did not measure are counted, never passed over in silence.
     left_out = len(chosen) - len(rows)
+    # Context rows without a verdict belong to no count.
     counted = count_words([row for row in rows if row.verdict is not None])
     lines = [
         f"{counted}.",

@@ -51,6 +51,7 @@ def sealed(image: Image) -> Image:
 
 def read_only(values: Any) -> Array:
     """Return an array that cannot be written to."""
+    # The flag is set on a view: the array of the caller stays writable.
     view = np.asarray(values).view()
     view.flags.writeable = False
     return view
@@ -92,6 +93,7 @@ class LayeredImage(Pictured):
     @cached_property
     def total(self) -> Array:
         """All light, airlight, surface and the sky behind [W/(m^2 sr)], (height, width, 3)."""
+        # The sky is a layer of its own only where a scene has one.
         background = self.image.layers.get("background")
         return read_only(self.airlight + self.surface + (0.0 if background is None else background))
 
@@ -158,6 +160,7 @@ class LayeredImage(Pictured):
         from airlight.reports.tables.record import block, bullets, picture
 
         title = self.title
+        # All light, and the airlight beside it where surfaces would hide it.
         shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
         if np.any(self.surface):
             png = png_bytes(self.picture("airlight"))
@@ -191,8 +194,10 @@ class Rendering(LayeredImage):
     @property
     def lines(self) -> Sequence[str]:
         """The cost of the frame, and the files that were written."""
+        # A frame that was not timed tells how to time it.
         lines = [f"{self.title}" + ("" if self.times else "; --timed measures what a frame costs")]
         if self.times is not None:
+            # A user's shader is one pass, which cannot be parted into surface and airlight.
             ms = {name: f"{time:.3g} ms" for name, time in self.times.medians.items()}
             whole = f"  {ms['frame']} a frame ({rate_words(self.times.frame.median_ms)})"
             lines += (
@@ -209,6 +214,7 @@ class Rendering(LayeredImage):
                 ]
             )
         lines += [f"  picture: {self.tone_curve}"] if self.tone_curve else []
+        # Averaging over a pixel hides the error of a method at pixel centres.
         if self.samples > 1:
             lines.append(
                 f"  {self.samples} rays a pixel: a picture; a method's error is measured at pixel "
@@ -259,6 +265,7 @@ class Reference(LayeredImage):
         """Return the fields of the record, the means of the layers, and what the
         header says of the samples.
         """
+        # JSON has the mean of each layer, (channels,), not its pixels.
         means = {name: layer.mean(axis=(0, 1)) for name, layer in self.image.layers.items()}
         said = {name: self.image.attributes.get(f"airlight:{name}") for name in _MADE}
         known = {name: value for name, value in said.items() if value is not None}
@@ -272,10 +279,13 @@ class Reference(LayeredImage):
     @property
     def lines(self) -> Sequence[str]:
         """Its means and its error."""
+        # The opacity is a fraction and has no unit.
         lines, made = [self.title], self.to_dict()
         for name, mean in made["means"].items():
             unit = "" if name == "opacity" else " W/(m^2 sr)"
             lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
+        # The quadrature states an error of the airlight, and its kind: proven, estimated or
+        # statistical.
         how = self.how
         if isinstance(how, QuadratureReference) and how.relative_bound is not None:
             lines.append(f"  airlight known to {how.relative_bound:.2g} of its mean ({how.kind})")
@@ -292,6 +302,7 @@ class Reference(LayeredImage):
         else:
             kind = "sets"
             lines.append(f"  standard errors from {batches} independent sets of light samples")
+        # Merged files have batches and no run: cache and target belong to runs.
         if isinstance(how, MonteCarloReference):
             lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []
             files = "file" if how.damaged == 1 else "files"
@@ -302,6 +313,8 @@ class Reference(LayeredImage):
             )
             lines.append(f"  standard error {_error_words(how)}")
         if batches < 32:
+            # The relative standard error of a standard error from n normal values is 1 / sqrt(2 (n
+            # - 1)); from 32 batches on it is below 13 % and not worth a line.
             known = 100 / (2 * (batches - 1)) ** 0.5
             lines.append(f"  a standard error from {batches} {kind} is known to {known:.0f} % only")
         return lines if self.passed else [*lines, "  the target error was not reached"]
@@ -352,6 +365,7 @@ class RenderedFrames(Result):
             "ms to move, "
             f"{self.render_ms:.3g} ms to render, reusing what stood still; {self.device}",
         ]
+        # One line for all files of a kind; the JSON file says what changes from frame to frame.
         for ending in dict.fromkeys(Path(path).suffix for path in self.files):
             own = [path for path in self.files if path.endswith(ending)]
             pixels = (
@@ -370,6 +384,7 @@ def write_image(
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped
 
+    # An EXR file gets the versions and the build in its header.
     if path.suffix.lower() == ".exr":
         write_exr(path, stamped(image))
     elif path.suffix.lower() == ".png":
@@ -395,6 +410,7 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
     """Answer NumPy's protocol: a view, or a copy for another type; raises ValueError if a
     needed copy is forbidden.
     """
+    # numpy.asarray(result, copy=False) forbids the copy that another type needs.
     if dtype is not None and np.dtype(dtype) != values.dtype:
         if copy is False:
             raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")

@@ -38,6 +38,7 @@ class OpenScene(LoadedScene):
         from airlight.reports.tables.record import block, paragraph
 
         try:
+            # A notebook shows a scene that no method can render too, with the reason.
             words, notes = _described(self)
         except InputError as reason:
             words, notes = {"refused": str(reason)}, ()
@@ -58,12 +59,14 @@ def opened(
 
     activate()
     pixels = pixels_of(size)
+    # A name or a path: loaded here, at the size and with the changes.
     if isinstance(scene, str | os.PathLike):
         return _as_open(load_scene(os.fspath(scene), pixels, changes or {}))
     if changes:
         raise InputError(
             "change: is for a scene by name or path; change the scene that you have loaded yourself"
         )
+    # A Mitsuba dictionary is built, then resized: its film says a size too.
     if isinstance(scene, Mapping):
         return _from_dictionary(scene, pixels)
     loaded = _as_open(scene) if isinstance(scene, LoadedScene) else _from_mitsuba(scene)
@@ -87,6 +90,7 @@ def _as_open(loaded: LoadedScene) -> OpenScene:
 
 def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:
     try:
+        # Mitsuba's own message, on one line.
         built = build_scene(scene)
     # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
     except Exception as error:
@@ -101,6 +105,8 @@ def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -
 
 def _from_mitsuba(scene: Any) -> OpenScene:
     if not isinstance(scene, mi.Scene):
+        # A scene of another variant has the same class name in another module, and this is the
+        # usual mistake: it was loaded before `airlight.activate`.
         kind = type(scene)
         if kind.__name__ == "Scene" and kind.__module__.split(".")[0] == "mitsuba":
             raise InputError(
@@ -115,6 +121,8 @@ def _from_mitsuba(scene: Any) -> OpenScene:
         )
     if not scene.sensors():
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")
+    # A scene that Mitsuba made has passed none of the checks of files: shapes get names for changes
+    # and messages, and numbers and closed bodies are checked.
     name_shapes(scene)
     check_numbers(scene)
     check_bodies(scene)

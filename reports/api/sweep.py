@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from airlight.validation.study.rows import RowStore
     from airlight.validation.study.study import Cell, Study
 
-_USUAL = 100  # random scenes of a study without a file
 _EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
 
 
@@ -69,6 +68,7 @@ class SweepRun(Result):
         ]
         lines += [f"  {self.timed_alone} timed alone"] if self.timed_alone else []
         lines += [f"  {status}: {number}" for status, number in sorted(self.counts.items())]
+        # Problems are listed one a line; the numbers of the others are in the rows.
         lines += [
             f"  {each.status}: {each.scene}, {each.label}: {each.reason}" for each in self.problems
         ]
@@ -123,6 +123,7 @@ def sweep(
     """
     from airlight.reports.machine.environment import activate, require
 
+    # An optional dependency is asked for before an hour of work, not after it.
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
         exclude("from", "computes no cells", {"the study": study, "cluster": cluster})
@@ -131,13 +132,16 @@ def sweep(
     from airlight.validation.study.rows import RowStore
     from airlight.validation.study.study import default_study, read_study
 
+    # A number stands for so many random scenes, 100 by default; anything else is a study file.
     place = parse_place(cluster)
-    number = str(_USUAL if study is None else study)
+    number = str(100 if study is None else study)
     chosen = default_study(int(number)) if number.isdecimal() else read_study(Path(number))
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
+    # The store keeps every row as it comes: an interrupted sweep continues from there.
     with RowStore(folder) as store:
         ran = _run(chosen, store, place, variant=variant, progress=progress)
+        # Parquet needs columns, and no row says which.
         if not len(store):
             return ran
         store.write_json()
@@ -168,9 +172,12 @@ def _run(
     from airlight.reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
     from airlight.validation.study.keys import made_here, scene_identities
 
+    # A row is found again by the version, the machine's variant and the content of its scene.
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
     problems: list[Problem] = []
 
+    # First pass: errors of each cell. A cell that failed becomes a row that says why, so that the
+    # table has every cell.
     def with_errors(outcome: Any) -> list[dict[str, Any]]:
         (cell, key), done = outcome.task.arguments, outcome.status == "done"
         row = outcome.value if done else row_without_numbers(cell, key, outcome)
@@ -185,14 +192,19 @@ def _run(
 
     how: dict[str, Any] = {"made": made, "problems": problems, "progress": progress}
     # Images that nobody times are rendered once: their kernels compile longer than they run.
+    # Errors do not depend on how long a kernel takes, so that kernels are compiled quickly where
+    # nothing is timed with them.
     quick = study.measure.times not in ("with", "stages")
     groups = list(cell_groups(study, made, store=store, scenes=scenes))
     counts = _part(study, store, place, groups, with_errors, quick=quick, **how)
     # of rows that are there by now
+    # Second pass: times. On this machine one process at a time measures, or the processes would
+    # slow each other down.
     groups = list(timing_groups(study, made, store=store, scenes=scenes))
     timed = _part(
         study, store, 1 if isinstance(place, int) else place, groups, with_times, quick=False, **how
     )
+    # Cells that neither pass ran were in the store already.
     total = study.scene_count * study.cells_by_scene
     return SweepRun(
         study=study.name,
@@ -226,10 +238,13 @@ def _part(
     from airlight.reports.cluster.run import run_groups
 
     counts, written = Counter[str](), time.monotonic()
+    # Workers are started only for work.
     if not groups:
         return counts
     total = sum(len(_cells(task)) for group in groups for task in group.tasks)
     with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
+        # Outcomes come in the order in which they end. A lost cell has no row, so that the next
+        # sweep tries it again.
         for outcome in run_groups(cluster, groups, made=made, retries=study.retries):
             cells = _cells(outcome.task)
             rows = [] if outcome.status == "lost" else rows_from(outcome)
@@ -238,11 +253,14 @@ def _part(
                 counts[row["status"]] += 1
             if not rows:
                 counts[outcome.status] += len(cells)
+            # A method may refuse a scene by name: this is an answer and no problem.
             if outcome.status not in ("done", "refused"):
                 what = (
                     cells[0].chosen.label if len(cells) == 1 else f"times of {len(cells)} methods"
                 )
                 problems.append(Problem(cells[0].scene, what, outcome.status, outcome.reason))
+            # The Parquet is for anyone who looks while the sweep runs; writing it whole for each
+            # row would take longer than the rows.
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()

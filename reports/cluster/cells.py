@@ -31,8 +31,6 @@ from airlight.validation.study.study import Cell, Study
 from airlight.validation.study.turns import time_cells
 
 _DONE = ("done", "refused", "left out")  #: what is not computed again
-_QUALITY = 60  # of WebP
-_SMALLER = 320  # pixels: wider images are shown smaller in the rows' pictures
 
 
 def reference_of(cell: Cell) -> Reference:
@@ -44,11 +42,14 @@ def row_of(reference: Reference, cell: Cell, key: str) -> dict[str, Any]:
     """Return the row of a cell by columns, from the reference of its image."""
     from distributed import get_worker
 
+    # In a worker. The scene, its properties and the origin are cached for the next cell, which is
+    # of the same image.
     started = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     loaded, scene = _opened(cell.image)
     properties = _properties(cell.image)
     row, _ = run(cell, scene, reference, whole=loaded.scene, paint=_picture)
     row = replace(row, key=key, properties=properties, origin=replace(_origin(), started=started))
+    # Only the worker knows whether its host does other work while it measures.
     if row.cost is not None and row.times is not None:
         row = replace(row, cost=replace(row.cost, alone=is_alone(get_worker())))
     return row_values(row)
@@ -65,6 +66,8 @@ def times_of(cells: Mapping[str, Cell]) -> dict[str, dict[str, Any]]:
     image = next(iter(cells.values())).image
     scene, alone = _opened(image)[1], is_alone(get_worker())
     columns = {}
+    # The cells take turns in one run, so that a change of the machine hits all of them alike. Only
+    # the columns of times come back; the errors are in the store.
     for (key, cell), timed in zip(
         cells.items(), time_cells(list(cells.values()), lambda cell: scene), strict=True
     ):
@@ -82,8 +85,11 @@ def timing_groups(
 
     Then all cells of the image are timed: they are compared with one another.
     """
+    # A cell that failed or was refused has no image to time.
     for keyed in _keyed(study.timed_images(), made, scenes):
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
+        # One missing time is reason enough to measure the whole image again: times of two runs are
+        # not compared. The limit grows with the number of cells, as they share one task.
         if any(store.row(key)[FRAME_MS] is None for key in wanted):
             first = next(iter(wanted))
             yield Group(
@@ -106,8 +112,12 @@ def cell_groups(
 
     A task is named by the key of its row and begins its arguments with the cell.
     """
+    # Cells that failed, hung or aborted are tried again by each sweep; a refusal is an answer and
+    # stays.
     for keyed in _keyed(study.images(), made, scenes):
         missing = {key: cell for key, cell in keyed.items() if store.status(key) not in _DONE}
+        # The reference comes first in the group: its value is an argument of all cells, and one
+        # worker loads the scene once.
         if missing:
             image = next(iter(missing.values())).image
             words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
@@ -167,11 +177,15 @@ def _origin() -> Origin:
 
 def _picture(reference: NDArray[np.float64], test: NDArray[np.float64]) -> bytes:
     """Return reference, image and error side by side as WebP."""
+    # Both images in the exposure of the reference, and their error, so that a row of the sweep can
+    # be looked at.
     factor = exposure(reference)
     parts = [tone_mapped(reference, factor), tone_mapped(test, factor), error_map(reference, test)]
     shown = Image.fromarray(np.concatenate(parts, axis=1))
-    if reference.shape[1] > _SMALLER:
-        shown.thumbnail((3 * _SMALLER, 3 * _SMALLER))
+    # The box is three images wide and bounds the height too; the aspect ratio stays.
+    widest = 320  # pixels
+    if reference.shape[1] > widest:
+        shown.thumbnail((3 * widest, 3 * widest))
     file = io.BytesIO()
-    shown.save(file, "WEBP", quality=_QUALITY)
+    shown.save(file, "WEBP", quality=60)
     return file.getvalue()

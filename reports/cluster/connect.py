@@ -16,10 +16,7 @@ from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.environment import require, threads
 
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
-# of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
-_KEPT = 2**28
 _PATIENCE = 10.0  # until a scheduler has answered [s]
-_WORKERS = 30.0  # until a worker has come [s]
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
 
 
@@ -36,6 +33,8 @@ def parse_place(word: str | None) -> Place:
     from airlight.errors import InputError
 
     require("distributed", "sweep", "work on several processes or machines")
+    # `local` uses every processor, `local:N` that many processes; anything else is a scheduler's
+    # address or its file.
     word = "local" if word is None else word.strip()
     if word == "local":
         return threads()
@@ -55,6 +54,7 @@ def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
     """Give the connection to a place; `quick` compiles kernels quickly in its
     processes, where nothing is timed.
     """
+    # A number of processes or a scheduler.
     _quiet()
     with _local(place, quick=quick) if isinstance(place, int) else _remote(place) as client:
         yield client
@@ -80,9 +80,10 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
         # No group waits behind another that takes minutes while a worker has nothing to do.
         "distributed.scheduler.worker-saturation": 1.0,
         # Dask lets the C library give every freed block back, and arrays of a frame's size come as
-        # new, zeroed pages: a quarter of a sweep's time was the kernel's.
+        # new, zeroed pages: a quarter of a sweep's time was the kernel's. A worker keeps so many
+        # freed bytes, and no larger array may come of them.
         "distributed.nanny.pre-spawn-environ": {
-            **{f"MALLOC_{name}_THRESHOLD_": _KEPT for name in ("TRIM", "MMAP")},
+            **{f"MALLOC_{name}_THRESHOLD_": 2**28 for name in ("TRIM", "MMAP")},
             "OMP_NUM_THREADS": 1,
         },
         # A cluster that is told of a death waits so long and then forgets the worker,
@@ -141,6 +142,7 @@ def _remote(scheduler: str) -> Iterator[Client]:
 
     from airlight.errors import InputError
 
+    # The file that a scheduler writes has its address, which may change when it starts again.
     given = {"address" if _ADDRESS.fullmatch(scheduler) else "scheduler_file": scheduler}
     try:
         client = Client(**given, timeout=_PATIENCE, set_as_default=False)
@@ -151,7 +153,9 @@ def _remote(scheduler: str) -> Iterator[Client]:
             "give its address"
         ) from None
     try:
-        client.wait_for_workers(1, timeout=_WORKERS)
+        # A scheduler without workers accepts tasks and never does them: the command would wait for
+        # ever.
+        client.wait_for_workers(1, timeout=30)
         yield client
     except TimeoutError:
         raise InputError(
@@ -160,6 +164,7 @@ def _remote(scheduler: str) -> Iterator[Client]:
             "environment that has airlight"
         ) from None
     finally:
+        # The scheduler may have disappeared during the work.
         with suppress(Exception):
             client.close(timeout=2)
 

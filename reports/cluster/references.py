@@ -31,7 +31,6 @@ from airlight.validation.study.reference import load_cell
 from airlight.validation.study.study import Cell
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
-_WAVE = 8  # batches that are asked for at once by worker, where their number is not known before
 
 
 def image_of(
@@ -42,6 +41,7 @@ def image_of(
     """Return the image of a scene as a cell, which workers load by the
     name or path of the scene.
     """
+    # A worker of this machine may run in another folder: a relative path would not be found there.
     name = str(loaded.path.resolve()) if loaded.path else loaded.name
     return Cell(name, size, tuple(change_words(changes)), Configuration("reference"))
 
@@ -52,16 +52,21 @@ def bring_references(cluster: Client, images: Sequence[Cell], **how: Any) -> Non
 
     `how`: arguments of `validation.estimates.quadrature.reference_inputs`.
     """
+    # The key of an image needs its scene loaded, here and later: nothing else says what is in the
+    # cache.
     lacking = [
         image
         for image in images
         if not is_kept(reference_inputs(load_cell(image).scene, **how).key)
     ]
     named = {f"reference {number}": image for number, image in enumerate(lacking)}
+    # Workers must compute what `--fresh` asks for again, and not take it from a cache of their own.
     given = how, fresh_since()
     groups = [
         Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()
     ]
+    # The value goes to the cache under the key that this process computed, together with the time
+    # that it took the worker.
     for name, (reference, spent) in _done(cluster, groups):
         keep(
             reference_inputs(load_cell(named[name]).scene, **how), reference, spent, ReferenceImage
@@ -72,6 +77,8 @@ def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]
     """Yield the names and values of tasks that were done; the first that
     was refused ends the run.
     """
+    # A refusal is the user's mistake and true everywhere. A task that failed, hung or was lost is
+    # left out here, and this process computes it.
     for outcome in run_groups(cluster, groups, made=facts()):
         if outcome.status == "refused":
             raise InputError(outcome.reason or "")
@@ -104,8 +111,10 @@ def tracing(
         groups = (Group((Task(f"batch {seed}", _batch, (kind, seed), _LIMIT),)) for seed in seeds)
         return (value for _, value in _done(cluster, groups))
 
+    # Eight batches a worker at once, where an error decides whether more are needed: every worker
+    # stays busy meanwhile.
     workers = len(cluster.scheduler_info(n_workers=-1)["workers"])
-    return bring, batches or _WAVE * max(1, workers)
+    return bring, batches or 8 * max(1, workers)
 
 
 def spread(cluster: Client, image: Cell) -> ElsewhereFor:

@@ -26,10 +26,6 @@ from airlight.reports.cluster.connect import Client, facts
 
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 
-_SENT = 0.004  # until what a worker says is on its way, twice the interval of Dask's batches [s]
-# memory from which a worker gives some back, starts again [bytes]
-_FREE, _RETIRE = 1.2 * 2**30, 1.6 * 2**30
-
 
 @dataclass(frozen=True)
 class Task:
@@ -80,6 +76,8 @@ def run_groups(
 
     from airlight.errors import InputError
 
+    # Workers report every task that they begin under this topic: of a process that died nothing
+    # else says what it was doing.
     topic = f"airlight-{uuid.uuid4().hex[:12]}"
     begun: dict[str, tuple[str, float]] = {}  # by future: which task began last, and when [s]
     flying: dict[Any, tuple[Group, int]] = {}  # groups that were sent, and how often
@@ -89,6 +87,7 @@ def run_groups(
     )
 
     def send(group: Group, attempts: int = 1) -> None:
+        # A new key each time: Dask would answer a key that it knows with the old result.
         key = f"{topic}-{uuid.uuid4().hex}"
         resources = {ALONE: 1} if group.tasks[0].alone else None
         future = client.submit(
@@ -101,6 +100,8 @@ def run_groups(
         for group in groups:
             send(group)
         for future in ended:
+            # A group ends in one of four ways: it returns its outcomes, its worker is unfit, its
+            # process died, or the scheduler failed.
             group, attempts = flying.pop(future)
             try:
                 yield from (replace(outcome, attempts=attempts) for outcome in future.result())
@@ -108,10 +109,15 @@ def run_groups(
             except (_Refused, ImportError) as error:
                 raise InputError(f"{error}: install the same airlight there, or stop it") from None
             except KilledWorker:
+                # The task that began last is the guilty one. If it ran longer than its limit, its
+                # own timer ended the process.
                 name, since = begun.pop(future.key, ("", time.monotonic()))
                 in_first = group.first is not None and group.first.name == name
                 guilty = group.first if in_first and group.first else group.tasks[0]
                 hung = time.monotonic() - since > guilty.limit
+                # One of several tasks killed the process: each is sent alone, so that the others
+                # get their results. The first task of a group is common to all, and splitting would
+                # not save them.
                 if len(group.tasks) > 1 and not in_first:
                     for task in group.tasks:
                         send(replace(group, tasks=(task,)))
@@ -129,9 +135,12 @@ def run_groups(
                     )
             # what a task or the scheduler raises ends a row, not the run
             except Exception as error:
+                # Without a scheduler every group that is still flying is lost; the loop ends once
+                # each has said so.
                 if client.status != "running":
                     yield from _all(group, "lost", "the scheduler went away", attempts)
                     continue
+                # A cancelled future says nothing about its tasks: the group is sent again.
                 if future.cancelled():
                     send(group, attempts)
                 else:
@@ -165,9 +174,12 @@ def do_group(group: Group, made: Any, topic: str, key: str) -> list[Outcome]:
         if made is not None:
             _check(worker, made)
 
+        # The timer is faulthandler's: a thread in C ends the process although Python may hang in a
+        # kernel. The report of the beginning must leave before the work does, or a death would not
+        # name its task.
         def done(task: Task, *values: Any) -> Outcome:
             worker.log_event(topic, {"key": key, "task": task.name})
-            time.sleep(_SENT)
+            time.sleep(0.004)  # twice the interval of Dask's batches [s]
             with open(os.devnull, "w") as nowhere:
                 faulthandler.dump_traceback_later(task.limit, exit=True, file=nowhere)
                 try:
@@ -175,6 +187,7 @@ def do_group(group: Group, made: Any, topic: str, key: str) -> list[Outcome]:
                 finally:
                     faulthandler.cancel_dump_traceback_later()
 
+        # Without the value of the first task the others cannot begin: they share its outcome.
         first = None if group.first is None else done(group.first)
         if first is not None and first.status != "done":
             return _all(group, first.status, f"{first.task.name}: {first.reason}")
@@ -190,6 +203,7 @@ def is_alone(worker: Any) -> bool:
 
 def _check(worker: Any, made: Any) -> None:
     """Make the first kernel possible; refuse a worker that is made of anything else."""
+    # The versions of a process do not change, and finding them takes time.
     if "airlight_made" not in worker.__dict__:
         try:
             worker.airlight_made = facts()
@@ -202,8 +216,8 @@ def _check(worker: Any, made: Any) -> None:
         from airlight.reports.machine.environment import LEAST_THREADS
 
         dr.set_thread_count(max(LEAST_THREADS, worker.state.nthreads))
-    if differences := made.differences(worker.airlight_made):
-        raise _Refused(f"worker {worker.address} has {', '.join(differences)}")
+    if mismatches := made.differences(worker.airlight_made):
+        raise _Refused(f"worker {worker.address} has {', '.join(mismatches)}")
 
 
 def _outcome(task: Task, *values: Any) -> Outcome:
@@ -214,6 +228,8 @@ def _outcome(task: Task, *values: Any) -> Outcome:
     except InputError as error:
         return Outcome(task, "refused", reason=str(error))
     except Exception as error:  # what a task raises is its row's, not the end of the run
+        # A row has room for a line and none for a traceback: the place of the exception stands
+        # behind its words.
         place = traceback.extract_tb(error.__traceback__)[-1]
         words = " ".join(str(error).split())
         return Outcome(
@@ -227,16 +243,20 @@ def _give_back(worker: Any) -> None:
     """Give memory back where there is much of it, and start the worker again
     where that does not help.
     """
-    if worker.monitor.get_process_memory() < _FREE:
+    if worker.monitor.get_process_memory() < 1.2 * 2**30:  # bytes
         return
     import gc
     import sys
 
+    # Frames and recorded kernels hang in reference cycles; Dr.Jit then keeps freed memory and
+    # compiled kernels for later use.
     gc.collect()
     if "drjit" in sys.modules:
         import drjit as dr
 
         dr.flush_malloc_cache()
         dr.flush_kernel_cache()
-    if worker.monitor.get_process_memory() > _RETIRE and worker.nanny:
+    # Memory that remains lies with libraries that never return it: a new process is cheaper than
+    # one that the limit ends. Without a nanny nobody would start it again.
+    if worker.monitor.get_process_memory() > 1.6 * 2**30 and worker.nanny:
         worker.loop.add_callback(worker.close_gracefully, restart=True)

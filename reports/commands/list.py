@@ -34,6 +34,7 @@ def list(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | No
         raise InputError(
             f"list: got {what!r}, expected one of {', '.join(kinds)}" + nearest(what, kinds)
         )
+    # One list is a table without a title; all lists together have titles to tell them apart.
     if what is not None:
         shown = kinds[what]()
         return Said(name=what, data=_data(shown), tables=(shown,))

@@ -107,6 +107,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     """Return a function as a command: with options for its output, without arguments
     that only Python can give.
     """
+    # The function decides everything: its parameters are the options, their descriptions the help.
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
     words = {
@@ -119,6 +120,8 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     )
     positional: list[inspect.Parameter] = []
     named: list[inspect.Parameter] = []
+    # Every parameter becomes a positional argument or an option. `progress` is for Python: the
+    # command line always shows a bar.
     for at, each in enumerate(own.values()):
         kind: Any = inspect.Parameter.KEYWORD_ONLY
         annotation, default = each.annotation, each.default
@@ -127,6 +130,8 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         if each.kind is inspect.Parameter.VAR_KEYWORD:
             named.append(inspect.Parameter("settings", kind, annotation=_SET, default=()))
             continue
+        # Annotations are evaluated where the function was defined, whose types are the ones of the
+        # command line at run time.
         if isinstance(annotation, str):
             annotation = eval(annotation, scope)  # our own source, see `reports.api.inputs`
         # a size
@@ -137,6 +142,8 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         ):
             default = "x".join(map(str, default))
         how: dict[str, Any] = {"help": words.get(each.name, "")}
+        # Words such as -k belong to pytest. The first argument stands without an option name, as
+        # does every one without a default.
         if each.kind is inspect.Parameter.VAR_POSITIONAL:
             kind, how["allow_leading_hyphen"] = each.kind, True
         elif each.kind is not kind and (at == 0 or default is inspect.Parameter.empty):
@@ -147,6 +154,8 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default
         )
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
+    # Commands whose result is a file have -o added here; others declare `output` themselves. A
+    # study writes its data by -o and has no --json; neither have three commands.
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
     if function not in (view, run_tests, export) and endings != STUDY_ENDINGS:
         extra["json"] = _JSON
@@ -159,9 +168,11 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         )
 
     def command(*arguments: Any, **options: Any) -> int:
+        # The files are checked before the function runs for minutes.
         json = options.pop("json", False)
         files = output_files(list(options.pop("output", ())), *endings) if endings else []
         settings = options.pop("settings", ()) if "settings" not in own else ()
+        # A function with `**parameters` takes them by name, one with `settings` as words.
         if settings:
             from airlight.validation.study.configuration import parse_settings
 
@@ -169,6 +180,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         if "progress" in own:
             options["progress"] = True
         result = function(*arguments, **options)
+        # A result writes itself; an integer is the exit status of the command.
         for path in files:
             result.save(path)
         return result if isinstance(result, int) else _printed(result, files, json=json)
@@ -191,6 +203,7 @@ def _plain(words: str | None) -> str:
 
 def _help(function: Callable[..., Any], *, whole: bool) -> str:
     """Return the help of a function, or its first sentence."""
+    # Sections of numpydoc are for Python: the help lists options by itself.
     description = inspect.getdoc(function) or ""
     description = re.split(r"\n\n[A-Z][a-z]+\n---", description)[0]
     return _plain(description if whole else description.split("\n\n")[0])
@@ -198,8 +211,11 @@ def _help(function: Callable[..., Any], *, whole: bool) -> str:
 
 def _printed(result: Result | None, files: Sequence[Path], *, json: bool) -> int:
     """Print a result, and return the exit status."""
+    # A view has no result.
     if result is None:
         return DONE
+    # JSON and tables go to standard output, where a pipe reads them; faults go to the error stream,
+    # where they do not mix with the data.
     if json:
         data = result.to_dict()
         print_json({**data, "output": str(files[-1])} if files and isinstance(data, dict) else data)
@@ -229,11 +245,15 @@ def make_app(words: Sequence[str] = ()) -> App:
         "help_epilogue": "",
     }
     summary = "How fast, accurate and robust is a real-time method for volumetric light, against a checked reference?"
+    # The epilogue and --version belong to the whole program, so that they are set after the
+    # settings that subcommands share.
     app = App(
         name="airlight", help=summary, version=_version, suppress_keyboard_interrupt=False, **how
     )
     app.help_epilogue, app.version_flags = _EPILOGUE, ("--version",)
     app["--help"].group = app["--version"].group = Group("Options", sort_key=99)
+    # A command has only its name and first sentence until it is the one that runs: reading all
+    # signatures would slow every start.
     for number, (title, functions) in enumerate(_PANELS.items()):
         group = Group(title, sort_key=number)
         for at, function in enumerate(functions):
@@ -253,6 +273,7 @@ def _add_studies(app: App, words: Sequence[str]) -> None:
     group = Group("Studies", sort_key=0)
     how: dict[str, Any] = {"help_format": "plaintext", "version_flags": ()}
     how["default_parameter"] = app.default_parameter
+    # A study is a command of its own under `airlight study`.
     for number, name in enumerate(STUDIES):
         function = find_study(name)
         asked = name in words[:1]
@@ -270,6 +291,7 @@ def command_names() -> list[tuple[str, ...]]:
 
 def find_command(words: Sequence[str]) -> App:
     """Return the command, or the study, that some words name."""
+    # Words lead to the subcommand, and only what they name is made whole.
     app = make_app(words)
     for word in words:
         app = app[word]
@@ -286,6 +308,7 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
     other exception is a fault of the program and keeps its traceback.
     """
     try:
+        # The folder is checked before Dr.Jit is imported.
         os.getcwd()
     except OSError:  # Dr.Jit ends the process over it
         return _fail(
@@ -293,6 +316,7 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
             WRONG_INPUT,
         )
     try:
+        # Cyclopts would take pytest's options for its own: they go behind a `--`.
         words = [_at_home(word) for word in arguments]
         if words[:1] == ["test"] and "--" not in words:  # pytest has its own options
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
@@ -310,16 +334,23 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except MissingError as error:
+        # The launcher installs an extra when it is first needed and runs the command again.
+        # `extras` has what it added already: a package that is still missing then is reported, not
+        # installed for ever.
         if error.extra and extras is not None and error.extra not in extras.split():
             start_again_with(" ".join([*extras.split(), error.extra]))
         return _fail(str(error), MISSING)
     except OSError as error:
+        # A file that cannot be opened, or a full disk, is for the user to fix; every other OSError
+        # is a fault of the program.
         if error.filename is None and error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         _drop_output(WRONG_INPUT)
         return _fail(f"{error.filename or 'output'}: {error.strerror}", WRONG_INPUT)
     # a NameError is what `import drjit` raises where libatomic is missing
     except (ImportError, NameError):
+        # Only a missing system library explains the failed import: anything else keeps its
+        # traceback.
         packages = missing_packages()
         if not packages:
             raise
@@ -327,12 +358,14 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
             f"system libraries are missing. To install them: {install_line(packages)}", MISSING
         )
     except cyclopts.CycloptsError as error:
+        # A comma where a number needs a point gets a hint of its own.
         path, said = " ".join(["airlight", *(error.command_chain or ())]), str(error).rstrip(".")
         comma = re.search(r'unable to convert "(-?\d+),(\d+)"', said)
         hint = f"; write {comma[1]}.{comma[2]}" if comma else ""
         return _fail(f"{said}{hint} (see `{path} --help`)", WRONG_INPUT)
     except InputError as error:
         return _fail(str(error), WRONG_INPUT)
+    # Without words the help was printed, and nothing was done.
     if not arguments:
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE
@@ -342,6 +375,7 @@ def _at_home(word: str) -> str:
     """Return a word with the home folder for a ~ at its beginning, also behind
     --option=, where shells leave it.
     """
+    # A shell expands ~ only where a word begins with it.
     option, equals, value = word.partition("=")
     if word.startswith("~"):
         return os.path.expanduser(word)

@@ -40,16 +40,21 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
             f"there are no tests in {root}, they come with the source only: clone it and run "
             "`./airlight test` there"
         )
+    # The machine is checked first: thousands of tests would otherwise fail for one missing library.
     require("pytest", "test", "a test")
     variant = prepare().variant
     workers = _workers()
+    # pytest-xdist, whose workers take tests from one another near the end.
     sharing = ["-n", str(workers), "--dist", "worksteal"] if workers > 1 else []
     os.chdir(root)
     if not all_ and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
         os.environ.update(quick_compilation.settings())  # of processes that have not begun
+    # Markers leave the slow tiers out; --all runs every one.
     tiers = [] if all_ else ["-m", "not statistical and not slow"]
     command = [sys.executable, "-m", "pytest", *sharing, *tiers, *arguments]
     sys.stdout.flush()
+    # Only a run of everything may write the record. Any other replaces this process, so that
+    # signals and the status are pytest's.
     if all_ and not arguments:
         return _recorded(command, root, variant)
     os.execv(sys.executable, command)
@@ -73,17 +78,20 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
     from airlight.reports.machine import quick_compilation
     from airlight.reports.machine.environment import describe_environment, machine_in_words
 
+    # The commit is read before the tests, which may take an hour.
     took, made = stopwatch(), build()
     with temporary_folder() as folder:
         results = folder / "tests.xml"
         asked = [f"--junit-xml={results}", "--allowed-skips=.ci/skips", "--durations=40"]
         status = subprocess.run([*command, *asked], check=False).returncode
+        # pytest ended before it collected: a record would claim that no test failed.
         if not results.is_file():
             print(
                 f"airlight: error: pytest ended with {status} and counted no tests: no record",
                 file=sys.stderr,
             )
             return 1
+        # The junit file counts what ended in which way, in one element.
         suite = next(ElementTree.parse(results).iter("testsuite"))
     tests, failed, errors, skipped = (
         int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped")

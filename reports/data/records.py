@@ -203,9 +203,11 @@ class Report:
 
 
 def read_report(path: Path | str) -> Report:
-    """Read a report.json of the current schema, or that of a folder."""
+    """Read a report.json of the current schema, by its path or its folder."""
     file = _report_file(path)
     data = read_json(file, f"what `airlight report -o {file.parent}` writes")
+    # Another schema is refused by its name: its values could fit these types and mean something
+    # else.
     given = data.get("schema") if isinstance(data, dict) else None
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
@@ -218,6 +220,8 @@ def read_report(path: Path | str) -> Report:
     try:
         return record_of(data, Report)
     except ValidationError as error:
+        # msgspec names the place as `$.scenes[0].size`; the message names it as
+        # `report.scenes[0].size`.
         words, _, place = str(error).partition(" - at `$")
         where = f"report{place.rstrip('`')}"
         raise InputError(
@@ -236,6 +240,7 @@ def load_report(path: Path | str) -> tuple[Report, Path]:
             raise InputError(
                 f"{file} names {name}, which is not in its folder; make the report again"
             )
+        # A page with missing pictures would be drawn in silence.
         if not (file.parent / name).is_file():
             raise InputError(
                 f"{file} names {name}, which is not beside it; move a report with its whole folder"
@@ -265,6 +270,8 @@ def _finite(digits: str) -> float | str:
 
 def _report_file(path: Path | str) -> Path:
     file = Path(path)
+    # A name with a suffix that is no folder is meant as the file, also where it is missing, so that
+    # the message names it.
     named = file.is_file() or (file.suffix and not file.is_dir())
     return file if named else file / "report.json"
 
@@ -287,6 +294,7 @@ def record_types(kind: Any = Report) -> dict[str, type]:
     found: dict[str, type] = (
         {kind.__name__: kind} if isinstance(kind, type) and is_dataclass(kind) else {}
     )
+    # The fields of a record, or the arguments of a generic type such as tuple[Scene, ...].
     inside = get_type_hints(kind).values() if found else get_args(kind)
     for each in inside:
         found |= record_types(each)

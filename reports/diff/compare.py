@@ -33,7 +33,6 @@ _COLUMNS = (
     *words("change"),
 )
 Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
-_BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,8 @@ def compare_reports(
             f"--time-tolerance: got {time_tolerance:g}, expected a number above 0, such as 0.1 for "
             "10 %"
         )
+    # Scenes and methods are matched by their names. One that is gone is a failure, one that is new
+    # a note.
     before, after = ({scene.name: scene for scene in report.scenes} for report in (old, new))
     findings: list[Finding] = []
     compared = 0
@@ -75,15 +76,19 @@ def compare_reports(
     findings += [
         Finding("note", name, "", "the scene is new") for name in after if name not in before
     ]
+    # Times are compared once for all scenes: the noise of the machine is seen only in all of them
+    # together.
     times, slower = compare_times(old, new, tolerance=time_tolerance)
     findings += [*slower, *_stability(old, new), *_growth(old, new)]
     findings += _papers(old, new)
+    # A comparison of nothing must not pass.
     if not compared and not times.compared:
         raise InputError(
             "reports: no number can be compared: no method of a scene was measured in both at one "
             "size; "
             "give two reports of the same scenes with the same effort"
         )
+    # The sort is stable: within a verdict the order of the reports stays.
     rank = {"worse": 0, "better": 1, "note": 2}
     findings.sort(key=lambda finding: rank[finding.verdict])
     worse = sum(finding.verdict == "worse" for finding in findings)
@@ -99,6 +104,8 @@ def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
     before, after = ({entry.label: entry for entry in scene.methods} for scene in (old, new))
     findings = [Finding("worse", name, label, "gone") for label in before if label not in after]
     findings += [Finding("note", name, label, "new") for label in after if label not in before]
+    # Errors against another reference, or at another size, say nothing; whether a method runs or
+    # refuses is compared all the same.
     reason = _incomparable(old, new)
     if reason:
         findings.append(reason)
@@ -116,6 +123,7 @@ def _entries(old: Row, new: Row, *, errors: bool) -> tuple[list[Change], int]:
     """Compare a configuration in a scene, and where `errors` can be compared
     these: return how many were.
     """
+    # A row with a reason has no numbers.
     if bool(old.reason) != bool(new.reason):
         words = f"refused: {new.reason}" if new.reason else "no longer refused"
         # Leaving a method out for the time it takes is a decision of the user, not a fault.
@@ -125,6 +133,7 @@ def _entries(old: Row, new: Row, *, errors: bool) -> tuple[list[Change], int]:
         return [("note", "errors not compared: they are of different layers", None, None)], 0
     if not errors:
         return [], 0
+    # Errors of noisy runs have intervals, and are taken only where both reports have them.
     noisy = bool(old.noise and new.noise)
     parts = [
         _errors(_errors_of(old, noisy), _errors_of(new, noisy), prefix=""),
@@ -136,9 +145,11 @@ def _entries(old: Row, new: Row, *, errors: bool) -> tuple[list[Change], int]:
 
 def _incomparable(old: Scene, new: Scene) -> Finding | None:
     """Say why the errors of a scene cannot be compared, None if they can."""
+    # Errors change with the pixels that they are taken over.
     if old.size != new.size:
         sizes = " and ".join("x".join(map(str, scene.size)) for scene in (old, new))
         return Finding("note", old.name, "", f"errors not compared: the images are {sizes} pixels")
+    # Without a mean there is nothing to doubt the reference by.
     before, after = (scene.reference.mean for scene in (old, new))
     if before is None or after is None:
         return None
@@ -164,6 +175,8 @@ def _numbers(errors: Metrics | None) -> Numbers:
 
 def _errors_of(entry: Row, noisy: bool) -> Numbers:
     """Return the errors of an image, or those of noisy runs, without quantiles of a single one."""
+    # A single noisy run has random quantiles: the mean of several runs, with its interval, replaces
+    # them.
     error = _numbers(entry.error)
     if not noisy or entry.noise is None:
         return error
@@ -175,18 +188,24 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
     """Compare the errors of a configuration in one layer; what has an
     interval may differ by it too.
     """
+    # An error that is new in a report is no difference.
     if not old or not new:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
     changes: list[Change] = []
     for name in _ERRORS:
+        # A number that is NaN in one report alone is a difference: something became, or stopped
+        # being, not finite.
         before, after = old.get(name), new.get(name)
         what = f"{prefix}{name}"
         if before is None or after is None:
             if before is not after:  # JSON writes NaN as null
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
+        # The band is the part that differs without a cause; the half intervals of two independent
+        # estimates add in quadrature.
         band = error_band(name, before, pixels=old["pixels"], rmse=old["relative_rmse"])
         band += math.hypot(*(each.get(f"{name}_within", 0.0) for each in (old, new)))
+        # A bias has a sign: its size is what gets worse.
         grown = abs(after) - abs(before)
         if abs(grown) > band:
             changes.append(("worse" if grown > 0 else "better", what, before, after))
@@ -208,6 +227,7 @@ def _flip(old: Row, new: Row) -> tuple[list[Change], int]:
 def _reference(old: Scene, new: Scene) -> Iterator[Finding]:
     """Compare the reference of a scene in two reports."""
     name = old.name
+    # The verdict over all checks first, then each check by its name.
     if not confirmed([new]) and confirmed([old]):
         yield Finding("worse", name, "", "the reference is no longer confirmed")
     elif confirmed([new]) and not confirmed([old]):
@@ -215,10 +235,13 @@ def _reference(old: Scene, new: Scene) -> Iterator[Finding]:
     for key, agreement in old.agreement.items():
         if key not in new.agreement:
             yield Finding("worse", name, "", f"the comparison with {key} is gone")
+        # An estimator that had no time has not spoken against the reference.
         elif verdict(agreement) is True and verdict(new.agreement[key]) is None:
             yield Finding(
                 "note", name, "", f"{key} ran out of time before it could confirm the reference"
             )
+    # Counts of shadow rays grow with the pixels, so that only images of one size have comparable
+    # ones.
     if old.size == new.size:
         for key in ("disagreements", "left"):
             before, after = getattr(old.reference, key), getattr(new.reference, key)
@@ -242,6 +265,7 @@ def _stability(old: Report, new: Report) -> Iterator[Finding]:
 
 def _growth(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the powers of the work with which times grow."""
+    # `other_power` is the change of the exponent, and zero where noise may explain it.
     for before, after in same_records(old.scaling, new.scaling):
         for name, growth in after.growth.items():
             if change := other_power(before.growth[name], growth):
@@ -258,6 +282,7 @@ def _growth(old: Report, new: Report) -> Iterator[Finding]:
 def _papers(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which claims are reproduced."""
     before, after = ({(row.paper, row.item): row for row in report.papers} for report in (old, new))
+    # A report without papers did not measure them.
     if not before or not after:
         return
     for (paper, item), row in before.items():
@@ -265,6 +290,7 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
         name = f"{paper}, {item}"
         if now is None:
             yield Finding("worse", "", "", f"{name}: the row is gone")
+        # The paper did not change: an edited figure is another claim.
         elif now.published != row.published:
             yield Finding(
                 "worse", "", "", f"{name}: the published figure", row.published, now.published
@@ -275,6 +301,7 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
 
 
 def _kind(row: Claim, now: Claim) -> str:
+    # A busy machine can overturn a verdict on times.
     if row.unit in _TIMED:
         return "note"
     if "reproduced" in (row.verdict, now.verdict):
@@ -318,6 +345,7 @@ def _change(finding: Finding) -> str:
     """
     if finding.old is None or finding.new is None or finding.old == 0:
         return ""
+    # A percentage reads well between a half and the double; beyond, a factor does.
     ratio = abs(finding.new / finding.old)
     return f"{100 * (ratio - 1):+.1f} %" if 0.5 < ratio < 2 else f"x {ratio:.3g}"
 
@@ -329,9 +357,10 @@ def _times_line(difference: Difference) -> str:
     where = (
         "one machine" if times.same_machine else "two machines, so beside the median of all frames"
     )
+    # With a larger ratio of the quartiles the machine was not quiet.
     busy = (
         f"; the machine was busy (quartiles {times.spread:.2f} times apart)"
-        if times.spread > _BUSY
+        if times.spread > 1.25
         else ""
     )
     return (

@@ -51,6 +51,7 @@ def compare_times(
     """Compare the times of two reports, with findings; parameters as in
     `reports.diff.compare.compare_reports`.
     """
+    # Differences of machine and versions are notes in every case: they explain what follows.
     machine, changes = _machines(old, new)
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
@@ -58,8 +59,10 @@ def compare_times(
     notes += [*_changed("old", old), *_changed("new", new)]
     pairs, otherwise = _pairs(old, new)
     notes += otherwise
-    both = max(spread(_all_times(old)), spread(_all_times(new)))
-    least = least_ratio(both, same_machine=machine, tolerance=tolerance)
+    # The noisier report decides the least ratio that is significant. The drift, the median ratio of
+    # all frames, is the part of a change that all methods share.
+    spread_of_noisier = max(spread(_all_times(old)), spread(_all_times(new)))
+    least = least_ratio(spread_of_noisier, same_machine=machine, tolerance=tolerance)
     common = drift(pairs.values()) if pairs else 1.0
     findings = [*notes, *_drift(common, least, machine, len(pairs))]
     grown = {key: growths(*times, common) for key, times in pairs.items()}
@@ -70,11 +73,13 @@ def compare_times(
         findings += _configuration(
             *key, *times, least=least, common=common, machine=machine, others=others, tests=tests
         )
-    return TimeComparison(len(pairs), machine, changes, both, least, common), findings
+    return TimeComparison(len(pairs), machine, changes, spread_of_noisier, least, common), findings
 
 
 def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     """Return whether both reports come from one machine, and what differs, in words."""
+    # Processor, threads, variant and device make a machine; another version of a package is a
+    # change that the comparison may be meant to judge.
     before, after = old.environment, new.environment
     pairs = {key: (getattr(before, key), getattr(after, key)) for key in _MACHINE}
     changes = [f"{key}: {was} -> {now}" for key, (was, now) in pairs.items() if was != now]
@@ -109,6 +114,8 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     before, after = _timed(old), _timed(new)
     pairs: dict[Key, tuple[Times, Times]] = {}
     notes: dict[Finding, None] = {}
+    # Two times are a pair if frames of one size were timed in one way. Notes are keys of a
+    # dictionary, which drops repetitions and keeps the order.
     for key in [key for key in before if key in after]:
         (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
         if size != new_size:
@@ -126,6 +133,7 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
                     f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now",
                 )
             ] = None
+        # The cache gave both reports the same measurement: it cannot differ.
         elif new_times.run is not None and new_times == old_times:
             words = f"times not compared: both reports show the run of {new_times.run.started}"
             notes[Finding("note", key[0], "", words)] = None
@@ -171,6 +179,9 @@ def _configuration(
     tests: int,
 ) -> list[Finding]:
     """Return the stages of one configuration that got slower or faster."""
+    # On one machine a method is judged by its own ratio even if all frames got faster; where all
+    # got slower, the drift is a finding of its own and excuses the method. Two machines are
+    # compared beside the drift only.
     floor = 1.0 if machine else 0.0
     slower = slower_stages(
         old, new, least=least, scale=max(floor, common), others=others, tests=tests
@@ -190,5 +201,6 @@ def _configuration(
             new[stage].median_ms,
         )
         for verdict, stage in moved
+        # Stages below the shortest time that can be judged are left out.
         if max(old[stage].median_ms, new[stage].median_ms) >= SHORTEST
     ]

@@ -39,9 +39,12 @@ def write_figures(
     return the names of the files.
     """
     target = ensure_folder(folder)
+    # A figure may belong to two papers.
     chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}
     written: list[Path] = []
     steps = sharing(progress, [(f"{name}, ", 1.0) for name in chosen])
+    # Each figure is drawn once per file format; its images and curves lie beside it, so that a
+    # reader can draw it differently.
     for (name, make), step in zip(chosen.items(), steps):
         figure = make(quick, step)
         written += [save_figure(target / f"{name}{ending}", figure.draw) for ending in ENDINGS]
@@ -67,8 +70,11 @@ def _pictures(quick: bool, progress: Progress) -> PaperFigure:
     """
     from airlight.validation.papers.pictures import tessellations, triptych, two_lights_image
 
+    # Sizes of `quick` only show that the code runs.
     size = (80, 60) if quick else (400, 300)
     lit = triptych(size)
+    # One exposure for the triptych, from its third image: brightness is to be compared across the
+    # three.
     shared = exposure(list(lit.values())[2])
     shown = [
         (f"Biri 2006, Fig. 1\n{label}", tone_mapped(image, shared)) for label, image in lit.items()
@@ -78,6 +84,8 @@ def _pictures(quick: bool, progress: Progress) -> PaperFigure:
     shown.append(("Billeter 2010, Fig. 1\ntwo lights", tone_mapped(two, exposure(two))))
     for name, side in tessellations(64 if quick else 256).items():
         label = "quads by our filter" if name == "ours" else "by the plain Laplacian"
+        # The sides of the quads, as an EXR file of three equal channels; the picture has their
+        # logarithm.
         images[f"side-{name}"] = np.repeat(side[:, :, None], 3, axis=2)
         # by the side of the quads
         shown.append((f"Billeter 2010, Fig. 8b\n{label}", np.log2(side[::-1])))
@@ -107,6 +115,7 @@ def _shafts(quick: bool, progress: Progress) -> PaperFigure:
 
     size = (80, 60) if quick else (200, 152)
     progress(0.0, "the reference")
+    # The five renderings of one scene in one exposure, timed one after the other.
     scene, reference = shafts_scene(size)
     chosen = {name: {**RENDERINGS, **VARIANTS}[name] for name in _SHAFTS}
     times = timings(scene, chosen, 0.05 if quick else 0.6)
@@ -130,6 +139,8 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
     """
     from airlight.validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
 
+    # The sizes and samples of the verdicts, so that figure and claim are of the same images and the
+    # cache serves both.
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
     scenes = {name: "Fig. 12" for name in RESULTS} | {GAP: "Fig. 11a", LOBES: "Fig. 11b"}
     above, below = [], []
@@ -137,6 +148,7 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
     steps = sharing(progress, [(f"{name}, ", 1.0) for name in scenes])
     for (name, figure), step in zip(scenes.items(), steps):
         collectors, paths, _ = pair_of(shown(name, size), samples, step)
+        # The light paths are toned like the collectors above them.
         factor = exposure(collectors)
         images |= {f"{name}-collectors": collectors, f"{name}-light-paths": paths}
         above.append((f"{figure}, {name}\ncollectors", tone_mapped(collectors, factor)))
@@ -161,6 +173,7 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
     curves = transport_curves()
 
     def draw(column: str) -> Any:
+        # A panel for each place in the slab, in it a curve for each order and each way.
         places = list(dict.fromkeys((curve.thickness, curve.depth) for curve in curves))
         width, across = WIDTHS[column], 2 if column == "double" else 1
         down = -(-len(places) // across)
@@ -173,6 +186,7 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
                 )
                 for way, (style, colour, label) in _WAYS.items():
                     values = getattr(curve, way)
+                    # A logarithmic axis has no zero: directions without light leave a gap.
                     shown = np.where((curve.exact > 0) & (values > 0), values, np.nan)
                     panel.plot(
                         curve.angle,
@@ -185,11 +199,13 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
             panel.set_title(title, fontsize=6)
             panel.set(yscale="log", xlabel="zenith angle of the view [degrees]", ylabel="T [1/sr]")
         panels[0].legend()
+        # The last row may have empty panels.
         for panel in panels[len(places) :]:
             panel.set_axis_off()
         return figure
 
     names = ("thickness", "depth", "orders", "angle", *_WAYS)
+    # The CSV file has a row for each angle, beyond the orders that are drawn.
     rows = [
         dict(zip(names, (curve.thickness, curve.depth, curve.orders, *numbers)))
         for curve in curves

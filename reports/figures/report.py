@@ -42,8 +42,6 @@ from airlight.validation.study.row import Row as CellRow
 
 _TIMES = ("frame", "light_moved", "objects_moved")
 _ERRORS = ("relative_rmse", "relative_bias", "p99")
-_MOST = 4  # most methods beside the reference
-_INSET = 6  # shorter side of an image over the side of an inset
 _FRAMES = (COLOURS["orange"], COLOURS["sky"])
 
 
@@ -58,6 +56,8 @@ def write_figures(
     """
     report, place = load_report(folder)
     drawn: dict[str, Callable[[str], Any]] = {}
+    # A report of --quick may have no times, a report of refusals no images: only figures with
+    # something to show are drawn.
     if any(has_point(entry) for each in report.scenes for entry in each.methods):
         drawn["frame-speed"] = partial(draw_speed, report.scenes)
     if (
@@ -83,6 +83,7 @@ def latex_table(scenes: Sequence[Scene]) -> str:
         "max(ref, mean / 1000).",
     )
     tables = []
+    # The accuracy of the reference stands in the table, as no error below it means anything.
     for scene in scenes:
         bound = scene.reference.relative_bound
         known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
@@ -95,6 +96,7 @@ def latex_table(scenes: Sequence[Scene]) -> str:
 
 
 def _latex_row(entry: CellRow) -> Row:
+    # A refusal is a row without numbers.
     if entry.reason:
         return Row({"label": entry.label}, "refused")
     keys = ("label", *_TIMES, *_ERRORS)
@@ -131,12 +133,15 @@ def _scene(report: Report, name: str | None) -> Scene:
         for scene in report.scenes
         if _shown(scene, "airlight") or _shown(scene, "total")
     }
+    # Only scenes with an image can be shown, and the message lists those.
     if name is not None and name not in scenes:
         raise InputError(
             f"scene: got {name!r}, expected one of {', '.join(scenes)}" + nearest(name, scenes)
         )
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
+    # A scene without shadows shows no difference between methods: the first scene with shadows is
+    # the default.
     shadowed = [
         scene
         for scene in scenes.values()
@@ -146,16 +151,18 @@ def _scene(report: Report, name: str | None) -> Scene:
 
 
 def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
-    """Return the methods to show: those that were asked for, or the most accurate of each."""
+    """Return the methods to show: the requested ones, or the most accurate of each."""
     known = {
         entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)
     }
+    # By default one image of each method, its most accurate; the four most accurate of these stay,
+    # in the order of the report.
     if wanted is None:
         best: dict[str, Method] = {}
         for entry in _shown(scene, "airlight") or _shown(scene, "total"):
             if entry.method not in best or _rank(entry) < _rank(best[entry.method]):
                 best[entry.method] = entry
-        kept = sorted(best.values(), key=_rank)[:_MOST]
+        kept = sorted(best.values(), key=_rank)[:4]
         return [entry for entry in best.values() if entry in kept]
     for label in wanted:
         if label not in known:
@@ -164,6 +171,8 @@ def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
                 f"method: got {label!r}, expected some of {names}" + nearest(label, known)
             )
     chosen = [known[label] for label in wanted]
+    # Errors of airlight and of all light have different scales, and one exposure fits only one of
+    # them.
     if len({entry.layer for entry in chosen}) > 1:
         raise InputError(
             "method: got images with airlight and images without layers; show them in two figures"
@@ -200,15 +209,20 @@ def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ..
 
     Errors are divided by the largest of their method, so that every method counts.
     """
+    # Errors of all methods, (height, width), each over its largest.
     reference = np.nan_to_num(images[0])
     total = np.zeros(reference.shape[:2])
     for image in images[1:]:
         error = np.abs(np.nan_to_num(image) - reference).sum(axis=2)
         total += error / max(error.max(), np.finfo(float).tiny)
+    # Sums over all squares of `side` pixels at once, from the table of sums over rectangles at the
+    # upper left corner.
     sums = np.pad(total, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
     inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
     corners = []
     for _ in range(2):
+        # The square with the largest error; corners whose squares would overlap it are then out of
+        # question.
         row, column = (int(index) for index in np.unravel_index(int(inside.argmax()), inside.shape))
         corners.append((column, row))
         inside[max(0, row - side) : row + side, max(0, column - side) : column + side] = -1.0
@@ -220,8 +234,11 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     the signed relative error.
     """
     height, width = images[0].shape[:2]
-    side = max(4, min(height, width) // _INSET)
+    # An inset shows a sixth of the image's shorter side.
+    side = max(4, min(height, width) // 6)
     corners, factor = worst_squares(images, side), exposure(images[0])
+    # Inches and points. Each image has a picture, two insets of half its width below, and an error
+    # map.
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
     figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + 0.55)
     grid = figure.add_gridspec(
@@ -240,6 +257,7 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
                 frame=colour,
             )
         below = figure.add_subplot(grid[2, 2 * at : 2 * at + 2])
+        # The reference has no error: the colour scale takes the place of its map.
         if entry is None:
             _scale(below, size)
         else:

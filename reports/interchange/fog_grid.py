@@ -18,21 +18,23 @@ from airlight.reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]
 
-_VOXELS = 20  # of the least scale height
-_MOST = 1 << 20
-
 
 def fog_grid(medium: HeightMedium) -> Array:
     """Return the densities of voxels from the floor to the cap, (N,) [1/m], at most a million."""
+    # The thinnest layer decides the step, a twentieth of its scale height (see the module); without
+    # layers the density is constant, and two voxels hold it.
     least = min((scale for _, _, scale in medium.layers), default=medium.cap - medium.floor)
-    count = max(2, int(np.ceil(_VOXELS * (medium.cap - medium.floor) / least)))
-    if count > _MOST:
+    count = max(2, int(np.ceil(20 * (medium.cap - medium.floor) / least)))
+    most = 1 << 20
+    if count > most:
         raise InputError(
-            f"the height fog takes {count} voxels, 20 a scale height; expected at most {_MOST}: "
+            f"the height fog takes {count} voxels, 20 a scale height; expected at most {most}: "
             "lower its cap"
         )
     step = (medium.cap - medium.floor) / count
     z = medium.floor + step * (np.arange(count) + 0.5)
+    # The middles of voxels are the nodes between which a renderer interpolates. The factor
+    # tanh(u/2)/(u/2) keeps the optical depth between any two of them (see the module).
     total = np.full(count, medium.constant)
     for sigma_t, base, scale in medium.layers:
         half = 0.5 * step / scale
@@ -47,6 +49,7 @@ def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
     """
     import mitsuba as mi
 
+    # A grid is written as it is; height fog becomes a column of voxels.
     if isinstance(medium, GridMedium):
         values, corner, size = medium.values, medium.low, medium.high - medium.low
     else:
@@ -70,11 +73,15 @@ def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
     """Return the densities of height fog, (z, y, x) [1/m], and corner and
     size of their box, (3,) [m].
     """
+    # The axis along which the fog falls, and whether it falls upwards along it.
     density, height = fog_grid(medium), medium.cap - medium.floor
     axis = int(np.argmax(np.abs(medium.up)))
     upwards = bool(medium.up[axis] > 0)
+    # Mitsuba's volumes are (z, y, x): the axis counts from the end.
     shape = [1, 1, 1]
     shape[2 - axis] = len(density)
+    # Across the axis nothing varies: one voxel is as wide as a thousand heights on either side,
+    # beyond which the wrap mode clamps.
     size, corner = np.full(3, 2e3 * height), np.full(3, -1e3 * height)
     size[axis], corner[axis] = height, medium.floor if upwards else -medium.cap
     return (density if upwards else density[::-1]).reshape(shape), corner, size

@@ -43,9 +43,6 @@ from airlight.validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 
-_FLOAT, _UINT = 5126, 5125
-_VERTICES, _INDICES = 34962, 34963
-_NEAR = 1e-3  # glTF requires a near plane [m]; the medium begins at the pinhole all the same
 
 # Rows: where the axes of glTF's world lie in the scene's, by the axis that points up in the scene.
 _TURNS: dict[str, list[list[int]]] = {
@@ -65,9 +62,11 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are
     not triangles by nature.
     """
+    # The description refuses scenes that no renderer here could render, before a file exists.
     described = describe_scene(loaded)
     scene = read_reference(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
+    # Surfaces, bounds of media, lights: the order in which `_document` lists their materials.
     opaque = [shape_mesh(shape) for shape in scene.occluders.shapes() if not shape.is_emitter()]
     area_lights = [shape_mesh(light.shape) for light in scene.area]
     names = {medium.name for medium in scene.media}
@@ -90,6 +89,8 @@ def _document(
     media, lights, as described.
     """
     buffer = _Buffer()
+    # A light of KHR_lights_punctual has a node; an area light is a mesh that emits (see the
+    # module).
     punctual = [light for light in described["lights"] if light["kind"] != "area"]
     extended = [light for light in described["lights"] if light["kind"] == "area"]
     materials = [_material(surface) for surface in described["surfaces"]]
@@ -102,6 +103,8 @@ def _document(
     nodes: list[dict[str, Any]] = [
         {"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)
     ]
+    # Nodes place meshes at the origin, as their vertices are turned already; camera and lights have
+    # transforms.
     camera = described["camera"]
     nodes.append({"name": "camera", "camera": 0, "matrix": _camera_matrix(camera, turn)})
     nodes += [
@@ -112,6 +115,7 @@ def _document(
         }
         for number, light in enumerate(punctual)
     ]
+    # A file has to declare its extensions, and only the ones that it uses.
     used = {
         "KHR_lights_punctual": punctual,
         "KHR_materials_specular": materials,
@@ -156,6 +160,7 @@ def _scene_extras(described: dict[str, Any], turn: Array) -> dict[str, Any]:
 
 
 def _camera(camera: dict[str, Any]) -> dict[str, Any]:
+    # glTF takes the vertical angle of view, Mitsuba gives the horizontal one.
     width, height = camera["size"]
     tangent = np.tan(0.5 * np.deg2rad(camera["fov_horizontal"]))
     return {
@@ -164,7 +169,8 @@ def _camera(camera: dict[str, Any]) -> dict[str, Any]:
         "perspective": {
             "yfov": float(2 * np.arctan(tangent * height / width)),
             "aspectRatio": width / height,
-            "znear": _NEAR,
+            # glTF requires a near plane [m]; the medium begins at the pinhole all the same.
+            "znear": 1e-3,
         },
         "extras": {"size": camera["size"], "fov_horizontal_degrees": camera["fov_horizontal"]},
     }
@@ -183,6 +189,7 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     quantity, unit = (
         ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
     )
+    # Intensity and colour: the largest channel, and the channels over it.
     intensity = np.array(light[quantity])
     largest = float(intensity.max())
     punctual: dict[str, Any] = {
@@ -209,6 +216,8 @@ def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
     position = light.get("position", [0.0, 0.0, 0.0])  # a directional light has no position
     if "axis" not in light:
         return _matrix(np.eye(3), position, turn)
+    # Any two axes across the light's own do, as its light is symmetric about it; the coordinate
+    # axis least along it gives the best-conditioned cross product.
     backward = -np.array(light["axis"])
     side = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
     side /= np.linalg.norm(side)
@@ -221,6 +230,8 @@ def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
     """
     matrix = np.eye(4)
     # The axes are in float32, but the format requires a rotation.
+    # Without its singular values the matrix is the nearest rotation. Adding 0.0 removes the sign of
+    # zeros.
     unit, _, other = np.linalg.svd(turn @ axes)
     matrix[:3, :3] = unit @ other
     matrix[:3, 3] = turn @ np.array(position)
@@ -238,6 +249,7 @@ def _emission(light: dict[str, Any]) -> dict[str, Any]:
     """Return the material of an area light: black, and as bright as the light
     on the side of its normal.
     """
+    # A black material reflects nothing; its emission is strength times factor.
     largest = max(light["radiance"])
     extras = {
         "light": light,
@@ -285,16 +297,22 @@ class _Buffer:
 
     def mesh(self, mesh: ShapeMesh, turn: Array, material: int) -> dict[str, Any]:
         """Add a mesh and return its entry."""
+        # The numbers of glTF for the types of values, and for what a view holds.
+        float_type, unsigned_type = 5126, 5125
+        for_vertices, for_indices = 34962, 34963
         vertices = (mesh.vertices @ turn.T).astype("<f4")
-        attributes = {"POSITION": self._add(vertices, "VEC3", _FLOAT, _VERTICES)}
+        attributes = {"POSITION": self._add(vertices, "VEC3", float_type, for_vertices)}
+        # The format requires the bounds of positions, of the float32 values that are in the file.
         self.accessors[-1] |= {
             "min": vertices.min(axis=0).tolist(),
             "max": vertices.max(axis=0).tolist(),
         }
         if mesh.normals is not None:
             normals = (mesh.normals @ turn.T).astype("<f4")
-            attributes["NORMAL"] = self._add(normals, "VEC3", _FLOAT, _VERTICES)
-        indices = self._add(mesh.faces.astype("<u4").reshape(-1), "SCALAR", _UINT, _INDICES)
+            attributes["NORMAL"] = self._add(normals, "VEC3", float_type, for_vertices)
+        indices = self._add(
+            mesh.faces.astype("<u4").reshape(-1), "SCALAR", unsigned_type, for_indices
+        )
         return {
             "name": mesh.name,
             "primitives": [{"attributes": attributes, "indices": indices, "material": material}],
@@ -305,6 +323,7 @@ class _Buffer:
         the number of its accessor.
         """
         data = values.tobytes()
+        # A view says where the bytes lie, an accessor what numbers they are.
         self.views.append(
             {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data), "target": target}
         )
@@ -324,6 +343,8 @@ def _container(document: dict[str, Any], binary: bytes) -> bytes:
     """Return the bytes of a .glb file: a header, the JSON, the binary part,
     each padded to four bytes.
     """
+    # JSON is padded with spaces and the binary part with zeros, as the format demands. Each chunk
+    # begins with its length and its kind; the header has 12 bytes.
     text = json.dumps(document, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
     chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
     chunks += [(b"BIN\0", binary + b"\0" * (-len(binary) % 4))] if binary else []

@@ -61,12 +61,14 @@ def triangle_count(shape: Any) -> int | None:
 def _of_mesh(shape: Any) -> ShapeMesh:
     import mitsuba as mi
 
+    # Mitsuba holds float32; the mesh is already where its transform puts it.
     parameters = mi.traverse(shape)
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
     normals = None
     if shape.has_vertex_normals():
         normals = np.array(parameters["vertex_normals"], dtype=np.float64).reshape(-1, 3)
+        # A vertex without a triangle has a normal of zero, which stays zero.
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / np.where(length > 0, length, 1)
         faces = _towards(vertices, faces, normals)
@@ -82,6 +84,8 @@ def _placed(shape: Any, vertices: Array, faces: Index, normals: Array | None) ->
     import mitsuba as mi
 
     matrix = matrix_of(mi.traverse(shape)["to_world"])
+    # A mirror turns the order of corners round. The order is reversed to keep the side that is
+    # shaded, except for the cylinder.
     mirrored = np.linalg.det(matrix[:3, :3]) < 0
     if mirrored and shape.class_name() != "Cylinder":
         faces = faces[:, ::-1]
@@ -104,8 +108,9 @@ def _towards(vertices: Array, faces: Index, normals: Array) -> Index:
     """
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    against = np.sum(normals[faces].sum(axis=1) * area, axis=1) < 0
-    return np.where(against[:, None], faces[:, ::-1], faces)
+    # The normals of the three corners together say the side of a triangle.
+    reversed_faces = np.sum(normals[faces].sum(axis=1) * area, axis=1) < 0
+    return np.where(reversed_faces[:, None], faces[:, ::-1], faces)
 
 
 def _turned(shape: Any, mesh: ShapeMesh) -> ShapeMesh:
@@ -132,6 +137,7 @@ def _cylinder() -> tuple[Array, Index, Array]:
 
 
 def _sphere() -> tuple[Array, Index, Array]:
+    # Half as many steps from pole to pole as around, so that cells at the equator are square.
     polar = np.pi * np.arange(SIDES // 2 + 1) / (SIDES // 2)
     vertices, faces = _revolved(np.stack([np.sin(polar), -np.cos(polar)], axis=1))
     return vertices, faces, vertices
@@ -142,6 +148,8 @@ def _revolved(profile: Any) -> tuple[Array, Index]:
     from outside where z grows.
     """
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    # Rings of `SIDES` vertices, one for each point of the profile. Two triangles join each vertex
+    # to the next ring.
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     vertices = np.concatenate([radius * circle + [0, 0, z] for radius, z in profile])
     i = np.arange(SIDES)

@@ -26,7 +26,6 @@ from airlight.validation.scenes.random.scene import drawn_values
 
 Array = NDArray[np.float64]
 
-_POINTS = 64  # samples of a reflectance, to tell a texture from a colour
 
 _FALLOFF = {
     "point": (
@@ -43,7 +42,6 @@ _FALLOFF = {
     "area": "the same radiance in every direction on the side of the normal, none behind: irradiance as the light's "
     "projected solid angle, times exp(-sigma_t r)",
 }
-EFFICACY = 683.0  #: of monochromatic light of 540 THz, which defines the lumen [lm/W]
 CONVENTION = (
     "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no "
     "tone mapping, no "
@@ -73,6 +71,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     # it refuses what `render` refuses, in its words
     notes = read_scene(loaded.scene).features.notes
     scene = read_reference(loaded.scene)
+    # A custom scene and a built-in one have the same keys: another renderer reads them by name.
     camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
         "scene": loaded.name,
@@ -110,6 +109,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             },
         },
     }
+    # A random scene also lists the values that its seed drew.
     drawn = (
         {"drawn": drawn_values(loaded.name)}
         if loaded.path is None and is_random(loaded.name)
@@ -132,6 +132,8 @@ def surface(shape: Any) -> dict[str, Any]:
 
     from airlight.reports.interchange.meshes import triangle_count
 
+    # Whether the shape reflects diffusely and nothing else: of the lower ten bits, Mitsuba's kinds
+    # of lobes, no other may be set.
     colour, textured = _reflectance(shape)
     flags = shape.bsdf().flags()
     kind = shape.class_name()
@@ -151,6 +153,8 @@ def surface(shape: Any) -> dict[str, Any]:
 def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
     import mitsuba as mi
 
+    # A scaling would change the units of depth, a shear the pixels, a mirror the handedness, and
+    # another renderer takes none of them from position and axes.
     matrix = camera_matrix(sensor)
     if (
         not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-5)
@@ -159,6 +163,7 @@ def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
         raise InputError(
             "the camera's to_world scales, shears or mirrors; expected a rotation and a translation"
         )
+    # Mitsuba's x axis points to the left in the image: right is -x.
     x_fov = _number(float(mi.traverse(sensor)["x_fov"][0]))
     tangent = np.tan(0.5 * np.deg2rad(x_fov))
     return {
@@ -180,6 +185,7 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
     """Return the numbers of a medium, None for a vacuum."""
     if medium.plugin is None:
         return None
+    # The phase function and the albedo belong to every kind of medium.
     phase: dict[str, Any] = {"name": medium.phase.name}
     if isinstance(medium.phase, HenyeyGreenstein):
         phase["g"] = _number(medium.phase.g)
@@ -189,6 +195,7 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
         "albedo": _numbers(medium.albedo),
         "phase": phase | {"formula": _PHASES[medium.phase.name]},
     }
+    # A grid is too large for a table: its box, its mean and its largest value stand for it.
     if isinstance(medium, GridMedium):
         return {
             "voxels": list(medium.values.shape[::-1]),
@@ -198,6 +205,7 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
             "largest": _number(float(medium.values.max())),
             **scattering,
         }
+    # Height fog has names and rules of its own in each engine.
     if isinstance(medium, HeightMedium):
         return {
             "layers": [
@@ -212,6 +220,8 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
             "engines": {name: _in_engine(name, medium) for name in ENGINES},
             **scattering,
         }
+    # A homogeneous medium in all forms that renderers ask for. Its numbers are the rounded ones
+    # that the table shows, so that sums agree.
     sigma_t, albedo = (np.array(_numbers(values)) for values in (medium.sigma_t, medium.albedo))
     return {
         "sigma_t": _numbers(sigma_t),
@@ -224,10 +234,13 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
 
 def _in_engine(name: str, medium: HeightMedium) -> dict[str, Any]:
     """Return the parameters of height fog in an engine, lengths in metres, or why it has none."""
-    found = parameters_of(name, medium.layers, clamped=medium.clamped, constant=medium.constant)
-    if isinstance(found, str):
-        return {"cannot": found}
-    numbers = {key: _number(value) for key, value in found.items()}
+    parameters = parameters_of(
+        name, medium.layers, clamped=medium.clamped, constant=medium.constant
+    )
+    # An engine's fog may have fewer parameters than the layers need.
+    if isinstance(parameters, str):
+        return {"cannot": parameters}
+    numbers = {key: _number(value) for key, value in parameters.items()}
     engine = ENGINES[name]
     return {
         "parameters": numbers,
@@ -279,6 +292,8 @@ def spot_power_angle(beam: float, cutoff: float) -> float:
 
 
 def _light(light: ReferenceLight) -> dict[str, Any]:
+    # Engines differ in the power that they ask for: `power` is what the light sends,
+    # `power_all_round` what a light of its intensity in all directions would send.
     intensity = np.array(_numbers(light.intensity))
     sphere = 4 * np.pi * intensity
     described: dict[str, Any] = {
@@ -313,6 +328,7 @@ def _area(light: ReferenceAreaLight) -> dict[str, Any]:
     r"""Return an area light: a Lambertian emitter of area A sends pi Le A, from
     a sphere of 4 pi r^2 too.
     """
+    # Shapes share radiance, area and power; the rest says what each of them needs to be placed.
     radiance = np.array(_numbers(light.radiance))
     power = np.pi * light.area * radiance
     described: dict[str, Any] = {
@@ -346,7 +362,9 @@ def luminous_flux(power: Array) -> float:
     """
     from colour.models import RGB_COLOURSPACE_sRGB
 
-    return EFFICACY * float(RGB_COLOURSPACE_sRGB.matrix_RGB_to_XYZ[1] @ power)
+    # The efficacy of monochromatic light of 540 THz, which defines the lumen [lm/W].
+    efficacy = 683.0
+    return efficacy * float(RGB_COLOURSPACE_sRGB.matrix_RGB_to_XYZ[1] @ power)
 
 
 def _reflects(shape: Any) -> bool:
@@ -360,9 +378,12 @@ def _reflectance(shape: Any) -> tuple[list[float], bool]:
     import drjit as dr
     import mitsuba as mi
 
-    number = np.arange(_POINTS)
+    count = 64  # samples, to tell a texture from a colour
+    number = np.arange(count)
     # evenly spread: Kronecker's points
-    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)
+    place = mi.Point2f((number + 0.5) / count, number * 0.6180339887 % 1)
+    # Points by area on the shape, seen along the normal: a diffuse reflectance does not depend on
+    # the direction. Its spread over the points tells a texture.
     sample = shape.sample_position(0, place)
     interaction = mi.SurfaceInteraction3f(sample, dr.zeros(mi.Color0f))
     interaction.wi = mi.Vector3f(0, 0, 1)

@@ -54,6 +54,7 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
     for light in described["lights"]:
         yield from _block("light", light)
     surfaces = described["surfaces"]
+    # A scene may have thousands of surfaces: the first ones and a count.
     yield "surfaces", "", f"{len(surfaces)}; diffuse: radiance = reflectance / pi irradiance"
     for surface in surfaces[:_LISTED]:
         yield (
@@ -72,6 +73,8 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
 def _block(what: str, part: Mapping[str, Any]) -> Iterator[Cells]:
     """Yield a row for each member of a part; of several records a row each."""
     for name, value in part.items():
+        # A list of records is numbered, a mapping of records goes by its keys; a list of numbers
+        # stays in one row. The part is named in its first row only.
         listed = dict(enumerate(value, 1)) if isinstance(value, list | tuple) else value
         records = list(listed.items()) if isinstance(listed, Mapping) else []
         if records and all(isinstance(each, Mapping) for _, each in records):

@@ -35,8 +35,6 @@ from airlight.reports.machine.own_process import in_own_process
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, table, words
 
-_PATIENCE = 180.0  # seconds for the first kernel; the first one on a GPU compiles OptiX's own
-
 
 @dataclass(frozen=True)
 class Kernel:
@@ -167,6 +165,8 @@ def doctor(*, clear_cache: bool = False) -> Doctor:
     >>> airlight.doctor().works  # doctest: +SKIP
     True
     """
+    # The cache first: its folder may be a mistake of the user, which is quicker to say than to run
+    # a kernel.
     cache = _cache(clear=clear_cache)
     return Doctor(diagnose(), cache)
 
@@ -182,10 +182,12 @@ def _cache(*, clear: bool) -> Cache:
     )
 
     folder = cache_folder()
+    # A file in place of the folder would fail every command.
     if folder.exists() and not folder.is_dir():
         raise InputError(
             f"the cache {folder} is not a folder; remove it, or name another by AIRLIGHT_CACHE_DIR"
         )
+    # Files are removed before they are counted: the numbers say what is left.
     removed = clear_cache() if clear else (None, None)
     entries = cache_entries()
     sizes = {
@@ -218,6 +220,7 @@ def diagnose() -> Machine:
     """Examine this machine."""
     import platform
 
+    # The first thing that fails is the problem; all checks are listed whatever fails.
     variant, used, problem, kernel = None, None, None, None
     try:
         prepared = prepare()
@@ -226,11 +229,14 @@ def diagnose() -> Machine:
     except (MissingError, EndedError) as error:
         problem = str(error)
     checks = [Check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")]
+    # Packages, then the libraries that the system has to bring.
     for name, version in versions().items():
         details = {"airlight": build().words, "python": f"{version}, {sys.executable}"}.get(
             name, version
         )
         checks.append(Check(name, version != "missing", details))
+    # Every libLLVM of the machine with its reason: the one that was used may not be the one that
+    # the user means.
     libraries = find_llvm()
     for llvm in libraries:
         details = f"{llvm.path}: {llvm.reason}{', used' if llvm.path == used else ''}"
@@ -238,9 +244,11 @@ def diagnose() -> Machine:
     checks += [] if libraries else [Check("LLVM", False, "none found")]
     atomic = atomic_problem()
     checks.append(Check("libatomic.so.1", not atomic, atomic or "can be loaded"))
+    # The error of OpenGL needs Mitsuba.
     opengl = opengl_status(judged=problem is None)
     for name, status in (("CUDA", cuda_status()), ("OptiX", optix_status()), ("OpenGL", opengl)):
         checks.append(Check(name, status.works, status.reason))
+    # The kernel last: it ran with all of the above.
     checks.append(Check("variant", variant is not None, variant or "none works"))
     if kernel:
         loaded = f"; loaded {kernel.library}" if kernel.library else ""
@@ -258,9 +266,11 @@ def try_kernel(variant: str) -> Kernel:
     """Run a kernel in a separate process; raises EndedError or
     MissingError where it does not work.
     """
+    # The time includes the start of the process and its imports. The first kernel on a GPU also
+    # compiles OptiX's own, and gets three minutes for it.
     took = stopwatch()
     kernel = in_own_process(
-        probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant
+        probe, what="the test kernel in", name=variant, limit=180, variant=variant
     )
     return replace(kernel, seconds=took().seconds)
 

@@ -41,8 +41,11 @@ def exported_values(host: ShaderHost, text: str, columns: Sequence[Any]) -> NDAr
         [np.broadcast_to(column, np.shape(columns[0])) for column in columns], axis=1
     )
     given = np.zeros((2, len(stacked), 4), dtype=np.float32)
+    # A ray is two texels: foot, height, x0, x1, then sigma_t and g. Infinity becomes a large
+    # number, as a texture need not hold it.
     given[0], given[1, :, :2] = np.minimum(stacked[:, :4], 3e38), stacked[:, 4:]
     whole = f"#version 430 core\n{text}{_MAIN}"
+    # One pixel a ray.
     stage = {
         "name": "rows",
         "text": whole,
@@ -95,6 +98,8 @@ def certified_rays(phase: str) -> tuple[list[NDArray[np.float64]], NDArray[np.fl
     )
     assert cases.value is not None
     # With g = 0 Henyey and Greenstein's function is the isotropic one.
-    own = np.isin(cases.phase, ("isotropic", "hg") if phase == "hg" else (phase,))
-    columns = [getattr(cases, name)[own] for name in ("foot", "height", "x0", "x1", "sigma_t", "g")]
-    return columns, cases.value[own]
+    selected = np.isin(cases.phase, ("isotropic", "hg") if phase == "hg" else (phase,))
+    columns = [
+        getattr(cases, name)[selected] for name in ("foot", "height", "x0", "x1", "sigma_t", "g")
+    ]
+    return columns, cases.value[selected]

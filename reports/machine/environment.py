@@ -73,6 +73,7 @@ def prepare(variant: str | None = None) -> Prepared:
     slowly (`reports.machine.quick_compilation`). The variant is by default ``AIRLIGHT_VARIANT``,
     else the best that works.
     """
+    # The argument, the environment, then the better one of the two that works.
     variant = variant or os.environ.get(VARIANT_VARIABLE) or None
     if variant is not None:
         check_variant(variant)
@@ -84,7 +85,9 @@ def prepare(variant: str | None = None) -> Prepared:
                 f"{VARIANT_VARIABLE}=llvm_ad_rgb"
             )
         variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
+    # LLVM is needed on a processor only; libatomic in both cases, as `import drjit` loads it.
     on_processor = variant == "llvm_ad_rgb"
+    # The best library leads the list, or the one that the user names.
     llvm = next(iter(find_llvm()), None)
     problems = [
         problem
@@ -95,8 +98,10 @@ def prepare(variant: str | None = None) -> Prepared:
         packages = missing_packages()
         install = f". To install what is missing: {install_line(packages)}" if packages else ""
         raise MissingError("; ".join(problems) + install)
+    # With CUDA a machine may lack LLVM.
     if llvm is None or not llvm.works:
         return Prepared(variant, None)
+    # Dr.Jit reads the variable when it first compiles.
     os.environ[LLVM_VARIABLE] = llvm.path
     if on_processor and quick_compilation.is_asked_for():
         quick_compilation.compile_quickly(llvm.path)
@@ -115,10 +120,13 @@ def activate(variant: str | None = None) -> str:
     InputError
         If the variant is not one of `VARIANTS`.
     """
+    # Objects of one variant are useless in another: the current variant stays unless another is
+    # asked for.
     mitsuba = sys.modules.get("mitsuba")
     current = mitsuba.variant() if mitsuba else None
     if current in VARIANTS and (variant or os.environ.get(VARIANT_VARIABLE) or current) == current:
         return current
+    # The environment has to be right before the import.
     chosen = prepare(variant)
     try:
         import mitsuba as mi
@@ -230,6 +238,7 @@ def processor() -> str:
     """Return the processor's name, by /proc/cpuinfo if that exists."""
     import platform
 
+    # `platform.processor()` is empty on many Linux systems.
     named = ""
     with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
         named = next(
@@ -254,6 +263,7 @@ def versions() -> dict[str, str]:
 
 def stamped(image: "Image") -> "Image":
     """Return a layered image whose header names the versions and the build that made it."""
+    # An EXR file may travel alone: its header says which code made it.
     made, named = build(), {f"airlight:version:{key}": value for key, value in versions().items()}
     named |= {"airlight:commit": made.commit, "airlight:digest": made.digest}
     if made.changed is not None:
@@ -267,6 +277,7 @@ def describe_environment() -> dict[str, object]:
 
     mitsuba = sys.modules.get("mitsuba")
     variant = mitsuba.variant() if mitsuba else None
+    # The variant may not be set yet, and the device is known with CUDA only.
     environment: dict[str, object] = {
         "versions": versions(),
         "build": asdict(build()),
@@ -277,6 +288,7 @@ def describe_environment() -> dict[str, object]:
     }
     if variant == "cuda_ad_rgb":
         environment["device"] = cuda_status().reason
+    # With CUDA it is listed too, where there is one.
     llvm = next(iter(find_llvm()), None)
     if llvm is not None:
         environment["llvm"] = f"{llvm.label}, {llvm.path}"

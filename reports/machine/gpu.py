@@ -4,7 +4,7 @@
 Dr.Jit knows whether (`dr.has_backend`), but not why not, and it loads OptiX
 when the first ray is cast.
 
-The rules are those of drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which
+The rules come from drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which
 is driver 535, or newer; for OptiX not CUDA 12.7 (drivers 565 to 569, refused as miscompiling);
 compute capability 7.5 for the kernels that it ships.
 """
@@ -14,11 +14,6 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-
-_OLDEST_CUDA = (12, 2)
-_MISCOMPILING_CUDA = (12, 7)
-_OLDEST_CAPABILITY = (7, 5)
-_CAPABILITY_MAJOR, _CAPABILITY_MINOR = 75, 76  # CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_*
 
 
 @dataclass(frozen=True)
@@ -31,6 +26,7 @@ class Status:
 
 def cuda_status() -> Status:
     """Return whether Dr.Jit's CUDA backend can work, with the device's name or the reason."""
+    # Each step needs the one before: driver, initialisation, version, device, capability.
     cuda = _load("libcuda.so.1", "DRJIT_LIBCUDA_PATH")
     if cuda is None:
         why = (
@@ -45,7 +41,7 @@ def cuda_status() -> Status:
             False, f"cuInit fails with error {error}" + (": no device" if error == 100 else "")
         )
     version = _cuda_version(cuda)
-    if version < _OLDEST_CUDA:
+    if version < (12, 2):
         return Status(
             False, f"driver too old: CUDA {_dotted(version)}, 12.2 (driver 535) or newer is needed"
         )
@@ -59,13 +55,14 @@ def cuda_status() -> Status:
     )
     failed = cuda.cuDeviceGet(ctypes.byref(device), 0)
     failed = failed or cuda.cuDeviceGetName(name, 256, device)
-    for number, attribute in zip(numbers, (_CAPABILITY_MAJOR, _CAPABILITY_MINOR)):
+    # CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR and _MINOR.
+    for number, attribute in zip(numbers, (75, 76)):
         failed = failed or cuda.cuDeviceGetAttribute(ctypes.byref(number), attribute, device)
     if failed:
         return Status(False, f"the device does not answer: error {failed}")
     capability = (numbers[0].value, numbers[1].value)
     words = f"{name.value.decode(errors='replace')}, compute capability {_dotted(capability)}, CUDA {_dotted(version)}"
-    if capability < _OLDEST_CAPABILITY:
+    if capability < (7, 5):
         return Status(False, f"{words}: compute capability 7.5 or newer is needed")
     return Status(True, words + _driver())
 
@@ -75,7 +72,7 @@ def optix_status() -> Status:
     cuda = _load("libcuda.so.1", "DRJIT_LIBCUDA_PATH")
     if cuda is None:
         return Status(False, "no NVIDIA driver")
-    if _cuda_version(cuda) == _MISCOMPILING_CUDA:
+    if _cuda_version(cuda) == (12, 7):
         return Status(
             False, "Dr.Jit refuses drivers 565 to 569, they miscompile: use an older or a newer one"
         )

@@ -32,9 +32,12 @@ def requirements(extras: Iterable[str], root: Path = _ROOT) -> list[str]:
 
     packages = tomllib.loads((root / "uv.lock").read_text(encoding="utf-8"))["package"]
     (own,) = (each for each in packages if each["name"] == "airlight")
+    # The lock is a graph: from the project's own needs on, every package that they need, each once
+    # for each set of extras.
     waiting = [*_needs(own, extras), *own["dev-dependencies"]["launcher"]]
     lines, done = set(), set()
     while waiting:
+        # A marker says for which Pythons and systems a package is needed.
         wanted = waiting.pop()
         name, inner = wanted["name"], wanted.get("extra", [])
         if (name, *inner) in done or (
@@ -47,6 +50,8 @@ def requirements(extras: Iterable[str], root: Path = _ROOT) -> list[str]:
         package = next(
             each for each in several if each["version"] == wanted.get("version", each["version"])
         )
+        # The checksums of all files of the version: pip takes the one that fits the machine, and
+        # refuses any other.
         files = [*package.get("wheels", []), *([package["sdist"]] if "sdist" in package else [])]
         lines.add(
             " ".join(
@@ -73,6 +78,7 @@ def install(
     uv, pip = environment / "bin" / "uv", [sys.executable, "-m", "pip"]
     by_uv = [str(uv), "pip", "install", "--quiet", "--no-deps", "--python", sys.executable]
     by_pip = [*pip, "--disable-pip-version-check", "--no-input", "-qq", "install", "--no-deps"]
+    # Both installers read one list.
     locked = ["--require-hashes", "-r", str(listed)]
 
     # Its own line of the lock brings uv.
@@ -80,6 +86,8 @@ def install(
         _write(listed, [line for line in lines if line.startswith("uv==")])
         _run(by_pip + locked, quiet=True)
     _write(listed, lines)
+    # uv may fail where pip does not, behind a proxy for instance: its words are hidden, and pip's
+    # are shown.
     installer = by_uv if _run(by_uv + locked, quiet=True) else by_pip
     if installer is by_pip:
         print(

@@ -69,6 +69,7 @@ def llvm_folders() -> list[Path]:
     """Return the folders in which a libLLVM may lie: those of LD_LIBRARY_PATH, of
     conda, and of the system.
     """
+    # The order is the one in which equal versions are preferred.
     named = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
     conda = [
         Path(prefix, "lib") for prefix in (sys.prefix, os.environ.get("CONDA_PREFIX")) if prefix
@@ -84,17 +85,21 @@ def find_llvm() -> list[Llvm]:
     """List every libLLVM of this machine: the user's setting first, then those
     that work, then the newest.
     """
+    # One library has several names, links and versions: its real path stands for it, and the first
+    # name that was found is reported.
     setting = os.environ.get(LLVM_VARIABLE)
-    seen: dict[str, Llvm] = {}
+    by_path: dict[str, Llvm] = {}
     for path in _libraries(llvm_folders()):
-        seen.setdefault(os.path.realpath(path), examine_llvm(str(path)))
+        by_path.setdefault(os.path.realpath(path), examine_llvm(str(path)))
     libraries = sorted(
-        seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True
+        by_path.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True
     )
+    # The user's setting leads the list even if it does not work: `prepare` then says so, and does
+    # not take another in silence.
     if setting:
-        own = examine_llvm(setting)
+        preferred = examine_llvm(setting)
         libraries = [
-            own,
+            preferred,
             *(
                 llvm
                 for llvm in libraries
@@ -106,8 +111,10 @@ def find_llvm() -> list[Llvm]:
 
 def examine_llvm(path: str) -> Llvm:
     """Say what a libLLVM is and whether it works, if possible without loading it."""
+    # A bare name is looked up by the dynamic linker.
     if os.path.dirname(path) and not os.path.isfile(path):
         return Llvm(path, None, False, "there is no such file")
+    # Loading is the last resort, and happens in another process (see the module).
     version = _version_of_name(path) or _version_asked(path)
     if version is None:
         return Llvm(
@@ -136,6 +143,7 @@ def _libraries(folders: Iterable[Path]) -> Iterator[str]:
 
 
 def _version_of_name(path: str) -> tuple[int, int] | None:
+    # A link such as libLLVM.so tells no version, the file that it leads to does.
     name = _LIBRARY.fullmatch(os.path.basename(os.path.realpath(path)))
     groups = [group for group in name.groups() if group] if name else []
     return (int(groups[0]), int(groups[1]) if len(groups) > 1 else 0) if groups else None

@@ -18,6 +18,7 @@ class _OncePerLine(mi.Appender):
 
     def append(self, level: mi.LogLevel, text: str) -> None:
         """Write a message."""
+        # Mitsuba repeats a message for every plugin that causes it.
         words = _PLACE.sub("", " ".join(text.split()))
         if words not in self._said:
             self._said.add(words)

@@ -22,6 +22,7 @@ def opengl_status(*, judged: bool = True) -> Status:
     """
     host = ShaderHost("OpenGL")
     try:
+        # An empty list of stages starts OpenGL and draws nothing.
         said, _ = host.ask("open", stages=[])
         device = f"{said['device']}, {said['version']}"
         if not judged:
@@ -35,6 +36,7 @@ def opengl_status(*, judged: bool = True) -> Status:
     finally:
         host.end()
     words = f"{device}: the kernel `exact` errs by {wrong:.1e} at most on certified integrals"
+    # `not <=` also refuses an error that is not a number.
     if not wrong <= CONFORMING:
         return Status(
             False,

@@ -45,6 +45,7 @@ def in_own_process(
         ChildProcess(__name__, name=f"{what} {name}", limit=limit, environment=environment),
         (function, arguments),
     )
+    # The first answer says whether more will come: a value or an iterator of values.
     if next(answers):
         return answers
     value = next(answers)
@@ -61,6 +62,7 @@ def _answers(
     message: Any = (sys.argv, *task)
     yields = False
     try:
+        # Ask, and pass on: the process computes the next value only when it is asked for it.
         while True:
             kind, value, spent = process.ask(message)
             if kind == "raised":
@@ -88,6 +90,7 @@ def _add_spent(spent: Any) -> None:
 
 def main() -> None:
     """Do the task that the caller sends, and answer with its result."""
+    # The task is received after Mitsuba is ready, as unpickling it imports modules.
     caller = connection_to_caller()
     from airlight.realtime.errors import NoDriverError
     from airlight.reference.storage.store import counted
@@ -105,6 +108,7 @@ def main() -> None:
             ledger.loaded = Spent()
 
         try:
+            # A generator has not run yet: each value waits for a message from the caller.
             result = function(*arguments)
             if isinstance(result, Iterator):
                 answer("yields", None)

@@ -11,8 +11,6 @@ Progress = Callable[[float, str], None]
 Steps = Callable[[int, int, str], None]  # (done, total, what)
 
 _PATIENCE = 2.0  # seconds before anything is shown
-_PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
-_LEAST = 0.01  # of a part, to read a cached result [s]
 
 
 @contextmanager
@@ -40,6 +38,7 @@ def _rich_bar(title: str) -> Iterator[Progress]:
         TimeElapsedColumn(),
         TextColumn("{task.fields[left]}{task.fields[what]}"),
     )
+    # Nothing is shown in the first seconds: most work ends within them.
     start = time.monotonic()
     console = Console(stderr=True, color_system="auto" if colours_wanted() else None)
     # it prints messages of others above itself
@@ -70,7 +69,8 @@ def _plain_lines(title: str) -> Progress:
     def progress(fraction: float, what: str) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - start < _PATIENCE or now - last < _PLAIN_EVERY:
+        # Ten seconds between two lines.
+        if now - start < _PATIENCE or now - last < 10:
             return
         last = now
         print(
@@ -108,7 +108,10 @@ def sharing(progress: Progress | None, parts: Iterable[tuple[str, float]]) -> li
     """Return the callback for each part of some work: of a part the words before its own,
     and how long it will take.
     """
-    named = [(words, max(_LEAST, seconds)) for words, seconds in parts]
+    # A cached result takes a hundredth of a second to read.
+    named = [(words, max(0.01, seconds)) for words, seconds in parts]
+    # Parts get fractions in proportion to their expected times; a cached one still gets a little,
+    # so that no two ends are equal.
     ends = [0.0, *itertools.accumulate(seconds for _, seconds in named)]
     return [
         part_of(progress, first / ends[-1], last / ends[-1], before=words)

@@ -50,6 +50,7 @@ def percent(value: float | None, digits: int = 3) -> str:
 
 def words(value: Any) -> str:
     """Return any value of report.json in a line."""
+    # The order matters: a truth value is an integer too, and a text is no list.
     if value is None:
         return DASH
     if isinstance(value, bool):
@@ -94,6 +95,7 @@ def kept_words(report: Report) -> str:
 
 def viewer_words(index: Mapping[str, Any]) -> str:
     """Return how many pixels the images of a scene have on the page, and their exposure."""
+    # A page that had to be thinned out says so.
     stride, (width, height) = index["stride"], index["full"]
     size = f"{width} \N{MULTIPLICATION SIGN} {height} pixels"
     if stride > 1:
@@ -120,9 +122,12 @@ _METHODS = (
 
 def methods(scene: Scene) -> Table:
     """Return the times and errors of the methods of a scene."""
+    # Where nothing casts a shadow, a method without shadows misses nothing and is not marked.
     shadows = scene.plan["shadows"].startswith("vis")
 
     def row(entry: CellRow) -> Row:
+        # A method as its paper prints it has errors on purpose: the remark says so, and the sort
+        # below puts these at the end.
         made, peer = method_row(entry, shadows=shadows), published_as(entry)
         return replace(made, remarks=(*made.remarks, f"published peer, {peer}")) if peer else made
 
@@ -158,6 +163,8 @@ def facts(title: str, entries: Any) -> Table:
 
 def trust_words(scenes: Sequence[Scene]) -> dict[str, str]:
     """Return in few words, after a mark, whether the reference is confirmed."""
+    # One disagreement decides; without one the reference is confirmed only if every comparison
+    # agrees, else undecided.
     verdicts = [verdict(entry) for scene in scenes for entry in scene.agreement.values()]
     if not verdicts:
         return {"mark": MARKS[None][0], "words": "Reference not compared"}

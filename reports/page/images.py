@@ -51,7 +51,6 @@ Array = NDArray[np.float64]
 
 LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
-FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
 STRIDES = (1, 2, 3, 4, 6, 8, 12, 16)  #: of the pixels that are kept
 REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
 LARGEST = 32766  #: code of the largest finite difference
@@ -75,11 +74,13 @@ def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[Scene
 
     Every scene begins with all pixels; while the page is too large the largest goes down `STRIDES`.
     """
+    # Every scene at full size first; most pages fit.
     packed = [packed_scene(scene, folder, STRIDES[0]) for scene in scenes]
     while (total := sum(len(images.data) for images in packed)) > limit:
         coarser = [
             place for place, images in enumerate(packed) if images.index["stride"] < STRIDES[-1]
         ]
+        # Every scene is at the last stride already.
         if not coarser:
             raise InputError(
                 f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in "
@@ -87,6 +88,7 @@ def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[Scene
                 f"along both axes, expected at most {limit / 1e6:.1f} MB; report fewer scenes or "
                 "methods at once"
             )
+        # The largest scene loses pixels first, by one stride, and the sum is looked at again.
         largest = max(coarser, key=lambda place: len(packed[place].data))
         stride = STRIDES[STRIDES.index(packed[largest].index["stride"]) + 1]
         packed[largest] = packed_scene(scenes[largest], folder, stride)
@@ -101,6 +103,7 @@ def read_images(scene: Scene, folder: Path) -> list[dict[str, Array]]:
     files = [folder / entry.files["exr"] for entry in scene.methods if entry.files]
     # not in parallel: reading turns the standard error stream off
     methods = [_layers(path) for path in files]
+    # An image of another size would be subtracted from the wrong pixels.
     size = reference["airlight"].shape
     for path, layers in zip(files, methods):
         for layer in layers.values():
@@ -137,16 +140,20 @@ def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
         return {"at": len(store) - len(planes), "bytes": len(planes)}
 
     reference, *tested = read_images(scene, folder)
+    # The reference: a scene without surfaces has a layer of zeros, so that every scene of the page
+    # has the same layers.
     exact = thin(reference)
     exact.setdefault("surface", np.zeros_like(exact["airlight"]))
     codes = {name: reference_codes(exact[name]) for name in LAYERS}
-    # The floors are those of the whole image, so that they do not depend on which pixels are kept.
+    # Floors come from the whole image: they must not depend on which pixels the page holds.
     whole = dict(reference)
     whole[TOTAL] = whole["airlight"] + whole.get("surface", 0)
     floors = {name: _floor(whole.get(name)) for name in (*LAYERS, TOTAL)}
     exact[TOTAL] = exact["airlight"] + exact["surface"]
     rounded = {name: reference_values(codes[name]) for name in LAYERS}
     rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
+    # The denominator uses the reference as the browser will have it, rounded; the difference uses
+    # the exact one (see the module).
     shown = [entry for entry in scene.methods if entry.files]
 
     def packed(number: int) -> dict[str, bytes]:
@@ -154,18 +161,22 @@ def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
         packed_layers = {}
         for name, layer in thin(tested[number]).items():
             if name == FLIP_LAYER:
-                levels = np.round(
-                    FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)
-                ).astype(np.int32)
+                # HDR-FLIP lies in 0..1, the same in every channel: one plane of 8 bits. Pixels that
+                # are not finite count as 0.
+                levels = np.round(255 * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(
+                    np.int32
+                )
                 packed_layers[name] = pack_planes(levels, FLIP_BITS)
             else:
                 relative = relative_difference(exact[name], rounded[name], layer, floors[name])
                 packed_layers[name] = pack_planes(difference_codes(relative), DIFFERENCE_BITS)
         return packed_layers
 
+    # zlib and NumPy let other threads run.
     with ThreadPoolExecutor() as pool:
         references = list(pool.map(lambda name: pack_planes(codes[name], REFERENCE_BITS), LAYERS))
         methods = list(pool.map(packed, range(len(shown))))
+    # Offsets follow from the order in which planes are added: the reference, then the methods.
     height, width = codes["airlight"].shape[:2]
     full_height, full_width = reference["airlight"].shape[:2]
     index = {
@@ -192,6 +203,7 @@ def relative_difference(exact: Array, rounded: Array, test: Array, floor: float)
     `rounded` is the reference as the page will have it, which it multiplies with.
     """
     with np.errstate(invalid="ignore"):
+        # Where the reference is not finite the image itself is the difference, against the floor.
         difference = test - np.where(np.isfinite(exact), exact, 0)
         unit = np.maximum(np.abs(np.where(np.isfinite(rounded), rounded, 0)), floor)
         return difference / unit
@@ -201,6 +213,7 @@ def _floor(reference: Array | None) -> float:
     """Return the radiance below which errors are relative to it; 1 where the reference is black."""
     if reference is None:
         return 1.0
+    # A floor of zero would divide by zero in black images.
     finite = np.isfinite(reference)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     return FLOOR * mean if mean > 0 else 1.0
@@ -218,6 +231,7 @@ def reference_codes(radiance: NDArray[np.floating]) -> Codes:
     bits = single.view(np.uint32).astype(np.int64)
     # Rounding up the largest finite numbers may reach the pattern of infinity, never beyond.
     rounded = (bits + 0x80) >> 8
+    # All NaN get one code, the pattern of a quiet NaN.
     codes = np.where(np.isfinite(single), rounded, bits >> 8)
     return np.where(np.isnan(single), 0x7FC000, codes).astype(np.int32)
 
@@ -230,6 +244,8 @@ def reference_values(codes: Codes) -> Array:
 def difference_codes(difference: Array) -> Codes:
     """Return the codes of relative differences, in the same shape."""
     with np.errstate(invalid="ignore"):
+        # k asinh(d / s), see the module; larger than the largest code means infinite, with the
+        # sign.
         codes = np.round(K * np.arcsinh(difference / S))
     codes = np.where(np.abs(codes) > LARGEST, np.copysign(INFINITE, codes), codes)
     return np.where(np.isnan(difference), NAN, codes).astype(np.int32)
@@ -241,9 +257,13 @@ def pack_planes(codes: Codes, bits: int) -> bytes:
     """
     parts: list[bytes] = []
     for number in range(codes.shape[-1]):
+        # The second and the third channel are predicted from the first, each pixel from its left
+        # neighbour. The shift to the top of the word and back keeps `bits` bits with their sign.
         plane = codes[..., number].astype(np.int32) - (codes[..., 0] if number else 0)
         rest = np.diff(plane, axis=1, prepend=np.int32(0)) << (32 - bits)
         signed = rest >> (32 - bits)  # modulo 2^bits, with its sign
+        # Small residuals of either sign become small numbers, whose upper bytes are zeros that
+        # compress to nothing.
         zigzag = ((signed << 1) ^ (signed >> 31)) & ((1 << bits) - 1)
         parts += [(zigzag >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
     return zlib.compress(b"".join(parts), 6)

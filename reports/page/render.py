@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 PAGE_LIMIT = 30_000_000  #: bytes of a page
-WORDS_LIMIT = 2_500_000  #: bytes of these for everything but images
 SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -44,8 +43,11 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
 
     # A scene without any image has no viewer.
     with_images = [scene for scene in report.scenes if any(entry.files for entry in scene.methods)]
-    images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
+    # Everything but images gets 2.5 MB of the page.
+    images = page_images(with_images, Path(folder), limit - 2_500_000)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
+    # The scene that opens the page is drawn without a script too, and has the chart of methods
+    # beside it.
     lead = _lead(
         report.scenes,
         [place for place, scene in enumerate(report.scenes) if id(scene) in number_of],
@@ -65,6 +67,7 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
     ]
     environment = page_environment()
     environment.globals |= TABLES
+    # Styles, scripts and data go into the page: it opens without a network.
     page = environment.get_template("report.html.j2").render(
         report=report,
         viewers=viewers,
@@ -81,6 +84,7 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
         pixels=[Markup(scene_images.data) for scene_images in images],
         kept=kept_words(report),
     )
+    # Words alone can exceed their part, with very many methods.
     if len(page.encode()) > limit:
         raise InputError(
             f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, expected at most "
@@ -96,6 +100,8 @@ def page_environment() -> "jinja2.Environment":
     """
     import jinja2
 
+    # Values of a report come from files of users: everything is escaped, and a value that is
+    # missing is a fault, no empty text.
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -124,6 +130,7 @@ def _viewer(
     shown = [entry for entry in scene.methods if entry.files]
     first = _first_shown(shown)
     files = shown[first].files
+    # Pictures for readers without scripts, of the opening scene only.
     named = {
         "reference": scene.files.picture,
         "method": files.get("picture"),
@@ -152,6 +159,7 @@ def _inline(path: Path) -> str:
 
     buffer = io.BytesIO()
     try:
+        # A smaller copy: the PNG file lies beside the page in full.
         with Image.open(path) as picture:
             picture.convert("RGB").save(buffer, "WEBP", quality=80)
     except OSError as error:

@@ -39,6 +39,7 @@ def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "doub
 def file_bytes(figure: "Figure", ending: str, **how: Any) -> bytes:
     """Return a figure as a file, the same bytes for the same figure."""
     buffer = io.BytesIO()
+    # Without dates and versions in it a file changes only when its figure does.
     figure.savefig(buffer, format=ending[1:], metadata=_METADATA[ending], **how)
     return buffer.getvalue()
 
@@ -56,6 +57,7 @@ def picture_grid(pictures: Sequence[tuple[str, Any]], column: str, *, across: in
 
     Pictures are (height, width, 3) in 8 bits, or (height, width) for shades of grey.
     """
+    # Inches: each row is as high as its pictures, with 0.36 for a title of two lines.
     wide, down = WIDTHS[column], -(-len(pictures) // across)
     height, width = pictures[0][1].shape[:2]
     figure = new_figure(wide, down * (wide / across * height / width + 0.36))
@@ -91,6 +93,8 @@ def speed_chart(
     A figure is `width` wide, a panel at most `tallest` high [inches]. Styles follow from all labels
     of a report, with or without a point, and `marks` change them.
     """
+    # A legend for all panels has only labels that some panel draws; their styles were assigned over
+    # all labels, so that every chart of a report agrees.
     timed = [scene for scene in scenes if any(map(has_point, scene.methods))]
     there = {entry.label for scene in timed for entry in scene.methods if has_point(entry)}
     rows = ((row.method, row.label) for scene in scenes for row in scene.methods)
@@ -114,6 +118,8 @@ def legend_below(
     figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int
 ) -> None:
     """Put the markers of labels below a figure."""
+    # Empty plots make the markers, and only those: curves and bars of errors stay out of the
+    # legend.
     handles = [
         panel.plot([], [], **style, linestyle="none", label=short(label))[0]
         for label, style in styles.items()
@@ -136,14 +142,18 @@ def speed_panel(
         assert entry.times
         assert entry.error
         assert entry.error.relative_rmse is not None
+        # Distances to the quartiles, which matplotlib takes as lengths of bars.
         frame, error = entry.times.frame, entry.error.relative_rmse
         spread = [[frame.median_ms - frame.low_ms], [frame.high_ms - frame.median_ms]]
         style = {**styles[entry.label], "linestyle": "none"}
+        # A noisy method would get better with every frame averaged: its point is the error of one
+        # frame, its bar reaches to the bias that remains.
         if noise := entry.noise:
             error = noise.rmse
             bias = noise.most_bias if noise.root_bias is None else noise.root_bias
             if bias is not None:
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
+        # Not measured in turns with the others.
         if entry.times.run is None:
             style["markerfacecolor"] = "none"
             panel.annotate(
@@ -166,6 +176,7 @@ def plain_times(panel: "Axes") -> None:
     """Name 1, 2 and 5 of each decade, in plain numbers: times often span less than one."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+    # With many decades 2 and 5 of each would collide.
     low, high = panel.get_xlim()
     panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 50 * low else (1,)))
     panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))

@@ -36,8 +36,6 @@ RED = ((70.0, 36.0, 24.0), (25.0, 29.0, 10.0))
 
 NOT_FINITE = (255, 0, 255)  #: magenta, which no map contains
 
-_FINE = 4097  # points along each curve, from which equal steps are interpolated
-
 
 @functools.cache
 def signed_colours(steps: int = 127) -> Colours:
@@ -46,6 +44,7 @@ def signed_colours(steps: int = 127) -> Colours:
     """
     import colour
 
+    # The blue arm runs backwards to the middle, which both arms have: it is taken once.
     lightness_and_hue = np.concatenate([_arm(BLUE, steps)[:0:-1], _arm(RED, steps)])
     # Both CAM16-UCS and the sRGB of colour-science scale XYZ to 1.
     linear = colour.XYZ_to_sRGB(colour.CAM16UCS_to_XYZ(lightness_and_hue))
@@ -63,7 +62,8 @@ def unsigned_colours(name: str) -> Colours:
 def _arm(points: tuple[tuple[float, float, float], ...], steps: int) -> NDArray[np.float64]:
     """Return a curve from the middle to its end in equal steps of length, (steps + 1, 3)."""
     middle, control, end = (np.array(point) for point in (MIDDLE, *points))
-    t = np.linspace(0, 1, _FINE)[:, None]
+    # A quadratic Bezier curve, its length up to each point, and the points at equal steps of it.
+    t = np.linspace(0, 1, 4097)[:, None]
     curve = (1 - t) ** 2 * middle + 2 * t * (1 - t) * control + t**2 * end
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     wanted = np.linspace(0, length[-1], steps + 1)
@@ -90,6 +90,7 @@ def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
     """
     import colour
 
+    # One channel that is not finite makes the whole pixel magenta.
     finite = np.all(np.isfinite(radiance), axis=-1)
     linear = np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, 1)
     encoded = np.asarray(colour.cctf_encoding(linear, function="sRGB"))
@@ -121,6 +122,7 @@ def tone_curve(radiance: NDArray[np.floating]) -> ToneCurve:
     99.9th percentile white.
     """
     finite = radiance[np.all(np.isfinite(radiance), axis=-1)]
+    # A black image has no mean to bring to 0.3.
     mean = float(np.maximum(finite, 0).mean()) if finite.size else 0.0
     if not mean > 0:
         return ToneCurve(1.0, 1.0)
@@ -160,10 +162,12 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     """
     relative = relative_error(reference, test)
     finite = ~np.isnan(relative)
+    # The channel with the largest error decides, and keeps its sign.
     relative = np.where(finite, relative, 0)
     worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[
         ..., 0
     ]
+    # From white at the floor to full colour at the ceiling, by the logarithm.
     decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
     size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)
     colours = signed_colours()

@@ -82,6 +82,7 @@ def kernel_styles(kernels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Return the style of the markers and lines of each kernel; 'name-N' looks like 'name'."""
     pairs = {}
     for kernel in kernels:
+        # A kernel may be given with its number of panels or terms.
         base, _, digits = kernel.rpartition("-")
         name = base if digits.isdecimal() and base in _KERNELS else kernel
         pairs[kernel] = _KERNELS.get(name, _OTHER_KERNEL)
@@ -104,6 +105,7 @@ def report_styles(shown: Iterable[tuple[str, str]]) -> dict[str, dict[str, Any]]
     labels: dict[str, dict[str, None]] = {}
     for method, label in shown:
         labels.setdefault(method.removesuffix(_HISTORY), {})[label] = None
+    # All variants of a method share its pair of colour and marker.
     others, pairs = cycle(_OTHERS), dict[str, tuple[str, str]]()
     for method, several in labels.items():
         pair = _METHODS.get(method) or next(others)
@@ -146,6 +148,7 @@ def _numbered(pairs: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, Any]]
 
 
 def _marker_style(colour: str, marker: str, variant: int) -> dict[str, Any]:
+    # After six variants the fillings come again, with a black edge.
     second_round = (variant // len(_FILLS)) % 2
     return {
         "color": COLOURS[colour],

@@ -36,7 +36,10 @@ def claims(scenes: Scenes) -> list[Claim]:
     """Return the claims that follow from the scenes of a report, in the order of the page."""
     if not scenes:
         return []
+    # The order of the page: first whether the reference can be trusted, then what it leaves out,
+    # then faults.
     sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
+    # A refusal is the method's answer, "left out" is our decision: two claims.
     slow = "Not measured for the time that they take"
     for kind, words, left_out in (("refused", "Refused", False), ("not-measured", slow, True)):
         without = [
@@ -68,6 +71,7 @@ def growth_claims(records: Sequence[Scaling]) -> list[Claim]:
     """Return the claims that follow from how times grow, the records of `scaling`."""
     if not records:
         return []
+    # Each jump is a claim that fails; a single one holds when there is none.
     jumps = [_claim("growth", f"A time jumps: {jump}.", good=False) for jump in cliffs(records)]
     scenes = " and ".join(dict.fromkeys(record.scene for record in records))
     kinds = ", ".join(dict.fromkeys(WORK[record.kind] for record in records))
@@ -83,6 +87,8 @@ def confirmed(scenes: Scenes) -> bool:
     confirmed by at least one.
     """
     for scene in scenes:
+        # One comparison that speaks against the reference outweighs all others; an undecided one
+        # does not, if another confirms its layer.
         compared = list(scene.agreement.values())
         if any(verdict(entry) is False for entry in compared):
             return False
@@ -97,7 +103,7 @@ def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
 
 
 def _entries(scenes: Scenes) -> list[tuple[str, Row]]:
-    """Return the scene's name with every entry: those of methods, then the images of engines."""
+    """Return the scene's name with every entry: first methods, then images of engines."""
     entries = [(scene.name, entry) for scene in scenes for entry in scene.methods]
     return sorted(entries, key=lambda pair: pair[1].kind == "image")
 
@@ -105,6 +111,7 @@ def _entries(scenes: Scenes) -> list[tuple[str, Row]]:
 def _trust(scenes: Scenes) -> list[Claim]:
     """Return a claim for each estimator that checked the reference."""
     compared = [(scene.name, entry) for scene in scenes for entry in scene.agreement.values()]
+    # A scene in the dark has nothing to compare.
     if not compared:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
         return [_claim("reference", text)]
@@ -116,6 +123,7 @@ def _trust(scenes: Scenes) -> list[Claim]:
 
 
 def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
+    # Three outcomes: against, undecided, confirmed.
     against, open_ = (
         [_place(*pair) for pair in compared if verdict(pair[1]) is found] for found in (False, None)
     )
@@ -129,6 +137,7 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
     good = [pair for pair in compared if verdict(pair[1])]
     text = ""
     if good:
+        # The interval that fills most of its margin shows how close the decision was.
         filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
         low, high = (100 * known(end) for end in worst.statistics.relative_bias_ci)
@@ -179,6 +188,7 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
         ("nonfinite", "values that are not finite"),
         ("negative", "negative values"),
     ):
+        # Papers as printed make negative values by design: a fact, no failure.
         wrong = [(name, m) for name, m in _entries(scenes) if getattr(m.error, count, 0)]
         failed = [_pixels(name, m, count) for name, m in wrong if not published_as(m)]
         if failed:
@@ -188,6 +198,7 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
             yield _claim(
                 "published", f"As the papers have it, images with {words}: {'; '.join(peers)}."
             )
+    # Lit intervals of the reference that random shadow rays contradict.
     left = [f"{scene.name} ({scene.reference.left})" for scene in scenes if scene.reference.left]
     if left:
         text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
@@ -202,6 +213,7 @@ def _timed(scenes: Scenes) -> list[Claim]:
     dates = sorted(run.started for _, run in runs)
     when = dates[0] if dates[0] == dates[-1] else f"between {dates[0]} and {dates[-1]}"
     text = f"The times of a scene are of one run, in which its methods took turns: {when}."
+    # Runs during which the machine changed, with the factors that tell it.
     changed = [
         f"{name} ({run.between:.2f} times between rounds, {run.within:.2f} within one)"
         for name, run in runs

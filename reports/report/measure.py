@@ -56,8 +56,6 @@ if TYPE_CHECKING:
     from airlight.validation.estimates.monte_carlo import ElsewhereFor
     from airlight.validation.study.scene import Judged
 
-_PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
-
 
 def write_report(
     folder: Path | str,
@@ -81,6 +79,7 @@ def write_report(
     the work. Workers of `cluster` compute references and the batches that check them; methods run
     here. Unusable input is refused, and an existing report is not damaged.
     """
+    # Mistakes are looked for before anything is measured: names, sizes of images, drivers, scenes.
     names = tuple(study.scene_names())
     _refuse_twins(names)
     shown = dict(images or {})
@@ -92,6 +91,7 @@ def write_report(
     environment, took = describe_environment(), stopwatch()
     if any(is_shader(chosen.method) for chosen in study.configurations):
         environment["opengl"] = require_opengl()
+    # A user's method may hang: then it runs where it can be ended.
     process = in_own_process if apart else None
     since, notes, of_scenes, referenced = (
         time.time() if fresh else None,
@@ -105,6 +105,8 @@ def write_report(
 
     with fresh_results(since):
         for name in names:
+            # Every scene is opened once to be checked and to say how long it will take, and again
+            # when its turn comes.
             each = opened(name)
             notes += each.scene.features.notes
             of_scenes.append((f"{each.name}: ", each.seconds()))
@@ -116,10 +118,12 @@ def write_report(
     # Not before the scenes are known to be right: a mistake leaves no empty folder.
     target = ensure_folder(folder)
     with fresh_results(since), staged(target) as hidden:
+        # The bar gives each part the time that it is expected to take; a cached part takes none,
+        # and the page a second for each scene.
         others = other_parts(study)
         whole = [(words, sum(parts.values())) for words, parts in of_scenes]
         whole += [(f"{part.title}, ", part.seconds) for part in others]
-        *steps, page = sharing(progress, [*whole, ("", _PAGE_SECONDS * len(names))])
+        *steps, page = sharing(progress, [*whole, ("", 1.0 * len(names))])
         studied, results = [], list[Kept[Any]]()
         if cluster is not None:
             from airlight.reports.cluster.references import bring_references
@@ -146,6 +150,7 @@ def write_report(
             studied.append(write_scene(result, hidden))
             del each, result
         gc.collect()
+        # Parts that belong to no scene follow the scenes, with the time of each kind.
         by_kind: dict[str, list[Any]] = {}
         seconds = {"scenes": took().seconds, "stability": 0.0, "scaling": 0.0, "papers": 0.0}
         for part, step in zip(others, steps[len(names) :]):
@@ -154,6 +159,7 @@ def write_report(
             seconds[part.kind] += of_part().seconds
             by_kind.setdefault(part.kind, []).append(found.value)
             results.append(found)
+        # A part returns a list of records; the report has all of a kind in one.
         scaling = [each for found in by_kind.get("scaling", ()) for each in found]
         usual = study.name in STUDIES and names == standard_study(study.name).scenes
         kernels = [each for found in by_kind.get("stability", ()) for each in found]
@@ -179,6 +185,7 @@ def write_report(
             scaling=tuple(scaling),
             papers=tuple(paper_rows(by_kind.get("papers", ()))),
         )
+        # Data before the page: the page is drawn from the record alone, as `--from` does.
         page(0.0, "the page")
         (hidden / "report.json").write_text(report_text(report), encoding="utf-8", newline="\n")
         (hidden / "report.html").write_text(
@@ -210,8 +217,9 @@ def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None
 def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuration, str]:
     """Render a small frame with every user method: what is at fault there is said before the work.
 
-    Returns those that ended their process, with how: they are not called again.
+    Returns the methods that ended their process, with how: they are not called again.
     """
+    # A small frame shows most faults of code. Refusals of this scene are no faults.
     ended = {}
     for chosen in study.configurations:
         if not chosen.own:
@@ -221,6 +229,8 @@ def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuratio
             _ = frame_of(cell) if apart is None else apart(frame_of, cell, name=chosen.method)
         except InputError as error:
             fault = own_fault(chosen.method, str(error))
+            # In this process the report cannot go on after a fault of the user's method; in another
+            # one it does, without the methods that ended their process.
             if fault and apart is None:
                 raise InputError(fault) from error
             if fault:
@@ -250,7 +260,6 @@ def _refuse_twins(scenes: Sequence[str]) -> None:
 # A folder out of sight until it is whole ----------------------------------------------------------
 
 _PREFIX = ".airlight-report-"
-_STALE = 86400.0  # seconds after which the remains of a killed run are removed
 
 
 @contextmanager
@@ -263,8 +272,10 @@ def staged(target: Path) -> Iterator[Path]:
     target as it was; that of a full disk names the target. Raises InputError if another process is
     writing a report there.
     """
+    # A killed run leaves its hidden folder behind; it is removed after a day, as a younger one may
+    # belong to a run that is still at work.
     for left in target.glob(f"{_PREFIX}*"):
-        if time.time() - left.stat().st_mtime > _STALE:
+        if time.time() - left.stat().st_mtime > 86400:
             shutil.rmtree(left, ignore_errors=True)
     hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
     try:
@@ -283,14 +294,18 @@ def _move(hidden: Path, target: Path) -> None:
     """Move the files of a hidden folder into the target, and remove the images that only
     the report before named.
     """
+    # The names of the old report, before its data are replaced.
     files, before = [path for path in hidden.rglob("*") if path.is_file()], set[Path]()
     with suppress(InputError):  # there was none, or of another version
         report, folder = load_report(target)
         before = {folder / name for name in named_files(report)}
+    # Images first, page and data last: a reader who opens the page meanwhile finds every image that
+    # it names.
     for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
         place = target / path.relative_to(hidden)
         place.parent.mkdir(parents=True, exist_ok=True)
         os.replace(path, place)
         before.discard(place)
+    # Images of the old report that the new one has not.
     for path in before:
         path.unlink(missing_ok=True)

@@ -22,8 +22,6 @@ from airlight.validation.study.configuration import Configuration, user_code
 from airlight.validation.study.study import Study, standard_study
 from airlight.validation.timing import Scaling
 
-_STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
-
 
 @dataclass(frozen=True)
 class OtherPart:
@@ -50,6 +48,8 @@ def other_parts(study: Study) -> list[OtherPart]:
     """Return the parts that a study asks for; claims of papers only with all
     scenes of a study of ours.
     """
+    # Growth needs all scenes of its standard study, and so do the claims of papers: a report on one
+    # scene has neither.
     parts = []
     if study.stability:
         parts.append(_stability_part(study.stability))
@@ -62,7 +62,7 @@ def other_parts(study: Study) -> list[OtherPart]:
     return parts
 
 
-# The modules of these inputs are those that compute, not the reports that show.
+# The modules of these inputs compute; the reports that show results are not among them.
 
 
 # --- kernels --------------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ def _stability_part(rays: int) -> OtherPart:
     added = {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
     compute = partial(_stability, rays, list(added))
     return OtherPart(
-        "stability", "stability", _STABILITY, StabilityInputs(rays, added), compute, list[Stability]
+        "stability", "stability", 20.0, StabilityInputs(rays, added), compute, list[Stability]
     )
 
 
@@ -98,8 +98,10 @@ def _stability(rays: int, added: list[str], progress: Progress) -> list[Stabilit
         "limit": math.inf,
         "quick": True,
     }
-    known: list[Stability] = in_own_process(known_kernels, rays, **how)
-    return known + (stability(added, count=rays, progress=counted(progress)) if added else [])
+    # Kernels of users run in this process, which knows them; ours run in another one, which is told
+    # to compile quickly.
+    built_in: list[Stability] = in_own_process(known_kernels, rays, **how)
+    return built_in + (stability(added, count=rays, progress=counted(progress)) if added else [])
 
 
 def known_kernels(rays: int) -> list[Stability]:
@@ -126,7 +128,7 @@ class ScalingInputs(Inputs):
 def _scaling_part(work: str, study: Study) -> OtherPart:
     inputs = ScalingInputs(work, study, machine())
     return OtherPart(
-        "scaling", "how times grow", _GROWTH, inputs, partial(_scaling, work, study), list[Scaling]
+        "scaling", "how times grow", 80.0, inputs, partial(_scaling, work, study), list[Scaling]
     )
 
 
@@ -144,6 +146,7 @@ def _scaling(work: str, study: Study, progress: Progress) -> list[Scaling]:
 
 def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[str]:
     """Return the names of the experiments that claims need and that an effort has."""
+    # Efforts are ordered: each includes the experiments of the ones before.
     needed = {claim.experiment for claim in chosen}
     most = EFFORTS.index(effort)
     return [
@@ -204,6 +207,7 @@ def measure_claims(
     """Measure what claims need and is not cached, and return those that are decided;
     `quick` leaves out images.
     """
+    # The results of an experiment are cached.
     parts = [_paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])]
     steps = sharing(progress, [(f"{part.title}, ", part.seconds) for part in parts])
     return decided(chosen, dict(part.result(step).value for part, step in zip(parts, steps)))

@@ -31,8 +31,10 @@ _REFERENCE = "reference"  # the stem of the reference's files
 def write_scene(result: SceneResult, folder: Path) -> Scene:
     """Return the record of a scene, and write its files into a folder of the report's."""
     study, reference = result.study, result.reference
-    own = folder_of(study.path)
-    (folder / own).mkdir(exist_ok=True)
+    # Every picture of the scene has the exposure of its reference, so that they can be compared by
+    # eye.
+    subfolder = folder_of(study.path)
+    (folder / subfolder).mkdir(exist_ok=True)
     light = reference.airlight + reference.surface
     factor = exposure(light)
     pictures = {
@@ -40,9 +42,12 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
         "airlight": tone_mapped(reference.airlight, factor),
     }
     named = _written(
-        folder, f"{own}/{_REFERENCE}", layered_reference(study.loaded, reference), pictures
+        folder, f"{subfolder}/{_REFERENCE}", layered_reference(study.loaded, reference), pictures
     )
-    stems = [f"{own}/{stem}" for stem in file_stems([judged.row.label for judged in result.rows])]
+    # Labels become names of files that no two rows share.
+    stems = [
+        f"{subfolder}/{stem}" for stem in file_stems([judged.row.label for judged in result.rows])
+    ]
     return Scene(
         name=study.name,
         purpose=study.loaded.purpose,
@@ -68,6 +73,7 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
 def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
     """Return the record of a row, with its files written."""
     named = dict[str, str]()
+    # A refusal has no image.
     if judged.image is not None and judged.expected is not None:
         test = np.asarray(judged.image.layers[judged.row.layer], dtype=np.float64)
         pictures = {
@@ -86,16 +92,17 @@ def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
 
 def reference_record(reference: ReferenceImage) -> Reference:
     """Return the accuracy of a quadrature reference, without its images."""
+    # Means over finite pixels; in the dark there is nothing to be relative to.
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
     bound = float(of_image(reference).bound[finite].mean()) / mean if mean > 0 else None
-    found = {
+    values = {
         "mean": mean,
         "relative_bound": bound,
         "kind": known_to(reference, "airlight").kind,
     } | {name: getattr(reference, name) for name in numbers}
-    return record_of(found, Reference)
+    return record_of(values, Reference)
 
 
 def _written(report: Path, stem: str, image: Image, pictures: Mapping[str, Any]) -> dict[str, str]:
@@ -104,6 +111,8 @@ def _written(report: Path, stem: str, image: Image, pictures: Mapping[str, Any])
     """
     names = {kind: f"{stem}{SUFFIXES[kind]}" for kind in ("exr", *pictures)}
     # somebody's, which the report judges
+    # An image from elsewhere may hold values that are not finite; the file keeps them, as the
+    # report judges them.
     write_exr(report / names["exr"], stamped(image), finite=False)
     for kind, pixels in pictures.items():
         (report / names[kind]).write_bytes(png_bytes(pixels))
@@ -125,8 +134,12 @@ def file_stems(labels: Sequence[str]) -> list[str]:
 
     taken, stems = files(_REFERENCE), []
     for label in labels:
+        # Labels have brackets, commas and paths of users; lower case, as some file systems ignore
+        # it.
         words = "".join(c if c.isascii() and c.isalnum() else " " for c in label).lower().split()
         stem = base = "-".join(words) or "image"
+        # `a` and `a-airlight` would share a file with the suffixes: all files of a stem have to be
+        # free.
         number = 2
         while files(stem) & taken:
             stem, number = f"{base}-{number}", number + 1

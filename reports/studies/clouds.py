@@ -102,6 +102,7 @@ def slab(
     from airlight.validation.slab.request import slab_request
     from airlight.validation.study.cost import Work, check_work
 
+    # One photon has no standard error.
     if photons != int(photons) or photons == 1 or photons < 0:
         raise InputError(
             f"photons: got {photons}, expected a whole number from 2 on, for example 1000000"
@@ -116,9 +117,11 @@ def slab(
         depths=depths,
         directions=directions,
     )
+    # The time is known before the work: it grows with the orders, the depths and the photons.
     check_work(f"photons {photons}", [Work(expected_seconds(request, int(photons)))])
     with telling(progress, "slab") as tell:
         found = slab_numbers(request, photons=int(photons), progress=tell)
+    # The two numbers that most users want, with their errors; everything else is in tables.
     words_of = {
         side: f"{found['total'][side]:.7g} +- {found['error']['total'][side]:.1g}"
         for side in ("reflectance", "transmittance")
@@ -151,12 +154,14 @@ def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
             title, columns, [{name: row[name] for name in ("orders", *_BY_ORDER)} for row in rows]
         )
 
+    # Tables follow from what was asked for: photons, depths and directions are optional.
     six: Mapping[str, Any] = {"digits": 6}
     photons, total = found["photons"], found["total"]
     yield by_order("By order; lengths in mean free paths", found["orders"])
     if photons:
         yield by_order(f"By {photons['count']} photons", photons["orders"])
         yield by_order("Standard errors of the photons", photons["standard_error"]["orders"], 2)
+    # A row for each order and depth.
     fluence = [
         {"orders": row["orders"], **each} for row in found["orders"] for each in row["fluence"]
     ]
@@ -185,6 +190,8 @@ def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
     from airlight.reports.plotting.figure import new_figure
     from airlight.reports.plotting.style import COLOURS, WIDTHS, reference_style
 
+    # Left the light that leaves the slab, right how far from its entry; the photons as black dots
+    # over the computed bars and lines.
     rows, walked = found["orders"], found["photons"]
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.5 * width)
@@ -203,6 +210,8 @@ def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
             )
 
     for number, (name, side, colour) in enumerate(_SIDES):
+        # Bars of both sides stand beside one another, 0.2 to the left and to the right of their
+        # order.
         at = places + 0.4 * number - 0.2
         fractions.bar(at, values(rows, name), 0.38, color=COLOURS[colour], label=side)
         put(fractions, name, at, "photons, ±2 standard errors" if number else None)

@@ -59,9 +59,11 @@ def scaling(
 
     usual = standard_study("scaling")
     wanted = usual.growth if kinds is None else listed("kinds", kinds)
+    # A mistake in words costs no work.
     for kind in wanted:
         if kind not in GROWTH:
             raise InputError(f"kinds: got {kind!r}, expected some of {','.join(GROWTH)}")
+    # Every scene and kind is a ladder of works, on which all methods are timed.
     chosen, _ = asked_configurations(method, (), (), usual=usual.configurations)
     study = replace(usual.at(pixels_of(size)), configurations=tuple(chosen))
     names = [str(name) for name in several(scenes)] or usual.scenes
@@ -94,6 +96,8 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
     from airlight.reports.plotting.style import WIDTHS, report_styles
     from airlight.reports.tables.costs import WORK
 
+    # A panel for each kind of work, in it a line for each method; the camera rays are the floor
+    # below all of them.
     kinds = list(dict.fromkeys(record.kind for record in records))
     width, double = WIDTHS[column], column == "double"
     across = min(len(kinds), 2 if double else 1)
@@ -108,6 +112,8 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
             label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
             times = [cost.frame.median_ms for cost in costs]
             panel.plot([cost.work for cost in costs], times, label=label, **styles[record.label])
+        # The camera rays are the same for all methods: the times beside the last method stand for
+        # all.
         rays = [cost.rays.median_ms for cost in costs]
         panel.plot(
             [cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays"

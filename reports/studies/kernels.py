@@ -39,7 +39,6 @@ else:
 # Costs
 
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
-_SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
 @with_kernels
@@ -61,6 +60,7 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     from airlight.analytic.phase import HenyeyGreenstein, phase_from_words
     from airlight.validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
 
+    # One phase function if the user names it, else the standard ones.
     phases: tuple[tuple[str, float], ...] = PHASES
     if phase is not None:
         chosen = phase_from_words(phase)
@@ -68,12 +68,14 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
         found = bench_kernels(named, phases=phases, progress=counted(tell))
+    # Which kernel is the cheapest at each error.
     levels = speed_against_error(found)
     return Study(
         name="kernels",
         data=with_environment(kernels={"costs": found, "levels": levels}),
         tables=tuple(kernel_tables(found, levels)),
         lines=("ns/ray: the kernel alone by Dr.Jit's history, median.",),
+        # The figure shows the first phase function only: isotropic fog by default.
         draw=partial(
             _draw_costs, [cost for cost in found if cost.phase == phases[0][0] and cost.time]
         ),
@@ -85,12 +87,16 @@ def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
     from airlight.reports.plotting.figure import new_figure
     from airlight.reports.plotting.style import WIDTHS, kernel_styles
 
+    # A panel for each statistic of the error, a line for each kernel over its sizes; the axes are
+    # shared, so that panels compare.
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.9 * width)
     panels = figure.subplots(*((1, 3) if double else (3, 1)), sharex=True, sharey=True)
+    least, most = 1e-7, 10.0  # errors
     styles = kernel_styles(dict.fromkeys(cost.family for cost in costs))
     for panel, (statistic, title) in zip(panels, _STATISTICS.items()):
         for family, style in styles.items():
+            # By time; errors outside the range are drawn at its edge.
             points = sorted(
                 (cost.time.median, error)
                 for cost in costs
@@ -99,10 +105,10 @@ def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
                 and (error := getattr(cost, statistic)) is not None
             )
             times = [point[0] for point in points]
-            errors = [min(max(point[1], _SHOWN[0]), _SHOWN[1]) for point in points]
+            errors = [min(max(point[1], least), most) for point in points]
             panel.plot(times, errors, label=family, linestyle="-", clip_on=False, zorder=3, **style)
         panel.set(xscale="log", yscale="log", xlabel="time of a ray [ns]", title=title)
-        panel.set_ylim(0.6 * _SHOWN[0], 1.6 * _SHOWN[1])
+        panel.set_ylim(0.6 * least, 1.6 * most)
     for panel in panels if not double else panels[:1]:
         panel.set_ylabel("relative error of J [1]")
     handles, labels = panels[0].get_legend_handles_labels()
@@ -133,15 +139,16 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     from airlight.validation.kernels.stability import BAR, CERTIFIED
     from airlight.validation.kernels.stability import stability as run
 
+    # All kernels by default.
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "stability") as tell:
-        found = run(named, count=_TRIED_RAYS, progress=counted(tell))
+        stabilities = run(named, count=_TRIED_RAYS, progress=counted(tell))
     return Study(
         name="stability",
-        data=with_environment(certified=CERTIFIED, bar=BAR, kernels=found),
-        tables=(stability_summary(found),),
-        lines=tuple(line for one in found for line in _stability_lines(one)),
-        good=not any(one.broken for one in found),
+        data=with_environment(certified=CERTIFIED, bar=BAR, kernels=stabilities),
+        tables=(stability_summary(stabilities),),
+        lines=tuple(line for one in stabilities for line in _stability_lines(one)),
+        good=not any(one.broken for one in stabilities),
     )
 
 
@@ -157,8 +164,6 @@ def _stability_lines(found: "Stability") -> Iterator[str]:
 
 
 # Integrals of a file
-
-_ROWS = 12  #: of integrals shown in a notebook
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -187,6 +192,7 @@ class Integrals(Study):
 
         if self.value is None:
             return None
+        # Equal values have no error, also where both are zero.
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.value == self.J, 0.0, (self.J - self.value) / np.abs(self.value))
 
@@ -197,6 +203,7 @@ class Integrals(Study):
         """Return columns by name, a value for each case, as `pandas.DataFrame` takes them."""
         import numpy as np
 
+        # Inputs and results side by side, case by case.
         cases = self.cases
         names = {"phase": cases.phase, "g": cases.g, "foot": cases.foot, "height": cases.height}
         names |= {"x0": cases.x0, "x1": cases.x1, "sigma_t": cases.sigma_t, "J": self.J.reshape(-1)}
@@ -267,14 +274,17 @@ def integrals(
     from airlight.reports.machine.environment import activate
     from airlight.validation.kernels.case_files import integrate_cases as certified
 
+    # Files and columns are checked before Mitsuba starts.
     read, shape = _cases(cases)
     activate()
     from airlight.validation.kernels.cases import check_results, integrate_cases, summary
 
     named = kernel_name(kernel) or "exact"
     J = integrate_cases(read, named, precision)
+    # Rows of a file whose results are not finite are refused; arrays from Python may hold one.
     if isinstance(cases, str | os.PathLike):
         check_results(read, J, named)
+    # Values of the file have precedence over a new integration.
     if certify and read.value is None:
         read = replace(read, value=certified(read)[0])
     found = Integrals(
@@ -286,10 +296,12 @@ def integrals(
         precision=precision,
         cases=read,
     )
+    # A notebook shows the first rows with their numbers.
     data = {"": list(range(len(found)))} | found.columns()
-    more = f"and {len(found) - _ROWS} more" if len(found) > _ROWS else ""
+    count = 12
+    more = f"and {len(found) - count} more" if len(found) > count else ""
     shown = [Column(name, name, digits=9) for name in data]
-    first = table("", shown, list(zip(*data.values()))[:_ROWS], explanation=more)
+    first = table("", shown, list(zip(*data.values()))[:count], explanation=more)
     return replace(found, tables=(first,), lines=(found.title,))
 
 
@@ -298,6 +310,7 @@ def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":
 
     if isinstance(cases, str | os.PathLike):
         cases = read_cases(Path(cases))
+    # Columns may have any common shape, files have one row a case.
     if isinstance(cases, Cases):
         return cases, (len(cases.x0),)
     if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):

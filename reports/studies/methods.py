@@ -44,6 +44,7 @@ def scene_by_scene(loaded: list[Any], title: str, progress: Any) -> Iterator[tup
     """Yield each scene, and what tells how much of it is done."""
     with telling(progress, title) as tell:
         for at, scene in enumerate(loaded):
+            # Each scene is an equal part of the bar, as their times are not known.
             part = part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{scene.name}: ")
             part(0.0, "the reference")
             yield scene, part
@@ -64,8 +65,9 @@ def cells_of(
     from airlight.validation.study.run import run
     from airlight.validation.study.study import Cell
 
-    scene, kept = read_scene(loaded.scene), reference_result(loaded.scene)
-    reference = of_image(kept.value, kept.spent)
+    # The reference is computed once for all configurations of the scene.
+    scene, result = read_scene(loaded.scene), reference_result(loaded.scene)
+    reference = of_image(result.value, result.spent)
     path, elsewhere = str(loaded.path or loaded.name), in_own_process if apart else None
 
     def cell(chosen: Any) -> tuple[Any, Any]:
@@ -89,6 +91,7 @@ def check_study(
     from airlight.validation.study.configuration import configuration_work
     from airlight.validation.study.cost import TIMED, check_work, reference_work
 
+    # The sum over scenes and configurations decides, before the first reference.
     works = []
     for each in loaded:
         scene = read_scene(each.scene)
@@ -180,12 +183,15 @@ def methods(
     from airlight.validation.study.study import Cell, Measure
     from airlight.validation.study.turns import time_cells
 
+    # Everything is checked and loaded before the first reference, which may take minutes.
     chosen, apart = asked_configurations(method, kernel, settings)
     loaded = loaded_scenes(scenes, size)
     check_study("methods", loaded, chosen, progress=progress)
     tables, wrong, rows = [], [], []
     for scene, tell in scene_by_scene(loaded, "methods", progress):
         measure = Measure("stages", seconds, every_metric=False)
+        # First the images and their errors, half of the bar. Configurations that do not differ in
+        # this scene, such as variants of shadows where nothing casts one, are left out.
         read, _, cell = cells_of(scene, measure, apart=apart)
         useful, measured = configurations_for(read, chosen), list[tuple[Any, Any]]()
         for at, each in enumerate(useful):
@@ -197,6 +203,8 @@ def methods(
             Cell(path, scene.size, (), each, measure) if row.status == "done" else None
             for each, (row, _) in zip(useful, measured, strict=True)
         ]
+        # Then the times, all methods in turns in one run, so that a change of the machine hits all
+        # alike.
         tell(0.5, "times")
         timings = time_cells(asked, partial(_same, read), apart=in_own_process if apart else None)
         found = [
@@ -222,12 +230,6 @@ def _same(scene: Any, cell: Any) -> Any:
 
 
 # Errors by cause
-
-_PARTS = {
-    "relative_rmse": FRACTION,
-    "relative_bias": FRACTION,
-    "fraction": {"percent": True, "places": 1},
-}
 
 
 @with_kernels
@@ -261,6 +263,7 @@ def decomposition(
     from airlight.reports.api.render import asked_configurations
     from airlight.validation.study.study import standard_study
 
+    # Scenes and methods of the standard study, unless others are named.
     usual = standard_study("decomposition")
     chosen, apart = asked_configurations(method, (), settings, usual=usual.configurations)
     loaded = loaded_scenes(several(scenes) or list(usual.scenes), size)
@@ -271,6 +274,7 @@ def decomposition(
         title = "{}, {} x {}: error of the airlight by cause".format(scene.name, *scene.size)
         tables.append(_cause_table(title, split))
         entries = []
+        # A refusal is an entry without parts.
         for each, _, found in split:
             entry: dict[str, Any] = {
                 "label": each.label,
@@ -313,6 +317,7 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
     scene, reference, cell = cells_of(loaded, measure, apart=apart)
 
     @cache
+    # Parts are differences of renders: some configurations occur in several, and are rendered once.
     def airlight(configuration: Any) -> Any:
         row, frame = cell(configuration)
         if frame is None or row.error is None or row.error.nonfinite:
@@ -322,6 +327,7 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
         return frame.airlight
 
     split: Split = []
+    # A method that the decomposition cannot split is a row with the reason.
     useful = configurations_for(scene, chosen)
     for at, each in enumerate(useful):
         progress((1 + at) / (1 + len(useful)), each.label)
@@ -346,7 +352,12 @@ def _cause_table(title: str, split: Split) -> Table:
             Row({**shown_values(part), "label": "" if at else each.label})
             for at, part in enumerate(found)
         ]
-    columns = table_of(title, ErrorPart, (), how=_PARTS).columns
+    how: dict[str, dict[str, Any]] = {
+        "relative_rmse": FRACTION,
+        "relative_bias": FRACTION,
+        "fraction": {"percent": True, "places": 1},
+    }
+    columns = table_of(title, ErrorPart, (), how=how).columns
     return table(title, (*words(label="method"), *columns), rows)
 
 
@@ -360,6 +371,7 @@ def _draw_parts(split: list[Any], column: str) -> Any:
     from airlight.reports.plotting.pictures import error_map, exposure, tone_mapped
     from airlight.reports.plotting.style import WIDTHS
 
+    # A row for each method: the reference, its image, the whole error, then the parts.
     across = 2 + max(len(parts) for _, _, parts in split)
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
     height, width = split[0][1].shape[:2]

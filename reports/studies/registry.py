@@ -50,6 +50,7 @@ class Study(Said):
         """
         from airlight.validation.columns import shown_values
 
+        # Rows may have different columns: the union of all, with None where a row lacks one.
         rows = [row if isinstance(row, Mapping) else shown_values(row) for row in self.rows]
         names = dict.fromkeys(name for row in rows for name in row)
         return {name: [row.get(name) for row in rows] for name in names}
@@ -74,6 +75,7 @@ class Study(Said):
         from airlight.reports.tables.drawing import csv, latex, markdown
 
         target = Path(path)
+        # The ending decides: a figure, tables or data.
         if target.suffix in (".pdf", ".png"):
             if self.draw is None:
                 raise InputError(
@@ -107,6 +109,7 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
     from airlight.reports.tables.drawing import csv
     from airlight.reports.tables.table import Column, table
 
+    # Columns without any value would be empty in every row.
     filled = {
         name: values
         for name, values in columns.items()

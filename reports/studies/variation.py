@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from airlight.validation.study.variation import MethodMotion, MethodNoise
 
 
-_GOAL = 0.01  # error, until which the time is given
-_MOST = 1e5  # runs that are averaged in the figure
-
-
 @with_kernels
 def noise(
     scene: SceneLike = "sphere-spot",
@@ -70,12 +66,15 @@ def noise(
     from airlight.validation.study.configuration import named_configurations
     from airlight.validation.study.variation import method_noise
 
+    # The configurations of `studies/methods.toml` under this word, unless others are named.
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("noise"))
     loaded = opened(scene, pixels_of(size))
     with telling(progress, "noise") as tell:
         found = method_noise(loaded.scene, chosen, runs=runs, progress=counted(tell))
+    # The error after a blur, of the middle width.
     middle = len(BLURS) // 2
-    shown = [
+    goal = 0.01  # error, until which the time is given
+    rows = [
         vars(each.noise)
         | {
             "label": each.label,
@@ -83,7 +82,7 @@ def noise(
             "ms": None if each.noise.seconds is None else 1e3 * each.noise.seconds,
             "interval": Interval(*each.noise.bias_ci) if each.noise.runs > 1 else None,
             "noise": each.noise.deviation.value,
-            "until": time_words(each.noise.time_to(_GOAL)),
+            "until": time_words(each.noise.time_to(goal)),
             "blurred": each.noise.blurred_rmse[middle],
         }
         for each in found
@@ -94,7 +93,7 @@ def noise(
         *numbers(bias="bias", interval="95 %", detectable_bias="detectable", how=FRACTION),
         *numbers(root_bias="bias by pixel", noise="noise", relative_rmse="rel. RMSE", how=FRACTION),
         *numbers(efficiency="efficiency [1/s]"),
-        *words(until=f"to {100 * _GOAL:g} %"),
+        *words(until=f"to {100 * goal:g} %"),
         *numbers(low_fraction="low frequencies", how={"digits": 2}),
         *numbers(blurred=f"RMSE blurred, {BLURS[middle]:g} px", how=FRACTION),
     )
@@ -103,7 +102,7 @@ def noise(
     return Study(
         name="noise",
         data=data,
-        tables=(table(title, columns, shown),),
+        tables=(table(title, columns, rows),),
         lines=tuple(f"{each.label}: {each.noise.verdict}" for each in found),
         rows=tuple(found),
         draw=partial(_draw_noise, found),
@@ -118,14 +117,18 @@ def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
     from airlight.reports.plotting.pictures import error_map
     from airlight.reports.plotting.style import WIDTHS
 
+    # At the top the errors and their spectra for all methods, below a row of pictures for each
+    # noisy one.
     width, noisy = WIDTHS[column], [each for each in found if each.noise.runs > 1]
     figure = new_figure(width, (0.42 + 0.38 * len(noisy)) * width)
     panels = figure.subplots(1 + len(noisy), 2, squeeze=False)
     errors, spectra = panels[0]
     for each in found:
+        # Eight points for each factor of ten of averaged runs, up to 1e5; a method without noise is
+        # a point.
         steps = [
             10 ** (k / 8)
-            for k in range(1 + round(8 * math.log10(_MOST)) if each.noise.runs > 1 else 1)
+            for k in range(1 + round(8 * math.log10(1e5)) if each.noise.runs > 1 else 1)
         ]
         style = {} if each.noise.runs > 1 else {"marker": "o", "linestyle": ""}
         # Without a time there is no place on the axis.
@@ -136,6 +139,7 @@ def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
             label=each.label,
             **style,
         )
+        # The middle of each ring of frequencies, up to half a cycle a pixel.
         rings = len(each.noise.spectrum)
         spectra.plot(
             [(k + 0.5) / (2 * rings) for k in range(rings)], each.noise.spectrum, label=each.label
@@ -158,10 +162,6 @@ def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
         for panel in (bias, deviation):
             panel.set(xticks=[], yticks=[])
     return figure
-
-
-_TURN = 120  # frames of a whole turn in a sweep
-_RUNS = 4  # of a method that draws random numbers
 
 
 @with_kernels
@@ -207,8 +207,11 @@ def motion(
     from airlight.validation.study.configuration import named_configurations
     from airlight.validation.study.variation import method_motion
 
+    # The configurations of `studies/methods.toml` under this word, unless others are named.
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
     loaded = opened(scene, pixels_of(size))
+    turn = 120  # frames of a whole turn in a sweep
+    runs = 4  # of a method that draws random numbers
     with telling(progress, "motion") as tell:
         found = method_motion(
             loaded.scene,
@@ -216,8 +219,8 @@ def motion(
             chosen,
             stimulus=stimulus,
             frames=frames,
-            turn=_TURN,
-            runs=_RUNS,
+            turn=turn,
+            runs=runs,
             progress=counted(tell),
         )
     columns = (
@@ -230,19 +233,21 @@ def motion(
     for each in found:
         row: dict[str, Any] = {"label": each.label, "verdict": each.verdict}
         if each.measures:
-            told = {
+            # Estimates have values and errors; the table shows errors of lag and ghost, which a
+            # threshold is compared with.
+            estimates = {
                 name: getattr(each.measures, name)
                 for name in ("relative_rmse", "bias", "flicker", "ghost")
             }
-            told["lag"] = each.measures.lag.lag
-            row |= {name: estimate.value for name, estimate in told.items()} | {
+            estimates["lag"] = each.measures.lag.lag
+            row |= {name: estimate.value for name, estimate in estimates.items()} | {
                 "pop": each.measures.pop
             }
-            row |= {f"{name}_se": told[name].error for name in ("lag", "ghost")}
+            row |= {f"{name}_se": estimates[name].error for name in ("lag", "ghost")}
         rows.append(row)
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
     data = with_environment(
-        scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=found
+        scene=loaded.name, stimulus=stimulus, frames=frames, turn=turn, runs=runs, rows=found
     )
     return Study(
         name="motion",
@@ -261,6 +266,8 @@ def _draw_motion(found: "list[MethodMotion]", column: str) -> Any:
     width = WIDTHS[column]
     figure = new_figure(width, 0.62 * width)
     axes = figure.subplots()
+    # The change of the reference from frame to frame stands beside the errors: a method that lags
+    # by a frame errs by that much.
     measured = [(each.label, each.measures) for each in found if each.measures]
     for label, measures in measured:
         axes.plot(measures.rmse_by_frame, label=label)

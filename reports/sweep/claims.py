@@ -64,12 +64,17 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     """Return in what fraction of the scenes a relative RMSE is at most the target;
     `level` is of this claim [1].
     """
+    # A scene counts as within if it is so at both ends of the reference's error, as undecided if
+    # only at one.
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
     surely = finite & (sample.errors + sample.reference_errors <= target)
     possibly = finite & (sample.errors - sample.reference_errors <= target)
+    # Faults are tries that missed; refusals and scenes without a reference are none.
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())
+    # The interval of the fraction holds whatever an exact reference would say of the undecided
+    # scenes: its lower end counts none of them, its upper end all.
     made = Claim(
         label=sample.label,
         target=target,
@@ -96,6 +101,8 @@ def best_claims(made: Sequence[Claim], target: float) -> list[Claim]:
     """Return the claims on an error that promise most, by the lower ends of
     their intervals, with equals.
     """
+    # The lower end of the interval, not the fraction: three of three scenes promise less than
+    # ninety of a hundred.
     tried = [each for each in made if each.target == target and each.within]
     most = max((each.low for each in tried), default=0.0)
     return [each for each in tried if each.low == most]
@@ -110,8 +117,10 @@ def percent(fraction: float, trials: int) -> str:
     """Return a fraction in per cent, to the digits that so many trials tell apart, never
     rounded up to all or none.
     """
+    # A hundred trials tell whole per cents apart, a thousand tenths.
     places = max(0, int(np.ceil(np.log10(max(trials, 1)))) - 2)
     text = f"{100 * fraction:.{places}f}"
+    # "100 %" would claim that no scene missed, "0 %" that none was within.
     if fraction < 1 and float(text) == 100:
         text = f"{100 - 10.0**-places:.{places}f}"
     if fraction > 0 and float(text) == 0:
@@ -152,6 +161,7 @@ def correlations(sweep: Sweep, made: Sequence[Sample]) -> list[Correlation]:
     """
     pairs = []
     for sample in made:
+        # Scenes with an error and a property; a constant has no rank correlation.
         usable = sample.measured & ~np.isnan(sample.errors)
         for name in sweep.properties:
             values = sweep.property(name)[list(sample.rows)]
@@ -159,6 +169,7 @@ def correlations(sweep: Sweep, made: Sequence[Sample]) -> list[Correlation]:
             x, y = values[both], sample.errors[both]
             if len(x) >= LEAST and np.ptp(x) > 0 and len(np.unique(y)) > 1:
                 pairs.append((sample, name, x, y))
+    # Bonferroni: all intervals hold together with the level.
     each = 1 - (1 - LEVEL) / max(len(pairs), 1)
     return [
         Correlation(sample.label, name, len(x), *rank_correlation(x, y, each))
@@ -177,9 +188,11 @@ def strongest(found: Sequence[Correlation], sweep: Sweep, sample: Sample) -> lis
 
     `found` comes from `correlations`.
     """
-    own = [each for each in found if each.label == sample.label and sure(each)]
+    # From the strongest down; a property that says nearly the same as one already named is passed
+    # over.
+    candidates = [each for each in found if each.label == sample.label and sure(each)]
     chosen: list[Correlation] = []
-    for each in sorted(own, key=lambda each: (-abs(each.r), each.property)):
+    for each in sorted(candidates, key=lambda each: (-abs(each.r), each.property)):
         if len(chosen) < NAMED and all(
             not _same(sweep, sample, each.property, other.property) for other in chosen
         ):

@@ -18,8 +18,6 @@ from airlight.reports.sweep.samples import FAULTS, Sample, Sweep
 from airlight.validation.columns import column
 from airlight.validation.study.row import PROPERTY
 
-COUNT = 10  #: worst scenes of a configuration
-
 #: Possible faults of an image: name, the column that counts the pixels, and a description.
 CHECKS = (
     ("not finite", "error.nonfinite", "pixels of the airlight that are NaN or infinite"),
@@ -77,6 +75,7 @@ def reasons(sweep: Sweep) -> list[Reason]:
     """Return why cells have no numbers, each reason once, the most frequent first."""
     statuses = ["refused", *FAULTS]
     groups: dict[tuple[str, str], list[int]] = {}
+    # Rows of one status and one reason without its numbers are one group.
     texts, status, scenes = sweep["reason"], sweep["status"], sweep["scene"]
     for row in np.flatnonzero(np.isin(status.astype(str), statuses)).tolist():
         groups.setdefault(
@@ -109,6 +108,7 @@ def checks(sweep: Sweep) -> list[Check]:
     made = []
     for name, counted, meaning in CHECKS:
         pixels, scenes = sweep[counted], sweep["scene"]
+        # NaN: the row was not checked, for instance as its method states no bound.
         says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
         made.append(
             Check(
@@ -132,6 +132,7 @@ def faults(sweep: Sweep) -> list[Fault]:
     for name, counted, _ in CHECKS:
         pixels = np.nan_to_num(sweep[counted])
         for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
+            # An image without a finite pixel compares none.
             whole = 0 if np.isnan(of[row]) else int(of[row])
             made.append(
                 Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or "")
@@ -159,9 +160,12 @@ def worst(sweep: Sweep, sample: Sample, properties: Sequence[str]) -> list[Worst
     """Return the worst scenes of a configuration, the worst first, with
     some of their properties.
     """
+    # Scenes with pixels that are not finite come first, as no error tells how bad they are; then by
+    # error. lexsort takes its last key first.
     errors = np.where(np.isnan(sample.errors), -np.inf, sample.errors)
     order = np.lexsort((-errors, -sample.nonfinite.astype(bool).astype(float)))
-    places = [place for place in order if sample.measured[place]][:COUNT]
+    # The ten worst scenes.
+    places = [place for place in order if sample.measured[place]][:10]
 
     def known(column: str, row: int) -> float | None:
         value = float(sweep[column][row])

@@ -42,14 +42,11 @@ PICTURES = 400  #: most on a page, of some 20 kB each
 
 _TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults")
 
-_WIDTH = 10.2  #: of a figure [inches]; the page scales it
 _EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
 #: errors above are drawn here: a series that left its range has 1e22, and no
 #: other point could be told
 _WRONG = 1e3
 _LABEL = 38  # letters of a label, which may be a path of a user's: room is left for the panel
-#: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
-_DOTS = 160
 
 ERROR = "relative RMSE of the airlight [1]"
 TIME = "time of a frame [ms]"
@@ -63,6 +60,8 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
     """
     said = summary_of(read_sweep(source))
     folder = ensure_folder(said.sweep.path.parent if target is None else target)
+    # Every figure as SVG for the page and as PDF for a paper; claims as JSON; the page last, as it
+    # holds the figures.
     charts = {}
     for name, figure in drawn_figures(said):
         charts[name] = svg_text(figure, name)
@@ -82,6 +81,7 @@ def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
     """
     from markupsafe import Markup
 
+    # The templates and the style of reports.
     environment = page_environment()
     environment.filters["error"] = error_words
     environment.globals |= {
@@ -90,6 +90,7 @@ def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
     environment.globals |= {"facts_table": drawn(facts), "property_words": property_words}
     template = environment.get_template("sweep.html.j2")
     worst = _worst_keys(said)
+    # Pictures of worst scenes are limited, and the page says how many it leaves out.
     content = {
         "pictures": _pictures(said, worst[:PICTURES]),
         "omitted": max(0, len(worst) - PICTURES),
@@ -121,6 +122,7 @@ def error_words(value: float | None) -> str:
 
 def _worst_keys(said: Summary) -> list[str]:
     """Return the keys of the worst scenes' rows, the worst of every configuration first."""
+    # Rank by rank over the configurations: a limit then cuts each of them alike.
     ranks = max((len(several) for several in said.worst.values()), default=0)
     return [
         several[rank].key
@@ -150,6 +152,7 @@ def distribution(said: Summary) -> "Figure | None":
 
     None if nothing was measured.
     """
+    # The best median at the top.
     shown = [sample for sample in said.samples if _errors(sample).size]
     if not shown:
         return None
@@ -159,6 +162,9 @@ def distribution(said: Summary) -> "Figure | None":
     styles = report_styles((sample.method, sample.label) for sample in said.samples)
     for place, sample in enumerate(shown):
         errors, colour = _errors(sample), styles[sample.label]["color"]
+        # A thin line from 5 % to 95 %, a thick one over the quartiles, a mark at the median, and
+        # each scene outside as a tick. Nearest values, as a mean of two errors may lie where no
+        # scene does.
         low, first, middle, third, high = np.quantile(
             errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest"
         )
@@ -182,6 +188,7 @@ def distribution(said: Summary) -> "Figure | None":
             solid_capstyle="butt",
         )
         panel.plot(middle, place, "|", color="black", markersize=9, markeredgewidth=1.6)
+    # The errors that claims are about.
     for target in TARGETS:
         panel.axvline(target, color="#666a72", linewidth=0.8, linestyle=":", zorder=0)
     panel.set_yticks(range(len(shown)), [_with_count(sample) for sample in shown], parse_math=False)
@@ -199,6 +206,7 @@ def medians(said: Summary) -> "Figure | None":
 
     None if nothing was timed with the machine to itself.
     """
+    # Times of one host with the machine to itself.
     shown = [sample for sample in said.samples if _points(sample)[0].size]
     if not shown:
         return None
@@ -232,8 +240,9 @@ def drawn_figures(said: Summary) -> Iterator[tuple[str, "Figure"]]:
 
 
 def _figure(height: float) -> "Figure":
-    figure = new_figure(_WIDTH, height)
-    figure.set_dpi(_DOTS)
+    figure = new_figure(10.2, height)  # inches; the page scales it
+    # Thousands of points would be megabytes as shapes, and are drawn as pixels: dots per inch.
+    figure.set_dpi(160)
     return figure
 
 
@@ -252,6 +261,7 @@ def _with_count(sample: Sample) -> str:
     """Return the name of a configuration, and how many of its scenes
     have no place in the figure.
     """
+    # An error that is infinite has no place on the axis.
     away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
     words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
     return f"{short(sample.label, _LABEL)}{f' [{words}]' if words else ''}"

@@ -68,6 +68,7 @@ class Sweep:
         if not keys:
             return {}
         with _reading(self.path):
+            # Only these rows are read: pictures are most of the file.
             wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
             columns = ["key", "picture"]
             found = pq.read_table(
@@ -86,6 +87,8 @@ def read_sweep(path: Path | str) -> Sweep:
     file = _file_of(Path(path))
     with _reading(file):
         names = pq.read_schema(file).names
+        # Another version of airlight has other columns: which one is missing says more than a
+        # failure later.
         missing = [column.key for column in COLUMNS if column.key not in names]
         if missing:
             raise InputError(
@@ -93,6 +96,7 @@ def read_sweep(path: Path | str) -> Sweep:
                 "version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
+        # Everything but the pictures, which stay on disk.
         wanted = [name for name in names if name != "picture"]
         table = pq.read_table(file, columns=wanted, page_checksum_verification=True)
         columns = {name: _array(table[name]) for name in table.column_names}
@@ -100,20 +104,22 @@ def read_sweep(path: Path | str) -> Sweep:
         raise InputError(
             f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer"
         )
+    # An unknown status would be neither a try nor a refusal, and would fall out of every fraction.
     unknown = sorted(set(columns["status"]) - set(STATUSES))
     if unknown:
         raise InputError(
             f"{file} has the status {unknown[0]!r}, expected one of {', '.join(STATUSES)}; run it "
             "again"
         )
-    kept = _current(columns)
-    order = {row: tuple(natural(columns[name][row] or "") for name in _ORDER) for row in kept}
-    kept.sort(key=order.__getitem__)
-    columns = {name: values[kept] for name, values in columns.items()}
+    # One row for each cell, in an order that does not depend on which worker was faster.
+    rows = _current(columns)
+    order = {row: tuple(natural(columns[name][row] or "") for name in _ORDER) for row in rows}
+    rows.sort(key=order.__getitem__)
+    columns = {name: values[rows] for name, values in columns.items()}
     properties = tuple(
         sorted(name.removeprefix(PROPERTY) for name in columns if name.startswith(PROPERTY))
     )
-    return Sweep(file, columns, properties, superseded=table.num_rows - len(kept))
+    return Sweep(file, columns, properties, superseded=table.num_rows - len(rows))
 
 
 @contextmanager
@@ -151,12 +157,14 @@ def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
     for row, cell in enumerate(zip(*(columns[name].tolist() for name in _CELL))):
         # NaN, where a number is not known, is not equal to itself.
         cells.setdefault(tuple(None if each != each else each for each in cell), []).append(row)
-    kept = []
+    rows = []
     for several in cells.values():
+        # The source code of the newest row counts; of its rows one that was timed alone, else the
+        # newest. The key settles equal dates.
         last = max(several, key=lambda row: (started[row], columns["key"][row]))
         same = [row for row in several if source[row] == source[last]]
-        kept.append(max(same, key=lambda row: (alone[row], started[row], columns["key"][row])))
-    return kept
+        rows.append(max(same, key=lambda row: (alone[row], started[row], columns["key"][row])))
+    return rows
 
 
 def _file_of(path: Path) -> Path:
@@ -236,14 +244,17 @@ def drawn_at_random(sweep: Sweep) -> bool:
 
 def samples(sweep: Sweep) -> list[Sample]:
     """Return the sample of every configuration, sorted by method and label."""
+    # Columns as arrays, one entry a row.
     labels, scenes, statuses = sweep["label"], sweep["scene"], _statuses(sweep)
     methods, errors = sweep["method"], errors_of(sweep)
     reference_errors = np.nan_to_num(sweep["reference.error"], nan=0.0)
     nonfinite = np.nan_to_num(sweep["error.nonfinite"], nan=0.0)
     times = np.where(comparable_times(sweep), sweep[FRAME_MS], np.nan)
+    # Random scenes are a sample; chosen ones count only where there are no others (see the module).
     counted = (
         np.isfinite(sweep["seed"]) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
     )
+    # Rows of each configuration by scene.
     groups: dict[tuple[str, str, str], dict[str, list[int]]] = {}
     for row, label in enumerate(labels):
         if counted[row]:
@@ -255,10 +266,12 @@ def samples(sweep: Sweep) -> list[Sample]:
             key=lambda item: tuple(map(natural, (item[0][1], item[0][0], item[0][2]))),
         )
     )
+    # The size is named only where one configuration has several.
     several = Counter((label, method) for label, method, _ in groups)
     full = [
         f"{label}{size}" if several[label, method] > 1 else label for label, method, size in groups
     ]
+    # The worst cell of a scene stands for it.
     badness = [_badness(status, error) for status, error in zip(statuses, errors.tolist())]
     made = []
     for (_, method, _), whole, group in zip(groups, full, groups.values()):
@@ -287,6 +300,7 @@ def samples(sweep: Sweep) -> list[Sample]:
 
 def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:
     known = errors[~np.isnan(errors)]
+    # The median, and the error that 95 % of the scenes stay below.
     ends = ((each, quantile_interval(known, each)) for each in (0.5, 0.95) if len(known))
     return tuple(Quantile(each, *map(plain, found)) for each, found in ends)
 
@@ -297,12 +311,14 @@ def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]
     Those that were taken in turns while nothing else of the sweep ran on the host, on the host,
     device and threads that have the most such rows; and of one image those of its last run.
     """
+    # Times of several machines cannot be compared: the place with most times counts.
     hosts, devices = sweep["origin.host"], sweep["origin.device"]
     places = list(zip(hosts, devices, np.nan_to_num(sweep["origin.threads"]).tolist()))
     alone = (sweep["cost.alone"] == 1) & (sweep["times.run.rounds"] > 1)
     most = Counter(place for place, timed in zip(places, alone) if timed).most_common(1)
     counts = alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
     # The dates of one host are in order as text.
+    # Methods of one image were timed in one run; a later run replaces all of it, never a part.
     images = list(zip(*(sweep[name].tolist() for name in ("scene", "width", "height", "medium"))))
     last: dict[tuple[Any, ...], str] = {}
     for row in np.flatnonzero(counts):
@@ -321,6 +337,7 @@ def errors_of(sweep: Sweep) -> Numbers:
     one. An image without a finite pixel has an infinite error.
     """
     done = sweep["status"] == "done"
+    # Without a relative error the reference is black or the image has no finite pixel.
     relative, absolute = sweep["error.relative_rmse"], sweep["error.rmse"]
     unknown = np.where(absolute == 0, 0.0, np.inf)
     return np.where(done, np.where(np.isfinite(relative), relative, unknown), np.nan)
@@ -364,6 +381,8 @@ def fastest_within(made: Sequence[Sample], target: float) -> Fastest:
     best: dict[str, tuple[float, str]] = {}
     timed: dict[str, bool] = {}
     for sample in made:
+        # A scene counts only if every image of it was timed: otherwise the fastest may be the one
+        # that was not.
         rows = zip(sample.scenes, sample.statuses, sample.errors, sample.nonfinite, sample.times)
         for scene, status, error, bad, time in rows:
             if status != "done":

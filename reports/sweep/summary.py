@@ -87,14 +87,17 @@ class Summary:
 
 def summary_of(sweep: Sweep) -> Summary:
     """Return what a sweep says."""
+    # Samples first: claims, correlations and worst scenes are made of them.
     made = tuple(samples(sweep))
     found = tuple(correlations(sweep, made))
     goes_with = {sample.label: tuple(strongest(found, sweep, sample)) for sample in made}
     random = np.isfinite(sweep["seed"])
     names = sweep["scene"]
     drawn = drawn_at_random(sweep)
-    own = sweep["reference.error"]
-    own = own[np.isfinite(own)]
+    # Errors of the references themselves, in which no method has a part.
+    reference_errors = sweep["reference.error"]
+    reference_errors = reference_errors[np.isfinite(reference_errors)]
+    # Everything is worked out here, so that page, tables and JSON say the same.
     said = Summary(
         sweep=sweep,
         rows=len(sweep),
@@ -113,7 +116,9 @@ def summary_of(sweep: Sweep) -> Summary:
         reasons=tuple(reasons(sweep)),
         checks=tuple(checks(sweep)),
         faults=tuple(faults(sweep)),
-        reference_errors=(float(np.median(own)), float(own.max())) if own.size else None,
+        reference_errors=(float(np.median(reference_errors)), float(reference_errors.max()))
+        if reference_errors.size
+        else None,
         versions={name: tuple(sorted(set(sweep[f"origin.{name}"]) - {None})) for name in _VERSIONS},
         statuses=dict(Counter(sweep["status"].tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
@@ -130,6 +135,8 @@ def _headlines(said: Summary) -> list[Headline]:
     def add(kind: str, text: str, good: bool | None = None) -> None:
         made.append(Headline(kind=kind, text=text, good=good))
 
+    # First what was promised most often, then the fastest, then the property that goes with most
+    # errors, then faults.
     for target in TARGETS:
         best = best_claims(said.claims, target)
         if best:
@@ -147,6 +154,7 @@ def _headlines(said: Summary) -> list[Headline]:
                 f"Fastest within {written(each.target)}",
                 f"{label}, in {fraction} % of {each.scenes} scenes{none}.",
             )
+    # The strongest property of each configuration has one vote.
     leading = Counter(chosen[0].property for chosen in said.strongest.values() if chosen)
     if leading:
         name, count = leading.most_common(1)[0]
@@ -159,8 +167,10 @@ def _headlines(said: Summary) -> list[Headline]:
     for check in said.checks:
         if check.faulty_rows:
             add(check.check.capitalize(), check_words(check), False)
+    # Without a fault the page says how many might have been missed.
     if not any(check.faulty_rows for check in said.checks):
         add("Sound", sound_words(said), True)
+    # Rows of several versions may differ by the code and not by the scenes.
     for name in ("airlight", "source"):
         if len(said.versions[name]) > 1:
             add(
@@ -168,6 +178,7 @@ def _headlines(said: Summary) -> list[Headline]:
                 f"the rows come of several versions: {name} {', '.join(said.versions[name])}.",
                 False,
             )
+    # Cells that came to nothing.
     lost = sum(said.statuses.get(status, 0) for status in FAULTS)
     words = ", ".join(
         f"{said.statuses[status]} {status}" for status in FAULTS if said.statuses.get(status)
@@ -195,6 +206,8 @@ def sound_words(said: Summary) -> str:
     it may have been missed.
     """
     checked = {check.check: check for check in said.checks}
+    # No fault in n scenes leaves a fraction that could have been missed: the upper end of the
+    # interval of 0 of n.
     most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
     stated = checked["outside of the bound"].rows
     bound = f", or outside of the bound that {stated} of them state" if stated else ""

@@ -18,8 +18,6 @@ from airlight.reports.tables.table import (
     words,
 )
 
-_FRACTION = {"digits": 2, "fraction": True}
-
 
 def errors_table(said: Summary) -> Table:
     """Return how wrong each configuration is, and in what fraction of the
@@ -37,7 +35,9 @@ def errors_table(said: Summary) -> Table:
             )
             for target in reversed(TARGETS)
         ),
-        *numbers(median="median error", most="95 % of scenes below", how=_FRACTION),
+        *numbers(
+            median="median error", most="95 % of scenes below", how={"digits": 2, "fraction": True}
+        ),
         *numbers(scenes="scenes", refused="refused", untold="no reference"),
         Column("lost", "not done", alarm=True),
     )
@@ -53,6 +53,7 @@ def errors_table(said: Summary) -> Table:
             "median": values[0].value if values else None,
             "most": values[1].value if values else None,
         }
+        # Fractions with their intervals; a configuration without a try has none.
         for claim in said.claims:
             if claim.label == sample.label and claim.fraction is not None:
                 row[f"within_{claim.target:g}"] = Measured(claim.fraction, claim.low, claim.high)
@@ -93,6 +94,7 @@ def speed_table(said: Summary) -> Table:
     )
     rows = []
     for sample in said.samples:
+        # Quartiles over the scenes, not over the repetitions of a frame.
         known = sample.times[np.isfinite(sample.times)]
         row = {"label": sample.label, "timed": len(known)}
         if len(known):
@@ -139,6 +141,7 @@ def refusals_table(said: Summary) -> Table:
     )
     rows = []
     for each in said.reasons:
+        # Three methods by name; the others are counted.
         shown = ", ".join(each.labels[:3]) + (
             f" and {len(each.labels) - 3} more" if each.labels[3:] else ""
         )
@@ -154,6 +157,7 @@ def checks_table(said: Summary) -> Table:
         "faulty_scenes": {"alarm": True},
         "meaning": {"long": True, "minor": True},
     }
+    # A check that no row passed through says nothing.
     shown = [each for each in said.checks if each.rows]
     return table_of("Images that were checked", Check, shown, how=how)
 

@@ -46,12 +46,15 @@ def verdict(compared: Agreement) -> bool | None:
     Out of time is what stopped before the intervals were as narrow as wanted. It can still speak
     against the reference: by an interval that lies outside the margin as a whole.
     """
+    # Equivalent means that the interval of the bias lies inside the margin.
     statistics = compared.statistics
     if statistics.equivalent:
         return True
     low, high = statistics.relative_bias_ci
     if compared.finished or low is None or high is None or statistics.margin is None:
         return False
+    # The run stopped early: its interval is undecided if it overlaps the margin, and against the
+    # reference if it lies outside.
     return None if low <= statistics.margin and high >= -statistics.margin else False
 
 
@@ -63,6 +66,7 @@ def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
     """
 
     def reach(comparison: Agreement) -> float:
+        # The end that is farther from zero, in margins.
         (low, high), margin = comparison.statistics.relative_bias_ci, comparison.statistics.margin
         return (
             float("inf")
@@ -85,6 +89,7 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
 
     An estimator has the interval that fills most of its margin, over the layers of a scene.
     """
+    # Two columns for each estimator of the report: its interval, and whether it agrees.
     estimators = list(
         dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values())
     )
@@ -128,6 +133,8 @@ def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
     values: dict[str, Value] = {"scene": scene.name, "bound": scene.reference.relative_bound}
     values |= {"kind": scene.reference.kind, "left": scene.reference.left}
     for name in estimators:
+        # An estimator that did not check this scene leaves its cells empty. A disagreement in one
+        # layer decides over all layers, then an undecided one.
         compared = [entry for entry in scene.agreement.values() if entry.estimator == name]
         if not compared:
             continue

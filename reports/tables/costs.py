@@ -37,6 +37,7 @@ def kernel_tables(costs: Iterable[KernelCost], levels: Iterable[ErrorLevel]) -> 
     cheapest kernels at each error.
     """
     costs, levels = list(costs), list(levels)
+    # Each phase function has tables of its own, as a kernel may refuse one or be slower there.
     for phase in dict.fromkeys(cost.phase for cost in costs):
         chosen = [cost for cost in costs if cost.phase == phase]
         g = f", g = {chosen[0].g:g}" if phase == "hg" else ""
@@ -55,6 +56,7 @@ def cost_table(title: str, costs: Iterable[KernelCost], *, code: bool = False) -
 
 def _cost_row(cost: KernelCost, code: bool) -> Row:
     values: dict[str, Value] = {"kernel": Name(cost.kernel) if code else cost.kernel}
+    # A refusal has neither time nor error.
     if cost.refused:
         return Row(values, f"refused: {cost.refused}")
     values |= {
@@ -90,6 +92,7 @@ def stability_summary(found: Iterable[Stability]) -> Table:
     )
 
     def row(kernel: str, rays: Rays) -> dict[str, Value]:
+        # float32 in full, as methods use it; of float64 the largest error alone.
         single = rays.single["all"]
         return {
             **vars(single),
@@ -129,6 +132,7 @@ _GROWTH = (
 def scaling_tables(records: Iterable[Scaling]) -> list[Table]:
     """Return a table of costs for each kind of work in a scene, and one of all exponents."""
     records = list(records)
+    # Costs first, by scene and kind of work, then the exponents of each scene.
     kinds = dict.fromkeys((record.scene, record.kind) for record in records)
     tables = [
         _costs(
@@ -168,6 +172,7 @@ def same_records(old: Iterable[Scaling], new: Iterable[Scaling]) -> list[tuple[S
 
 
 def _costs(scene: str, kind: str, records: list[Scaling]) -> Table:
+    # One row a step: the work, the times, and the camera rays, below which no frame can be.
     columns = (
         *words(label="method"),
         *numbers(work=WORK[kind], how={"whole": True}),
@@ -199,6 +204,7 @@ def _costs(scene: str, kind: str, records: list[Scaling]) -> Table:
 def _exponents(scene: str, records: list[Scaling]) -> Table:
     rows = []
     for record in records:
+        # A power needs two steps.
         if len(record.costs) < 2:
             continue
         values: dict[str, Any] = {"kind": WORK[record.kind], "label": record.label}

@@ -76,8 +76,11 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
     from rich.console import Console
     from rich.table import Table as Grid
 
+    # Cells as text, with quartiles in columns of their own; then the columns that fit.
     columns, rows = _with_spreads(table.columns), list(_open_rows(table, _Style(str)))
     kept, widths, note = _fitted(columns, rows, width)
+    # Sentences in narrow columns cannot be read: such a table becomes a list. Numbers stay a table,
+    # with columns left out.
     if width is not None and len(kept) < len(columns) and any(column.long for column in columns):
         lines = _records(columns, rows, width, styled=styled)
     else:
@@ -88,6 +91,7 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
             grid.add_column(columns[place].title, justify=side, overflow="fold", width=wide)
         for cells in rows:
             grid.add_row(*(cells[place] for place in kept))
+        # Rich draws into a buffer: the text is printed elsewhere, or not on a terminal at all.
         drawn = io.StringIO()
         Console(
             file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled
@@ -98,9 +102,6 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
         ]
     below = [line for words in _below(table) for line in _wrapped(words, width)]
     return "\n".join([*_wrapped(table.title, width), *lines, *below]) + "\n"
-
-
-_LONGEST = 30  #: a longer word of text, such as a path, may be broken in a narrow terminal
 
 
 def _fitted(
@@ -114,10 +115,12 @@ def _fitted(
     """
     places = list(range(len(columns)))
     cells = [[columns[place].title, *(row[place] for row in rows)] for place in places]
+    # The width at which nothing is wrapped.
     natural = [max(map(len, column)) for column in cells]
     if width is None or _width(natural) <= width:
         return places, [None] * len(places), ""
-    # A number is not broken, but its heading may be, between words.
+    # A number is not broken, but its heading may be, between words; a word of text of more than 30
+    # characters, such as a path, may be broken too.
     least = [
         max(
             [
@@ -127,20 +130,22 @@ def _fitted(
         )
         for place, column in zip(places, cells)
     ]
-    least = [
-        min(wide, _LONGEST) if columns[place].words else wide for place, wide in zip(places, least)
-    ]
+    least = [min(wide, 30) if columns[place].words else wide for place, wide in zip(places, least)]
+    # Columns are left out from the end of this list: minor columns and quartiles before others,
+    # right before left.
     order = sorted(places[1:], key=lambda place: (columns[place].minor, place))
     left: list[int] = []
     while len(places) > 1 and _width([least[place] for place in places]) > width:
         left.append(order.pop())
         places.remove(left[-1])
+    # The rest of the room is shared in proportion to what each column lacks of its natural width.
     room = width - _width([least[place] for place in places])
     wanted = [natural[place] - least[place] for place in places]
     part = min(1.0, max(0, room) / (sum(wanted) or 1))
     widths: list[int | None] = [
         least[place] + int(part * more) for place, more in zip(places, wanted)
     ]
+    # The user should know which columns are missing and how to see them.
     if not left:
         return places, widths, ""
     names = ", ".join(columns[place].title for place in sorted(left))
@@ -201,6 +206,7 @@ def markdown(table: Table) -> str:
 
 def html(table: Table) -> str:
     """Return a table as HTML, in a box that scrolls sideways; fractions are in per cent."""
+    # Headings, then a row for each row; a box that can be focused scrolls by the keyboard too.
     head = "".join(
         f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>'
         for column in table.columns
@@ -216,6 +222,7 @@ def html(table: Table) -> str:
     )
     lines.append("<tbody>")
     for row in table.rows:
+        # The reason of a refusal stands over all columns that the row leaves empty.
         shown, left = _until_reason(row, table.columns)
         cells = [_html_cell(row, column, first=not place) for place, column in enumerate(shown)]
         cells += [f'<td class="words" colspan="{left}">{_in_html(row.reason)}</td>'] if left else []
@@ -247,6 +254,7 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
     def line(cells: Iterable[str]) -> str:
         return " & ".join(cells) + r" \\"
 
+    # All tables share one tabular, so that their columns line up in the paper.
     columns = tables[0].columns
     lines = [f"% {words}" for words in (f"Needs {PREAMBLE}.", *comment)]
     lines += [
@@ -254,6 +262,7 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
         r"\toprule",
     ]
     lines.append(line(_in_latex(column.heading) for column in columns))
+    # Units have a line of their own below the headings.
     if any(column.unit for column in columns):
         lines.append(
             line(f"[{_in_latex(column.unit)}]" if column.unit else "" for column in columns)
@@ -262,6 +271,7 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
     for place, table in enumerate(tables):
         lines += [r"\addlinespace"] if place else []
         if table.title:
+            # Numbers with powers of ten inside a sentence are set by siunitx too.
             about = re.sub(
                 r"\b([\d.]+e-?\d+)\b", lambda match: _num(match[1]), _in_latex(table.explanation)
             )
@@ -283,6 +293,8 @@ def csv(table: Table) -> str:
     rows: list[dict[str, str]] = []
     keys: dict[str, None] = {}
     for column in table.columns:
+        # A column of medians also gets columns for its quartiles; a column of intervals has the two
+        # ends alone.
         kinds = {type(row.values.get(column.key)) for row in table.rows}
         keys |= {} if Interval in kinds else {column.key: None}
         keys |= (
@@ -291,6 +303,7 @@ def csv(table: Table) -> str:
             else {}
         )
     for row in table.rows:
+        # Reasons and remarks have columns only if some row has one.
         said = {"reason": row.reason, "remarks": "; ".join(row.remarks)}
         rows.append(
             {key: cell for key, value in row.values.items() for key, cell in _csv_cells(key, value)}
@@ -325,6 +338,7 @@ def text_of(value: Value) -> str:
 
 def _cell(value: Value, column: Column, style: _Style) -> str:
     """Return a value as a format writes it; of what was measured the median alone."""
+    # A truth value is an integer for Python, so that it is asked for before numbers.
     percent = column.percent or (column.fraction and style.fractions)
 
     def written(number: float) -> str:
@@ -359,6 +373,7 @@ def _with_spreads(columns: Iterable[Column]) -> list[Column]:
 
 def _open_rows(table: Table, style: _Style) -> Iterator[list[str]]:
     for row in table.rows:
+        # A refused row would be a line of dashes.
         if row.reason and all(row.values.get(column.key) is None for column in table.columns[1:]):
             continue  # the row has nothing but a name: a line below the table gives the reason
         cells = []
@@ -406,6 +421,7 @@ def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column]
     """
     if not row.reason:
         return columns, 0
+    # The last column with a value; the reason gets the rest, one column at least.
     filled = max(
         (place for place, column in enumerate(columns) if row.values.get(column.key) is not None),
         default=0,
@@ -444,14 +460,17 @@ def _layout(column: Column) -> str:
 def _html_cell(row: Row, column: Column, *, first: bool) -> str:
     value = row.values.get(column.key)
     shown = _cell(value, column, _HTML)
+    # The first cell names the row, for screen readers too, and carries its remarks.
     if first:
         remarks = "".join(
             f' <span class="quiet">({_in_html(remark)})</span>' for remark in row.remarks
         )
         return f'<th scope="row"{_layout(column)}>{shown}{remarks}</th>'
+    # Anything but zero in an alarm column is marked as bad.
     if isinstance(value, Verdict) or (column.alarm and value):
         kind = _VERDICTS[value.good][1] if isinstance(value, Verdict) else "bad"
         return f'<td class="{kind}">{shown}</td>'
+    # Quartiles stand in the cell where the column shows them, else under the pointer.
     title = ""
     if isinstance(value, Measured):
         ends = _cell(Interval(value.low, value.high), column, _HTML)
@@ -465,6 +484,7 @@ def _in_latex(words: str) -> str:
 
 
 def _num(digits: str) -> str:
+    # siunitx reads neither.
     if digits.endswith(("inf", "nan")):
         return digits if digits == "nan" else digits.replace("inf", r"$\infty$").replace("-$", "$-")
     mantissa, letter, exponent = digits.partition("e")
@@ -475,6 +495,7 @@ def _latex_cell(row: Row, column: Column) -> str:
     """Return a cell; what is published has the digits of its paper."""
     value = row.values.get(column.key)
     if isinstance(value, Measured):
+        # Distances to the quartiles as index and exponent.
         median, below, above = map(_num, with_spread(value.median, value.low, value.high))
         return rf"${median}_{{-{below}}}^{{+{above}}}$"
     return _cell(value, column, replace(_LATEX_STYLE, zeros=not row.published))

@@ -62,6 +62,7 @@ def methods_table(
     device stands beside its time.
     """
     rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
+    # Times on another device than the rest must say so.
     shown = list(keys or BENCH)
     if any(row.values.get("device") for row in rows):
         shown.insert(shown.index("frame") + 1, "device")
@@ -72,6 +73,7 @@ def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     """Return the costs and errors of a method as a row; `shadows` marks
     a method that knows none.
     """
+    # Remarks say all that makes a row not comparable with the others.
     users = "user's shader" if is_shader(entry.method) else "user's function"
     remarks = (
         [f"image, {entry.layer}"]
@@ -85,6 +87,7 @@ def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     remarks += [entry.note] if entry.note else []
     remarks += ["timed elsewhere"] if entry.times and entry.times.run is None else []
     values: dict[str, Value] = {"label": entry.label}
+    # A row that was refused or left out has no numbers.
     if entry.reason:
         return Row(values, f"{entry.status}: {entry.reason}", tuple(remarks))
     values |= {name: measured(getattr(entry.times, name, None)) for name in TIMES}
@@ -113,6 +116,7 @@ def runs_of(entries: Iterable[CellRow]) -> list[TimingRun]:
 def run_words(run: TimingRun) -> str:
     """Say when times were measured, and whether the machine changed meanwhile."""
     words = f"measured in turns in one run of {run.rounds} rounds, {run.started}"
+    # The run could not judge the machine.
     if run.steady is None or run.between is None or run.within is None:
         return words
     verdict = (
@@ -127,6 +131,7 @@ def run_words(run: TimingRun) -> str:
 
 def times_words(entries: Iterable[CellRow]) -> str:
     """Say of what runs the times of a table are; empty where there are none."""
+    # One run for the table is the usual case; several are told apart by their methods.
     entries = list(entries)
     runs = runs_of(entries)
     if len(runs) == 1:
@@ -165,6 +170,7 @@ def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, f
     """
 
     def reaches(entry: CellRow) -> bool:
+        # Another device, no error or no time in the common run: no race.
         if entry.device or entry.error is None or entry.error.relative_rmse is None:
             return False
         if entry.times is None or entry.times.run is None:
@@ -181,6 +187,7 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     """Return for every scene of a report the fastest method within each
     relative RMSE of `TARGETS`.
     """
+    # A column for each error of `TARGETS`.
     columns = [
         Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS
     ]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The claims of papers with their verdicts, and the numbers that papers print beside ours.
 
-Rows are those that stand under `papers` of report.json.
+The rows stand under `papers` in report.json.
 """
 
 import itertools
@@ -29,6 +29,7 @@ def paper_tables(rows: Sequence[Claim], *, plain: bool = True) -> list[Table]:
     """
     made = []
     names = dict.fromkeys(row.paper for row in rows)
+    # First the verdicts of all papers, then their numbers without one.
     for judged, paper in itertools.product((True, False) if plain else (True,), names):
         several = [
             row for row in rows if row.paper == paper and (row.verdict is not None) == judged

@@ -36,6 +36,7 @@ def print_json(data: Any) -> None:
     import json
 
     try:
+        # JSON has no NaN: other programs could not read it.
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
         from airlight.errors import InputError
@@ -44,6 +45,7 @@ def print_json(data: Any) -> None:
             "a result is not finite, and is not printed; a number of the input may be too large"
         ) from None
     try:
+        # An output in ASCII gets escapes in place of the characters that it lacks.
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
         text = json.dumps(data, indent=2, allow_nan=False)
@@ -101,6 +103,7 @@ class Result:
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
         """Return the claims, tables and lines for a terminal."""
+        # Claims above, tables, then lines, with an empty line between tables and lines.
         claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
         drawn = [text(table, width=width, styled=styled) for table in self.tables]
         lines = [*([""] if drawn and self.lines else []), *self.lines]
@@ -118,7 +121,7 @@ class Said(Result):
     """A result that is worked out as a whole."""
 
     name: str
-    data: Any = None  #: as JSON has them; by default those of the record
+    data: Any = None  #: as JSON has them; by default the data of the record
     claims: Sequence[str] = ()
     tables: Sequence[Table] = ()
     lines: Sequence[str] = ()
@@ -166,6 +169,7 @@ def bullets(items: Sequence[str]) -> str:
 
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
     """Return a PNG file of that width [pixels] as a figure that carries it inside."""
+    # A whole factor, so that every pixel stays a square of one size.
     times = max(1, -(-_NARROW // width))
     style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -106,6 +106,7 @@ class Table:
     explanation: str = ""  #: what a caption adds to the title
 
     def __post_init__(self) -> None:
+        # A value without a column would disappear in silence.
         keys = {column.key for column in self.columns}
         for row in self.rows:
             stray = set(row.values) - keys
@@ -169,6 +170,7 @@ def fields_of(record: type, *keys: str, **how: Any) -> tuple[Column, ...]:
     from airlight.validation.columns import described
 
     known = described(record)
+    # Without keys all fields that can be cells: texts and numbers.
     shown = [known[key] for key in keys] or [each for each in known.values() if each.kind]
     return tuple(
         Column(
@@ -215,6 +217,7 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
 
     With `percent` a fraction is in per cent although the column does not ask for it.
     """
+    # A whole number is written in full; digits and places are for measured ones.
     shown = 100 * value if percent or column.percent else value
     if isinstance(value, int) and shown is value:
         text = str(value)
@@ -238,6 +241,7 @@ def with_spread(median: float, low: float, high: float) -> tuple[str, str, str]:
     """
     from math import floor, log10
 
+    # At least a thousandth of the median, as quartiles may coincide.
     widest = max(high - median, median - low, abs(median) * 1e-3)
     places = max(0, 1 - floor(log10(widest))) if widest > 0 else 1
     return f"{median:.{places}f}", f"{median - low:.{places}f}", f"{high - median:.{places}f}"

@@ -58,15 +58,13 @@ def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> C
                 dr.eval(result)
             return result
 
+        # Work of the stage before must not count for this one.
         dr.sync_thread()
         result, took = timed(work)
         times[name] = times.get(name, 0.0) + took.ms
         return result
 
     return clocked
-
-
-_KEPT = 6  # configurations of which the recorded functions are kept
 
 
 @dataclass(frozen=True)
@@ -87,6 +85,8 @@ class LiveScene:
     ) -> None:
         self.name, self.size = name, size
         self.chosen, self.changes = chosen, dict(changes)
+        # Isotropic media of the scene as it was read: a change that gives one a lobe needs another
+        # phase function, for which the scene is loaded again.
         self._isotropic = isotropic_media(load_scene(name, size).scene)
         self._renderers: OrderedDict[Any, FrameRenderer] = OrderedDict()
         self._surfaces: dict[Any, FrameRenderer] = {}
@@ -95,6 +95,7 @@ class LiveScene:
 
     def _load(self) -> None:
         loaded = load_scene(self.name, self.size, self.changes)
+        # A new scene has new arrays and new meshes: nothing that was kept for the last one fits.
         self.label = loaded.name
         self.source = loaded.scene
         self.scene = read_scene(loaded.scene)
@@ -135,6 +136,7 @@ class LiveScene:
         """Return the last frame with the mean airlight of the frames of a noisy method
         since something changed.
         """
+        # Only the airlight is noisy.
         distance, surface, airlight = shown.stages
         return replace(
             shown, stages=(distance, surface, self._sum / self.summed if self.summed else airlight)
@@ -146,6 +148,8 @@ class LiveScene:
         If the method refuses the scene or a parameter, all is as it was.
         """
         took = stopwatch()
+        # A method may refuse the scene only when it is prepared: then the last configuration goes
+        # on.
         before, self.chosen = self.chosen, chosen
         try:
             renderer = self._find_renderer()
@@ -169,9 +173,11 @@ class LiveScene:
         """Render by the shader as it is in its file now; if that is at fault, all is as it was."""
         known = defaults(find_method(self.chosen.method))
         given = {name: value for name, value in self.chosen.parameters if name in known}
+        # The new text may have other parameters: parameters that stayed keep their values.
         chosen = configuration(self.chosen.method, None, given)
         made = prepared(self.scene, chosen)
         self.chosen, self.renderer, self._other_method = chosen, made, True
+        # Renderers of the old text must not come back.
         for key in [key for key in self._renderers if key[0].method == chosen.method]:
             del self._renderers[key]
         self._renderers[chosen, self._code()] = made
@@ -180,10 +186,12 @@ class LiveScene:
         """Change the scene; names that are not given are as they were. If scene or method
         refuse, all is as it was.
         """
+        # Changes are absolute values: the old and the new ones are applied together.
         before, renderer = self.changes, self.renderer
         wanted = before | dict(changes)
         moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}
         try:
+            # Numbers change in place, which keeps what was recorded.
             if self._lobes(wanted) == self._lobes(before):
                 change_scene(self.source, wanted)
                 self.scene = read_again(self.scene, self.source)
@@ -212,9 +220,12 @@ class LiveScene:
 
     def frame(self, *, by_stage: bool = False) -> Shown:
         """Render the next frame; `by_stage` times its stages, which makes it a little slower."""
+        # The time of the whole frame, until its arrays are ready.
         took = stopwatch()
         renderer, times = timed_stages(self.renderer) if by_stage else (self.renderer, {})
         cache, moved = self._cache, dict(self._moved)
+        # Another method can use only the hits of camera rays, and these only while the camera stood
+        # still. Lights count as moved, so that shadows are prepared again.
         if self._other_method and cache is not None:
             keeps = not moved["camera_moved"]
             cache = FrameCache(cache.cast, None, frames=cache.frames) if keeps else None
@@ -224,6 +235,7 @@ class LiveScene:
         self._other_method = False
         self._moved = dict.fromkeys(self._moved, False)
         shown = Shown(stages, took().ms, times)
+        # The mean of noisy frames since the last change, for the error that remains.
         if self.renderer.method.noisy:
             self._sum, self.summed = (
                 stages[2] + (0 if self._sum is None else self._sum),
@@ -244,11 +256,13 @@ class LiveScene:
 
     def _find_renderer(self) -> FrameRenderer:
         """Return the renderer of the configuration for the scene as it is now."""
+        # The last six configurations keep their recorded functions; the least recently used goes
+        # first.
         key = self.chosen, self._code()
         if key not in self._renderers:
             made = prepared(self.scene, self.chosen)
             self._renderers[key] = self._with_known_surface(made)
-            while len(self._renderers) > _KEPT:
+            while len(self._renderers) > 6:
                 self._renderers.popitem(last=False)
         self._renderers.move_to_end(key)
         return self._renderers[key]
@@ -257,6 +271,8 @@ class LiveScene:
         """Return a renderer that casts and shades by the functions that
         another one has recorded.
         """
+        # Casting and shading depend on a method only in whether it finds out which surfaces are
+        # lit.
         key = self._code(), made.method.provides_visibility
         known = self._surfaces.setdefault(key, made)
         stages = replace(made.stages, surface=known.stages.surface, shade=known.stages.shade)

@@ -38,6 +38,7 @@ class Pictures:
         """Return the picture of a frame on the device, 8-bit RGBA row by row;
         `pixel` numbers its lanes.
         """
+        # Opaque numbers, so that a new exposure or layer compiles nothing.
         weights = [dr.opaque(mi.Float, factor * weight) for weight in LAYERS[layer]]
         return np.array(self._draw(self._levels, pixel, surface, airlight, *weights)).data.cast("B")
 
@@ -46,6 +47,7 @@ class Pictures:
         [W/(m^2 sr)], in the same form.
         """
         finite = np.asarray(np.isfinite(radiance).all(axis=-1))
+        # The nearest entry: half a step is added before the fraction is cut off.
         place = (
             np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, _BRIGHTEST) * _PER_ENTRY
             + 0.5
@@ -66,6 +68,8 @@ _PER_ENTRY = (_ENTRIES - 1) / _BRIGHTEST
 
 
 def _drawn(levels, pixel, surface, airlight, airlight_weight, surface_weight):
+    # The levels of the three channels are packed into one integer, with an opaque alpha in its
+    # upper byte. One channel that is not finite makes the pixel magenta.
     color = surface * surface_weight + airlight * airlight_weight
     picture, finite = mi.UInt32(0xFF000000), mi.Bool(True)
     wrong = mi.UInt32(0xFF000000)
@@ -77,6 +81,7 @@ def _drawn(levels, pixel, surface, airlight, airlight_weight, surface_weight):
         )
         picture |= dr.gather(mi.UInt32, levels, place) << (8 * channel)
         wrong |= int(NOT_FINITE[channel]) << (8 * channel)
+    # Lanes are not in the order of the image.
     image = dr.zeros(mi.UInt32, dr.width(pixel))
     dr.scatter(image, dr.select(finite, picture, wrong), pixel)
     return image

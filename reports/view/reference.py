@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference of what is shown: in which order its pixels come, and the process that computes it.
 
-Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is
-random, so that what is known is a fair sample of the image at any time, and the picture of it grows
-sharper. The process yields the processor to the view. A new task ends the one before it, at the
-next of its chunks; the process ends with the other end of its pipe, however the view has ended.
+Pixels of a coarse grid come first, then pixels of grids of half its step. Within a grid the order
+is random, so that what is known is a fair sample of the image at any time, and the picture of it
+grows sharper. The process yields the processor to the view. A new task ends the one before it, at
+the next of its chunks; the process ends with the other end of its pipe, however the view has ended.
 """
 
 import os
@@ -31,6 +31,8 @@ STEPS = (16, 8, 4, 2, 1)
 
 def pixel_order(width: int, height: int) -> NDArray[np.int64]:
     """Return the numbers of all pixels in their order, (pixels,)."""
+    # Each pixel has the level of the coarsest grid that it lies on: from the finest to the
+    # coarsest, each overwrites. Within a level the order is random, with one seed.
     row, column = np.divmod(np.arange(width * height), width)
     level = np.full(width * height, len(STEPS) - 1)
     for number, step in reversed(list(enumerate(STEPS))):
@@ -70,6 +72,7 @@ class KnownReference:
         """Return a layer of the reference, or of a frame; pixels that are not known
         take a near one that is.
         """
+        # The finest grid that is known as a whole; a pixel takes the corner of its cell.
         known = self.known
         step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
         if step is None:
@@ -99,6 +102,7 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
     """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)];
     None if nothing is known.
     """
+    # Errors over the known pixels, a random sample of all.
     known = found.known
     count, pixels = int(known.sum()), known.size
     if count == 0:
@@ -107,9 +111,12 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
     metrics = error_metrics(reference[None], test[None])
     mean = float(reference.mean())
     square = np.mean((test - reference) ** 2, axis=1)
+    # The standard error of the mean square, without replacement: it is zero when all pixels are
+    # known. The error of its root is half of that over the root.
     spread = float(square.std()) / np.sqrt(count) * np.sqrt(1 - count / pixels)
     rmse = float(np.sqrt(square.mean()))
     interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
+    # The reference's own error, which no number of pixels removes.
     bound = float(np.sqrt(np.mean(found.bound[known] ** 2)))
     return ViewError(
         metrics.relative_rmse,
@@ -129,12 +136,9 @@ def motion_error(errors: Sequence[ViewError]) -> tuple[float, float]:
     rmse, halves = (
         np.array([getattr(each, name) for each in errors]) for name in ("relative_rmse", "interval")
     )
+    # Half intervals of independent frames add in quadrature, each weighted by its own error.
     mean = float(np.sqrt(np.mean(rmse**2)))
     return mean, float(np.linalg.norm(rmse * halves)) / (len(errors) * mean) if mean > 0 else 0.0
-
-
-_CHUNK = 0.25  # approximate time for the rays between two looks for a new task [s]
-_FIRST, _MOST = 256, 20000  # rays
 
 
 @dataclass(frozen=True)
@@ -177,20 +181,24 @@ def answers(task: Task) -> Iterator[Answer]:
     from airlight.validation.estimates.quadrature import reference_error, reference_of_pixels
     from airlight.validation.scenes.loading import load_scene
 
+    # This process has the scene by its name and its changes; nothing on the device is shared.
     scene = load_scene(task.scene, task.size, task.changes).scene
     order = pixel_order(*task.size)
     if task.most is not None:  # others for each frame
         order = np.random.default_rng(task.number).permutation(order)[: task.most]
-    begin, rays = 0, _FIRST
+    begin, rays = 0, 256
     while begin < len(order):
+        # About a quarter of a second of rays passes between two looks for a new task: their number
+        # follows the time that the last ones took, by a factor of two up or four down at most.
         chosen = order[begin : begin + rays]
         took = stopwatch()
         found = reference_of_pixels(scene, chosen)
         begin, seconds = begin + len(chosen), took().seconds
-        rays = int(np.clip(rays * np.clip(_CHUNK / max(seconds, 1e-3), 0.25, 2), 16, _MOST))
+        rays = int(np.clip(rays * np.clip(0.25 / max(seconds, 1e-3), 0.25, 2), 16, 20000))
         # The lights that the camera sees are left out: the frames beside this show none.
         layers = found.airlight, found.surface, found.airlight_bound
         airlight, surface, bound = (layer.reshape(-1, 3) for layer in layers)
+        # Area lights add two standard errors of their samples.
         error = reference_error(found, "airlight")
         if error is not None:
             bound = bound + 2 * error.reshape(-1, 3)
@@ -212,6 +220,8 @@ def compute(pipe: Connection, variant: str) -> None:
     activate(variant)
     with suppress(EOFError, OSError):  # the view has ended
         while True:
+            # Only the newest task counts: older ones are of a scene that is shown no more. A newer
+            # one also ends the work on this one.
             task: Task | None = pipe.recv()
             while pipe.poll():
                 task = pipe.recv()
@@ -237,6 +247,7 @@ class ReferenceInBackground:
         self.known: KnownReference | None = None
         self.done = False
         self.failure = ""  #: why there is no reference, in one line
+        # A forked process would share the state of Dr.Jit, and deadlock in it.
         context = get_context("spawn")
         self._pipe, other = context.Pipe()
         self.process = context.Process(target=compute, args=(other, variant), daemon=True)
@@ -258,6 +269,7 @@ class ReferenceInBackground:
     ) -> None:
         """Compute the reference of a scene from now on, of all pixels or of so many by chance."""
         with self._lock:
+            # Answers to an older task carry its number and are dropped.
             self._number += 1
             self.known, self.done, self.failure = KnownReference.of_size(*size), False, ""
             self._send(Task(self._number, scene, size, dict(changes), most))
@@ -292,6 +304,7 @@ class ReferenceInBackground:
 
     def _take(self, answer: Answer) -> None:
         with self._lock:
+            # Late news of an older task.
             if answer.task != self._number or self.known is None:
                 return
             if answer.pixels is not None:

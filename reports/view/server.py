@@ -44,6 +44,8 @@ class Page:
 
     def show(self, picture: bytes | memoryview, **values: Any) -> None:
         """Send a picture, 8-bit RGBA, with values as JSON before it."""
+        # The length of the JSON, the JSON padded to four bytes, the picture: the page reads the
+        # pixels in place.
         head = json.dumps(values, allow_nan=False).encode()
         head += b" " * (-len(head) % 4)
         self._send(b"".join((struct.pack("<I", len(head)), head, picture)))
@@ -78,6 +80,7 @@ class Server:
     ) -> None:
         from websockets.sync.server import serve
 
+        # A view runs code of the user: a program that reaches the port must know the token too.
         self._token = secrets.token_urlsafe(24)
         self._opened, self._told, self._closed = opened, told, closed
         self._server = serve(
@@ -89,6 +92,7 @@ class Server:
             max_size=2**16,
             server_header=None,
         )
+        # Port 0 has become a real one.
         self.port = self._server.socket.getsockname()[1]
         shown = f"[{host}]" if ":" in host else host
         self.address = f"http://{shown}:{self.port}/{self._token}/"
@@ -106,6 +110,8 @@ class Server:
         from websockets.datastructures import Headers
         from websockets.http11 import Response
 
+        # The address is /TOKEN/FILE; the token is compared in constant time, and a wrong one is
+        # answered like a missing file.
         token, slash, file = request.path.partition("?")[0].removeprefix("/").partition("/")
         known = secrets.compare_digest(token.encode(), self._token.encode()) and slash
         if known and file == "socket":
@@ -116,6 +122,7 @@ class Server:
             return None
         if not (known and file in _FILES):
             return connection.respond(http.HTTPStatus.NOT_FOUND, "not found\n")
+        # Files by a fixed list: no path of a request reaches the file system.
         name, kind = _FILES[file]
         body = (_PAGE / name).read_bytes()
         shape = (
@@ -132,6 +139,7 @@ class Server:
         page = Page(connection)
         self._opened(page)
         try:
+            # Anything that is no JSON object is ignored.
             for message in connection:
                 said = _parsed(message)
                 if said is not None:

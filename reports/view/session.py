@@ -51,15 +51,9 @@ from airlight.validation.columns import plain
 from airlight.validation.scenes.changes import Values
 from airlight.validation.study.configuration import Configuration, configuration
 
-_AHEAD = 2  # frames that are sent before the page has shown the first of them
 _QUIET = 0.15  # after so long without a change the page is told where all stands [s]
 _STILL = 0.4  # after so long the reference is begun [s]
 _NEWS = 0.4  # between two pictures of what is known of the reference [s]
-_BY_STAGE = 8  # of so many frames one is timed by stage
-_STOPS = 20.0  # of exposure, brighter or darker
-_LOOKS = 0.3  # between two looks at the files of a shader [s]
-_IN_MOTION = 256  # pixels in which a frame is judged while the scene changes
-_GOES_ON = 64  # frames drawn of a still scene where each builds on the last
 
 
 class Session:
@@ -102,6 +96,7 @@ class Session:
     def opened(self, page: Page) -> None:
         """Show this page what there is from now on, and no other."""
         with self._condition:
+            # A view has one page: the newest.
             before, self._page = self._page, page
             self._said.append((page, {"kind": "opened"}))
             self._condition.notify()
@@ -137,15 +132,19 @@ class Session:
     def turn(self) -> None:
         """Wait for something to do, and do it."""
         with self._condition:
+            # The server's threads and the reference wake the loop; otherwise it sleeps until the
+            # next thing is due.
             if not self._said and not self._can_draw():
                 self._condition.wait(self._patience())
             said, self._said = self._said, []
             page = self._page
+        # Nobody looks: nothing is drawn, and no reference computed.
         if page is None:
             if self._reference_of is not None:
                 self._reference_of = None
                 self.reference.stop()
             return
+        # First what the user asked, then a frame, then what is known by now.
         self._take(page, said)
         self._follow_shader(page)
         if self._can_draw():
@@ -153,15 +152,18 @@ class Session:
         self._after(page)
 
     def _can_draw(self) -> bool:
+        # Two frames are sent before the page has shown the first of them.
         ahead = self._sent - self._drawn
-        return self._page is not None and ahead < _AHEAD and (self._wanted > 0 or self._show["run"])
+        return self._page is not None and ahead < 2 and (self._wanted > 0 or self._show["run"])
 
     def _patience(self) -> float:
         """Return how long to wait for news [s]."""
         if self._page is None:
             return 60.0
         now = time.perf_counter()
-        waits = [_LOOKS if self._shader else 60.0]
+        # The nearest of the times at which something is due; files of a shader are looked at every
+        # 0.3 s.
+        waits = [0.3 if self._shader else 60.0]
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
         # Without a frame no reference begins, and without a reference there is no news to wait for.
@@ -176,8 +178,10 @@ class Session:
         of one parameter the last.
         """
         changes: dict[str, Values] = {}
-        own = [message for sender, message in said if sender is page]
-        for message, following in zip(own, [*own[1:], {}]):
+        messages = [message for sender, message in said if sender is page]
+        # A slider sends a value for every pixel of its way: only the last choice of one parameter
+        # counts. Changes of the scene are collected until another kind of message comes.
+        for message, following in zip(messages, [*messages[1:], {}]):
             if message.get("kind") == "choose" and _chooses(message) == _chooses(following):
                 continue
             if message.get("kind") == "change":
@@ -195,6 +199,7 @@ class Session:
 
     def _try(self, page: Page, work, *, of_scene: bool) -> None:
         """Change what is shown; a mistake is told in one line, and changes nothing."""
+        # The first of several requests: the cost that the page shows is what the user waited.
         self._asked_at = self._asked_at or time.perf_counter()
         try:
             work()
@@ -203,6 +208,7 @@ class Session:
         else:
             page.tell("mistake", message="")
             self._moves_on |= of_scene
+            # The reference is of the scene before the change.
             if of_scene and self._reference_of is not None:
                 self._reference_of = None
                 self._in_motion.clear()
@@ -214,6 +220,7 @@ class Session:
         """Read the shader that is shown again where one of its files has changed; a
         mistake leaves the picture.
         """
+        # An editor may remove a file before it writes it again: no stamp is no change.
         now = self.live.shader_stamp()
         changed, self._shader = (
             bool(now) and bool(self._shader) and now != self._shader,
@@ -226,10 +233,12 @@ class Session:
     def _touch(self) -> None:
         self._changed_at = time.perf_counter()
         self.live.begin_mean()
-        self._wanted = _GOES_ON if self.live.goes_on else 1
+        # Frames drawn of a still scene where each builds on the last.
+        self._wanted = 64 if self.live.goes_on else 1
 
     def _do(self, page: Page, message: Mapping[str, Any]) -> None:
         kind = message.get("kind")
+        # A page that opens has seen no frame; `drawn` says which it has shown.
         if kind == "opened":
             self._sent = self._drawn = self._moves = self._last_judged = 0
             self._open(page)
@@ -239,11 +248,13 @@ class Session:
             self._try(page, lambda: self._choose(message), of_scene=False)
             self._tell_state(page)
         elif kind == "show":
+            # Values of a page are not trusted: unknown words fall back to the default, and numbers
+            # are limited: 20 stops brighter or darker.
             given = self._show | {name: message[name] for name in self._show if name in message}
             layer, other = (str(given[name]) for name in ("layer", "other"))
             self._show = {
                 "layer": layer if layer in LAYERS else "total",
-                "exposure": min(max(_number(given["exposure"]), -_STOPS), _STOPS),
+                "exposure": min(max(_number(given["exposure"]), -20.0), 20.0),
                 "other": other if other in ("reference", "error") else "none",
                 "run": bool(given["run"]),
             }
@@ -256,6 +267,7 @@ class Session:
     def _choose(self, message: Mapping[str, Any]) -> None:
         """Choose another method, kernel or value of a parameter."""
         chosen = self.live.chosen
+        # Parameters of another method do not carry over.
         method = str(message.get("method", chosen.method))
         given: dict[str, Any] = dict(chosen.parameters) if method == chosen.method else {}
         if "parameter" in message:
@@ -268,6 +280,8 @@ class Session:
         """Refuse what is neither built in nor named by the user at the start: a page
         must not choose code to run.
         """
+        # The page comes from this server, but a message may come from anything that knows the
+        # token.
         own = self._given.chosen
         if method not in METHODS and method != own.method:
             wanted = ", ".join([*METHODS, *([own.method] if own.method not in METHODS else [])])
@@ -320,9 +334,13 @@ class Session:
         )
 
     def _draw(self, page: Page) -> None:
-        by_stage = self._sent % _BY_STAGE == 0
+        # Timing stages synchronises the device after each, so that only one frame of eight pays for
+        # it.
+        by_stage = self._sent % 8 == 0
         try:
             shown = self.live.frame(by_stage=by_stage)
+            # The first frame, or one after a wish of the page, sets the exposure; then it stays, so
+            # that changes of light can be seen.
             if self._factor is None:
                 frame = self.live.on_host(shown)
                 self._factor = exposure(frame.airlight + frame.surface)
@@ -335,11 +353,13 @@ class Session:
         self._news |= self.live.goes_on
         if by_stage:
             self._stages = shown.stages_ms
+        # The picture is made on the device: only 8-bit pixels are copied.
         took = stopwatch()
         _, surface, airlight = shown.stages
         how = {"layer": self._show["layer"], "factor": self._exposed()}
         picture = self._pictures.of_frame(self.live.renderer.pixel, surface, airlight, **how)
         picture_ms, now = took().ms, time.perf_counter()
+        # The page learns what the frame cost, and how long its last change took to appear.
         self._sent += 1
         page.show(
             picture,
@@ -363,6 +383,7 @@ class Session:
         now = time.perf_counter()
         if self._told < self._changed_at and now >= self._changed_at + _QUIET:
             self._tell_state(page)
+        # While the scene changes, single frames are judged in some pixels.
         if self._moves_on:
             self._judge_motion(page)
         if (
@@ -392,6 +413,7 @@ class Session:
             and known is not None
             and (self.reference.done or self.reference.failure)
         ):
+            # The judged frame has its reference: its error joins the mean over the motion.
             error, self._judged = view_error(known, self._judged), None
             if self.reference.done and error is not None and error.relative_rmse is not None:
                 self._in_motion.append(error)
@@ -403,7 +425,8 @@ class Session:
                     "pixels": error.known,
                 }
                 page.tell("motion", **plain(told))
-        # A change that no frame shows yet has another reference.
+        # A change that no frame shows yet has another reference. A frame that was not judged yet,
+        # and that shows the last change, is judged in 256 pixels.
         new = self._sent > self._last_judged and self._asked_at is None
         if self._judged is None and self._shown is not None and new:
             with suppress(InputError):
@@ -411,11 +434,10 @@ class Session:
                     self._sent,
                     self.live.on_host(self._shown).airlight,
                 )
-                self.reference.start(
-                    self._given.scene, self._given.size, self.live.changes, _IN_MOTION
-                )
+                self.reference.start(self._given.scene, self._given.size, self.live.changes, 256)
 
     def _tell_error(self, page: Page, shown: Shown) -> None:
+        # No reference: the page shows why.
         found = self.reference.known
         if self.reference.failure or found is None:
             page.tell("error", failure=self.reference.failure)
@@ -425,6 +447,7 @@ class Session:
         except InputError as mistake:
             page.tell("error", failure=" ".join(str(mistake).split()))
             return
+        # The error of the last frame, and of the mean of frames, which tells bias from noise.
         error, left = (view_error(found, each.airlight) for each in (frame, mean))
         page.tell(
             "error",
@@ -437,6 +460,8 @@ class Session:
         )
         if error is None or self._show["other"] == "none":
             return
+        # The second picture: the error or the reference, in which pixels that are not known take a
+        # near one.
         if self._show["other"] == "error":
             test = found.filled(np.asarray(frame.airlight, dtype=np.float64))
             picture = rgba(error_map(found.filled(found.airlight), test))
@@ -461,12 +486,15 @@ class Session:
 
 def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration:
     """Return a configuration that names only what differs from the method's defaults."""
+    # A command that repeats the view should hold only what the user changed.
     record = find_method(method)
-    own, light_samples = method_parameters(record, given)
-    now = values(light_samples) | values(own)
+    method_values, light_samples = method_parameters(record, given)
+    now = values(light_samples) | values(method_values)
     usual = values(record.light_samples) | defaults(record)
     differing = {name: now[name] for name in given if now[name] != usual[name]}
-    return configuration(method, str(kernel) if kernel and own.uses_kernel else None, differing)
+    return configuration(
+        method, str(kernel) if kernel and method_values.uses_kernel else None, differing
+    )
 
 
 def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -483,6 +511,7 @@ def _numbers(changes: Any) -> dict[str, Values]:
     """Return the changes of a page's message that have the form of changes."""
     if not isinstance(changes, dict):
         return {}
+    # Anything of another form is dropped.
     lists = {name: value for name, value in changes.items() if isinstance(value, list)}
     return {
         name: tuple(float(number) for number in value)

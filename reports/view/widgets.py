@@ -30,6 +30,7 @@ class ViewState:
 
     def command(self, name: str) -> str:
         """Return the line to type that shows this: `name` is 'view', 'render' or 'reference'."""
+        # A reference needs no method, but the same scene, changes and size.
         words = ["airlight", name, self.scene]
         if name != "reference":
             words += ["--method", self.chosen.method]
@@ -69,6 +70,7 @@ def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[
     lights also of their points.
     """
     method = find_method(chosen.method)
+    # A method may set parameters of area lights itself: those are shown once, as the method's.
     own, light_samples = method_parameters(method, dict(chosen.parameters))
     widgets = [_parameter(item, getattr(own, item.name)) for item in fields(own)]
     if area_lights:
@@ -91,6 +93,8 @@ def _parameter(item: Field, value: Any) -> dict[str, Any]:
         "help": limits.help,
         "unit": limits.unit,
     }
+    # The kind of widget follows from the type of the default; a bool comes before numbers, as it is
+    # one for Python.
     if limits.choices:
         return widget | {"kind": "choice", "choices": limits.choices}
     if isinstance(item.default, bool):
