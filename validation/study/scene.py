@@ -368,7 +368,7 @@ def study_scene(
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
-    # What each part took when it was computed, whether that was now or in an earlier study.
+    # The time that each part took when it was computed, now or in an earlier study.
     methods = [result for row in rows for result in row.results]
     seconds = {
         "reference": reference.seconds,
