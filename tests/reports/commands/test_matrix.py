@@ -43,7 +43,7 @@ ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 _OF_CLOUDS = dict.fromkeys((*CLOUDS, "cloud-paths"), "cloud")
 REFUSED: dict[str, dict[str, str]] = {kind: _OF_CLOUDS for kind in KINDS}
 REFUSED["density grid"] = _OF_CLOUDS | dict.fromkeys(SUMS, "grid")
-for _kind in ("bounded media", "height fog, lamp", "height fog, sun"):
+for _kind in ("bounded media", "height fog, lamp", "height fog, sun", "sky"):
     REFUSED[_kind] = _OF_CLOUDS | {"light-volumes-2010": "homogeneous"}
 REFUSED["cloud"] = dict.fromkeys(FOG, "sky")
 
