@@ -95,8 +95,8 @@ def _error(integrand: Callable[[Array], Array], nodes: int) -> float:
     """Return the largest error of a rule for integrals from 0 to 1; the integrand
     takes a column of places.
     """
-    # Columns of `values` are panels, rows nodes: first those of the rule, then those of the rule of
-    # 24 nodes that judges it.
+    # Each column of `values` is a panel. Its first rows are the nodes of the rule; the other rows
+    # are the 24 nodes of a finer rule, which judges it.
     few, many = (np.array(unit_nodes(count)).T for count in (nodes, 24))
     values = integrand(np.concatenate([few[0], many[0]])[:, None])
     return float(np.max(np.abs(few[1] @ values[:nodes] / (many[1] @ values[nodes:]) - 1)))

@@ -107,8 +107,8 @@ def mean_measures(runs: list[Measures]) -> Measures:
     """Return the means over runs of what has an error, with errors from their spread.
 
     Runs that measure the same to the last digit are one run, of one seed. A number that one run
-    does not tell is unknown of their mean, and so is a delay in which runs differ. Values that are
-    not finite are those of all runs; the rest is that of the first.
+    does not tell is unknown of their mean, and so is a delay in which runs differ. Values that
+    are not finite are counted over all runs; every other field is taken from the first run.
     """
     runs = [run for number, run in enumerate(runs) if run not in runs[:number]]
     if len(runs) == 1:
