@@ -18,8 +18,7 @@ from typing import Any
 import drjit as dr
 
 from airlight.realtime.methods.interface.method import Method
-from airlight.realtime.scene.light_table import LightTable, alike, light_tables
-from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.light_table import LightTable, alike
 from airlight.realtime.scene.read_scene import Scene
 
 _ROOM = 2**30  # of the states of all groups of lights [bytes]
@@ -46,23 +45,20 @@ class LightGroup:
         """The lights for recorded functions; a table by itself is of area light 0, as
         one recording serves all.
         """
-        tables = light_tables(self.scene.lights)
+        tables = self.scene.tables
         if len(tables) == 1 and self.source:
             tables = (replace(tables[0], rows=replace(tables[0].rows, source=0)),)
         return tables
 
 
-def light_groups(
-    scene: Scene, lights: tuple[Light, ...], method: Method, *, together: bool
-) -> tuple[LightGroup, ...]:
-    """Return the groups of some lights of a scene for a method; `together`: all in one."""
+def light_groups(scene: Scene, method: Method, *, together: bool) -> tuple[LightGroup, ...]:
+    """Return the groups of the lights of a scene for a method; `together`: all in one."""
     if method.at_once or together:
-        groups = [lights]
-    elif method.by_table:
-        groups = alike(lights)
-    else:
-        groups = [(light,) for light in lights]
-    return tuple(LightGroup(replace(scene, lights=group)) for group in groups)
+        return (LightGroup(scene),)
+    if method.by_table:
+        return tuple(LightGroup(replace(scene, lights=group)) for group in alike(scene.lights))
+    apart = replace(scene, sample_tables=())
+    return tuple(LightGroup(replace(apart, lights=(light,))) for light in scene.lights)
 
 
 def group_states(

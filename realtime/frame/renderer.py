@@ -52,13 +52,7 @@ from airlight.realtime.numerics.noise import Noise, blue_mask
 from airlight.realtime.numerics.recorded import Frozen, refusals
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.camera import TILE, tiled_pixels
-from airlight.realtime.scene.light_table import (
-    LightTable,
-    light_samples,
-    light_tables,
-    structure,
-)
-from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.light_table import LightTable, sampled_lights, structure
 from airlight.realtime.scene.read_scene import Scene
 
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
@@ -99,21 +93,19 @@ class FrameRenderer:
         return _by_rays(self.method)
 
     @cached_property
-    def lights(self) -> tuple[Light, ...]:
-        """The lights of the scene as it is now and the samples of its area
-        lights, made once for a frame.
-        """
-        return _lights(self.scene, self.light_samples)
+    def lit(self) -> Scene:
+        """The scene as it is now, with the samples of its area lights, made once for a frame."""
+        return _with_samples(self.scene, self.light_samples)
 
     @cached_property
     def groups(self) -> tuple[LightGroup, ...]:
         """The groups of lights of the scene as it is now."""
-        return light_groups(self.scene, self.lights, self.method, together=self.extra_layers)
+        return light_groups(self.lit, self.method, together=self.extra_layers)
 
     @cached_property
     def tables(self) -> tuple[LightTable, ...]:
         """All lights, for the surfaces that shadow rays light."""
-        return () if self.method.provides_visibility else light_tables(self.lights)
+        return () if self.method.provides_visibility else self.lit.tables
 
     def prepare(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of the method by groups of lights, None for those that are not kept."""
@@ -160,7 +152,7 @@ def frame_renderer(
         )
     check_media(scene, chosen)
     extra_layers &= not scene.area_lights
-    groups = light_groups(scene, _lights(scene, samples), chosen, together=extra_layers)
+    groups = light_groups(_with_samples(scene, samples), chosen, together=extra_layers)
     # Groups of one structure need the same memory and are refused alike.
     for group in {
         tuple(structure(light)[1] for light in each.scene.lights): each for each in groups
@@ -184,9 +176,10 @@ def frame_renderer(
     )
 
 
-def _lights(scene: Scene, samples: LightSamples) -> tuple[Light, ...]:
-    """Return the lights of a scene, and behind them the samples of its area lights."""
-    return scene.lights + light_samples(scene, samples.points, samples.pattern)
+def _with_samples(scene: Scene, samples: LightSamples) -> Scene:
+    """Return a scene that has, behind its lights, the samples of its area lights."""
+    lights, tables = sampled_lights(scene.area_lights, samples, type(scene.camera.origin.x))
+    return replace(scene, lights=scene.lights + lights, sample_tables=tables)
 
 
 def _by_rays(method: Method) -> bool:
@@ -421,7 +414,7 @@ def _sphere_scales(renderer: FrameRenderer, cast: Cast) -> dict[int | None, Any]
                 scene.camera,
                 renderer.pixel,
                 scene.medium,
-                next(sample for sample in renderer.lights if sample.source == number),
+                next(sample for sample in renderer.lit.lights if sample.source == number),
                 sampled_sphere(light, renderer.light_samples, type(scene.camera.origin.x)),
                 cast.distance,
                 renderer.kernel,

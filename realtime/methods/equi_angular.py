@@ -32,7 +32,7 @@ from airlight.realtime.methods.interface.method import Layers, Method, View, ani
 from airlight.realtime.numerics.functions import summed
 from airlight.realtime.numerics.noise import PATTERNS
 from airlight.realtime.parameters import parameter
-from airlight.realtime.scene.light_table import light_choice, light_tables
+from airlight.realtime.scene.light_table import light_choice
 from airlight.realtime.scene.lights import Light
 
 
@@ -64,7 +64,7 @@ class EquiAngular(Method):
     def preparation(self, scene):
         """Return a function of what draws the lights of each table that have a place."""
         return lambda now: tuple(
-            light_choice(table) if table.rows.w else None for table in light_tables(now.lights)
+            light_choice(table) if table.rows.w else None for table in now.tables
         )
 
     def render(self, view, state, kernel):

@@ -39,7 +39,6 @@ from airlight.realtime.intervals import add_waiting, close_interval, no_interval
 from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
 from airlight.realtime.methods.interface.method import Method, animate, jitter, no_state
 from airlight.realtime.parameters import parameter
-from airlight.realtime.scene.light_table import light_tables
 from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.shadow_maps.shadow_map import (
     cast_shadow_maps,
@@ -132,7 +131,7 @@ class RayMarch(Method):
         if self.shadow != "map" or not scene.features.shadows:
             return no_state
         return lambda now: tuple(
-            cast_shadow_maps(now.geometry, table, self.map) for table in light_tables(now.lights)
+            cast_shadow_maps(now.geometry, table, self.map) for table in now.tables
         )
 
     def airlight(self, view, light, state, kernel):

@@ -11,13 +11,15 @@ of the total.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import chain
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.realtime.area_lights.points import PlacedPoints, place_points
+from airlight.realtime.area_lights.points import LightSamples, PlacedPoints, place_points
+from airlight.realtime.area_lights.shape import AreaLight
 from airlight.realtime.numerics.array_types import (
     ArrayTypes,
     aligned_array,
@@ -27,31 +29,61 @@ from airlight.realtime.numerics.array_types import (
 )
 from airlight.realtime.numerics.functions import summed
 from airlight.realtime.scene.lights import Facing, Light
-from airlight.realtime.scene.read_scene import Scene
 
 
-def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
-    """Return the light samples of the area lights of a scene, light after light.
+def sampled_lights(
+    lights: Sequence[AreaLight], samples: LightSamples, Float: Any
+) -> tuple[tuple[Light, ...], tuple["LightTable", ...]]:
+    """Return the light samples of area lights, light after light, and a table of those of each.
 
     Parameters
     ----------
-    scene
-        The scene.
-    points, pattern
-        Fields of `realtime.area_lights.points.LightSamples`.
+    lights
+        The area lights.
+    samples
+        How many there are of each light, and in which pattern.
+    Float
+        The type of the numbers of the samples.
 
     Raises
     ------
     InputError
         For a number or a pattern that does not exist.
     """
-    types = types_of(type(scene.camera.origin.x))
-    placed = [place_points(light, points, pattern) for light in scene.area_lights]
-    return tuple(
-        point
-        for number, of_light in enumerate(placed)
-        for point in _points_of(of_light, number, types)
+    types = types_of(Float)
+    points, tables = [], []
+    for number, light in enumerate(lights):
+        placed = place_points(light, samples.points, samples.pattern)
+        points.append(_points_of(placed, number, types))
+        tables.append(_table_of(placed, number, types))
+    return tuple(chain(*points)), tuple(tables)
+
+
+def _table_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> "LightTable":
+    """Return the rows of placed points, which the host knows: a read of the lights themselves would
+    wait for the device.
+    """
+    count = len(placed.positions)
+
+    def column(scalar: Any, numbers: Any) -> Any:
+        return aligned_array(scalar, np.broadcast_to(numbers, count))
+
+    def vector(kind: Any, scalar: Any, rows: Any) -> Any:
+        return kind(*(column(scalar, numbers) for numbers in rows))
+
+    facing = Facing(
+        vector(mi.Vector3d, mi.Float64, placed.normals.T),
+        column(types.scalar, placed.lift),
+        column(types.scalar, placed.chord),
     )
+    position = vector(types.vector, types.scalar, placed.positions.T)
+    intensity = vector(types.color, types.scalar, placed.intensity)
+    light = Light(position, intensity, facing=facing, source=source)
+    return LightTable(light, count, flat=_face_alike(placed))
+
+
+def _face_alike(placed: PlacedPoints) -> bool:
+    return bool(np.all(placed.normals == placed.normals[0]))
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
@@ -60,7 +92,7 @@ def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Lig
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
     # The samples of a flat light have one normal: one array serves all.
-    alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))
+    alike = _face_alike(placed)
     normals = placed.normals[:1] if alike else placed.normals
     facings = [
         Facing(mi.Vector3d(*aligned_numbers(mi.Float64, normal)), lift, chord) for normal in normals
@@ -86,6 +118,8 @@ class LightTable:
 
     rows: Light  #: its arrays have a row for each light; all that is no array is common to them
     count: int
+    #: whether they are the samples of an area light that all face the same way, bit for bit
+    flat: bool = False
 
     def __getitem__(self, number: Any) -> Light:
         """Return the lights of some numbers, counted from 0."""
@@ -110,7 +144,9 @@ def structure(light: Light) -> Any:
     return light.source, tuple(value is None for value in vars(light).values())
 
 
-def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
+def light_tables(
+    lights: Sequence[Light], made: Sequence[LightTable] = ()
+) -> tuple[LightTable, ...]:
     """Return the tables of some lights, in the order of the first light of each.
 
     A light at infinity is a table by itself.
@@ -119,8 +155,13 @@ def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
     ----------
     lights
         Lights of any kind.
+    made
+        Tables of area lights, as `sampled_lights` returns them. A light of which `lights` has one
+        sample has them all. The other tables are stacked: of several lights, that waits for the
+        device.
     """
-    return tuple(map(_table, alike(lights)))
+    known = {table.rows.source: table for table in made}
+    return tuple(known.get(group[0].source) or _table(group) for group in alike(lights))
 
 
 def alike(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
@@ -188,13 +229,13 @@ def light_choice(table: LightTable) -> LightChoice:
         One of the tables that `light_tables` returns.
     """
     light = table.rows
-    # Intensity as the mean of red, green and blue; an array of one entry serves all rows.
-    power = np.stack([np.array(channel) for channel in light.intensity]).mean(axis=0) * np.ones(
-        table.count
-    )
+    # Intensity as the mean of red, green and blue, in one read, as each waits for the device.
+    mean = dr.mean(mi.Vector3d(light.intensity))
     # A cone has the solid angle 2 pi (1 - cos): all lights of a table have one, or none has.
     if light.cone is not None:
-        power = power * (1 - np.array(light.cone.cos))
+        mean *= 1 - mi.Float64(light.cone.cos)
+    # An array of one entry serves all rows.
+    power = np.array(mean) * np.ones(table.count)
     power = power if power.sum() > 0 else np.ones(table.count)
     Float = type(light.position.x)
     fractions = power / power.sum()

@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -27,6 +28,7 @@ from airlight.realtime.scene.directional_extent import (
     media_spheres,
     shape_spheres,
 )
+from airlight.realtime.scene.light_table import LightTable, light_tables
 from airlight.realtime.scene.lights import Light, spot_fields
 from airlight.realtime.scene.media.medium import Medium
 from airlight.realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
@@ -59,11 +61,18 @@ class Scene:
     #: vertices of shapes that moved, by name [m]
     positions: Mapping[str, Any] = field(default_factory=dict)
     area_lights: tuple[AreaLight, ...] = ()  #: methods render samples of them
+    #: of the area lights whose samples are all among `lights`
+    sample_tables: tuple[LightTable, ...] = ()
     #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms
     #: of shading show its light
     sky: Any = None
     #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
     boundaries: tuple[Any, ...] = ()
+
+    @cached_property
+    def tables(self) -> tuple[LightTable, ...]:
+        """The lights, a table for each structure and area light."""
+        return light_tables(self.lights, self.sample_tables)
 
     def source_shape(self, light: Light) -> str | None:
         """Return the name of the shape of a light sample that casts no

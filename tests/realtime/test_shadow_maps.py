@@ -8,8 +8,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from airlight.realtime.area_lights.points import LightSamples
 from airlight.realtime.methods.soft_shafts.sources import source_state
-from airlight.realtime.scene.light_table import light_samples, light_tables
+from airlight.realtime.scene.light_table import sampled_lights
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
 from tests.helpers.lamps import lamp_scene
@@ -35,7 +36,7 @@ def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
 
 def test_a_plane_never_shadows_itself(variant):
     scene = read_scene(mi.load_dict(lamp_scene(ball=None)))
-    (lights,) = light_tables(light_samples(scene, 3, "ring"))
+    _, (lights,) = sampled_lights(scene.area_lights, LightSamples(3, "ring"), mi.Float)
     state = source_state(scene.geometry, lights, 64, with_maps=True)
     points = np.random.default_rng(4).uniform([-5, -5, 0], [5, 5, 0], (50000, 3))
     place = mi.Vector3f(*(mi.Float(column) for column in points.T))

@@ -41,16 +41,42 @@ class Guess:
 
 
 @dataclass
+class _Recent:
+    """Values by their keys, as long as there is room: the one used longest ago goes first."""
+
+    room: float  #: how many numbers stay in memory, some eight bytes each
+    taken: int = 0
+    # With their sizes. A dictionary keeps the order of insertion: an entry that is used is taken
+    # out and put in again, so that the one used last comes last.
+    entries: dict[Any, tuple[Any, int]] = field(default_factory=dict)
+
+    def once(self, key: Any, compute: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+        """Return the value of a key, computed where it is not here."""
+        entry = self.entries.pop(key, None)
+        if entry is None:
+            value = compute()
+            entry = value, size(value)
+            self.taken += entry[1]
+            while self.entries and self.taken > self.room:
+                self.taken -= self.entries.pop(next(iter(self.entries)))[1]
+        self.entries[key] = entry
+        return entry[0]
+
+
+@dataclass
 class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
     reference: ReferenceScene
-    #: how many numbers of paths stay in memory, some eight bytes each; the oldest go first
-    most: float = 12_000_000
-    # By kind, with their sizes; the one used last comes last.
-    _cached: dict[str, dict[Any, tuple[Any, int]]] = field(
-        default_factory=lambda: {"paths": {}, "radiance": {}}
-    )
+    most: float = 12_000_000  #: room for the numbers of paths
+
+    @cached_property
+    def _paths(self) -> _Recent:
+        return _Recent(self.most)
+
+    @cached_property
+    def _radiance(self) -> _Recent:
+        return _Recent(6_000_000)
 
     @cached_property
     def higher_orders(self) -> Array | None:
@@ -80,8 +106,8 @@ class SceneLight:
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
-        return self._once(
-            "paths", key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size
+        return self._paths.once(
+            key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size
         )
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
@@ -90,8 +116,7 @@ class SceneLight:
         """
         key = "model", scenery, layer, ends, _sight(seen)
         view = self.view(seen, scenery)
-        return self._once(
-            "paths",
+        return self._paths.once(
             key,
             lambda: seen.model(view, scenery, layer, ends),
             lambda model: 20 * model.places,
@@ -103,29 +128,12 @@ class SceneLight:
         plain = fog.without_factors
         ends = fog.ends if layer == 0 else None
         key = scenery, plain, layer, _sight(seen)
-        by_light = self._once(
-            "radiance",
+        by_light = self._radiance.once(
             key,
             lambda: self.model(seen, scenery, layer, ends).by_light(plain),
             lambda each: each.size,
         )
         return fog.combined(by_light)[layer]
-
-    def _once(
-        self, kind: str, key: Any, compute: Callable[[], Any], size: Callable[[Any], int]
-    ) -> Any:
-        # A dictionary keeps the order of insertion: an entry that is used is taken out and put in
-        # again, so that the first one is the one used longest ago. It goes first where a new entry
-        # needs its room, 6 million numbers for radiance.
-        cached, most = self._cached[kind], self.most if kind == "paths" else 6_000_000
-        entry = cached.pop(key, None)
-        if entry is None:
-            value = compute()
-            entry = value, size(value)
-            while cached and sum(each for _, each in cached.values()) > most - entry[1]:
-                del cached[next(iter(cached))]
-        cached[key] = entry
-        return entry[0]
 
 
 def _sight(seen: Seen) -> tuple[Any, ...]:

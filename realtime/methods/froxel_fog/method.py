@@ -26,7 +26,6 @@ from airlight.realtime.methods.froxel_fog.injection import Visibility, frame_shi
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.numerics.array_types import bytes_of
 from airlight.realtime.parameters import parameter
-from airlight.realtime.scene.light_table import light_tables
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.hemisphere_map import (
     HemisphereMaps,
@@ -120,7 +119,7 @@ class FroxelFog(Method):
                 return cast_shadow_maps(geometry, table, self.map)
             return cast_hemisphere_maps(geometry, table, self.point_map, for_surfaces=False)
 
-        return lambda now: tuple(maps(now.geometry, table) for table in light_tables(now.lights))
+        return lambda now: tuple(maps(now.geometry, table) for table in now.tables)
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""

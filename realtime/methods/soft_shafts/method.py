@@ -62,7 +62,7 @@ from airlight.realtime.methods.soft_shafts.sources import (
     source_state,
 )
 from airlight.realtime.numerics.array_types import two_numbers
-from airlight.realtime.scene.light_table import LightTable, light_tables, lights_apart
+from airlight.realtime.scene.light_table import LightTable, lights_apart
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from airlight.realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
@@ -95,9 +95,7 @@ class SoftShafts(SoftShaftsParameters):
                 "one that divides both "
                 "sides"
             )
-        most = max(
-            lights.count for lights in lights_apart(light_tables(scene.lights), by_source=True)
-        )
+        most = max(lights.count for lights in lights_apart(scene.tables, by_source=True))
         if self.interleave and (most > 16 or 16 % most):
             raise InputError(
                 f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a "
@@ -124,7 +122,7 @@ class SoftShafts(SoftShaftsParameters):
         }
 
         def prepare(now):
-            sources = lights_apart(light_tables(now.lights), by_source=True)
+            sources = lights_apart(now.tables, by_source=True)
             return tuple(
                 source_state(now.geometry, lights, self.map, **asked) for lights in sources
             )
@@ -240,7 +238,7 @@ class _Frame:
                 del own  # two images that the filter needs not
             lit = self._smooth_by_width(lit, width, lights.count)
         elif p.filter != "none":
-            there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
+            there, levels = dr.isfinite(whole.distance), lights.flat and not p.interleave
             lit = _smooth_fraction(
                 lit,
                 self.raster,

@@ -24,7 +24,6 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from airlight.realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from airlight.realtime.methods.interface.method import View
@@ -41,7 +40,6 @@ class SourceState:
     """The state of one source, made again when lights or shapes move."""
 
     width: Any  #: of an area light, of a square with its mean square extent [m]
-    flat: bool  #: whether all its samples face the same way
     maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
 
 
@@ -58,7 +56,7 @@ def source_state(
     # map.
     if light.facing is None:
         maps = cast_shadow_map(scene, light, size) if with_maps else None
-        return SourceState(dr.opaque(type(light.position.x), 0, 1), True, maps)
+        return SourceState(dr.opaque(type(light.position.x), 0, 1), maps)
     # The mean square distance from the middle of a square of the side L is L^2 / 6. It stays on the
     # device.
     spread = sum(dr.mean(dr.square(column - dr.mean(column))) for column in light.position)
@@ -67,9 +65,7 @@ def source_state(
         hemispheres = cast_hemisphere_maps(scene, lights, size, for_surfaces=for_surfaces)
     width = dr.sqrt(6 * spread)
     dr.eval(width)
-    # All samples of a rectangle or disc have the same normal, bit for bit.
-    flat = all(np.ptp(np.array(component)) == 0 for component in light.facing.exact_normal)
-    return SourceState(width, flat, hemispheres)
+    return SourceState(width, hemispheres)
 
 
 @dataclass(frozen=True)
@@ -157,7 +153,7 @@ def _reached_of_sample(
     square = dr.squared_norm(away)
     # Where pixels share no samples, samples that face one way count alike: the fraction has N + 1
     # levels.
-    alike = state.flat and not p.interleave
+    alike = lights.flat and not p.interleave
     weight = 1 if alike else dr.maximum(dr.dot(away, light.normal), 0) / (square * dr.sqrt(square))
     if not view.features.shadows:
         lit = mask

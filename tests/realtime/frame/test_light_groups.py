@@ -6,12 +6,14 @@ spheres have their closed form.
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import airlight.realtime.frame.light_groups as groups_module
 import airlight.realtime.scene.light_table as module
+from airlight.realtime.area_lights.points import LightSamples
 from airlight.realtime.area_lights.shape import turned_area_light
 from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
@@ -19,7 +21,7 @@ from airlight.realtime.frame.renderer import run_stages
 from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.animate import with_area_lights
-from airlight.realtime.scene.light_table import light_choice, light_samples, light_tables
+from airlight.realtime.scene.light_table import light_choice, light_tables, sampled_lights
 from airlight.validation.scenes.meshes import rotation
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers import frames
@@ -57,7 +59,8 @@ def one_by_one(variant, request):
             else {"changes": {"size": SIZE, "lamp": ring((0.9, 0.7, 1.9), size=0.6)}}
         )
     )
-    for point in light_samples(scene, 5, "sobol"):
+    points, _ = sampled_lights(scene.area_lights, LightSamples(5, "sobol"), mi.Float)
+    for point in points:
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
         frame = frames.render(alone, "ray-march", steps=1200)
         airlight, surface = airlight + frame.airlight, surface + frame.surface
@@ -163,6 +166,27 @@ def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(
     # A state beyond the room for all is made when it is needed.
     monkeypatch.setattr(groups_module, "_ROOM", 3 * 12)
     assert [state is None for state in drawn.prepare(scene)] == [False] * 3 + [True] * 37
+
+
+@pytest.mark.parametrize("Float", ["Float", "Float64"])
+def test_the_table_of_a_light_has_its_samples_bit_by_bit(variant, Float):
+    """Methods read the table or the samples: images of both belong to one light."""
+    lights, (table,) = sampled_lights(
+        scene_of().area_lights, LightSamples(7, "sobol"), getattr(mi, Float)
+    )
+    (stacked,) = light_tables(lights)
+    made, read_back = dr.width(table.rows), dr.width(stacked.rows)
+    assert (table.count, made) == (stacked.count, read_back) == (7, 7)
+    for one, other in zip(_numbers(table.rows), _numbers(stacked.rows), strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)
+
+
+def _numbers(light):
+    facing = light.facing
+    return map(
+        np.array, (light.position, light.intensity, facing.exact_normal, facing.lift, facing.chord)
+    )
 
 
 def test_the_power_of_a_light_is_its_intensity_times_its_solid_angle(variant):

@@ -119,6 +119,7 @@ LAMP = {
 MOVES = {"look": "", "camera": "camera_moved", "light": "light_moved", "objects": "geometry_moved"}
 
 READ = "realtime/numerics/array_types.py: _in_one_transfer"
+POWER = "realtime/scene/light_table.py: light_choice"
 SIDES = "realtime/methods/light_volumes/jump_search.py: _jumping_sides"
 
 #: By method the moves after which a frame waits for the host, where, and how often in each of the
@@ -134,9 +135,7 @@ WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
         SIDES,
         {"lamp": 2, "spot": 2, "sun": 2, "area": 2 * POINTS, "box": 2},
     ),
-    "equi-angular": (tuple(MOVES), READ, {"lamp": 1, "spot": 1, "area": 1, "box": 1}),
-    "froxel-fog": (("light", "objects"), READ, {"area": 1}),
-    "soft-shafts": (("light", "objects"), READ, {"area": 1}),
+    "equi-angular": (tuple(MOVES), POWER, {"lamp": 1, "spot": 1, "area": 1, "box": 1}),
 }
 
 
