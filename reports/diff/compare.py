@@ -188,9 +188,10 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
     """Compare the errors of a configuration in one layer; what has an
     interval may differ by it too.
     """
-    # An error that is new in a report is no difference.
     if not old or not new:
-        return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
+        gone: Change = ("worse", f"{prefix}error is gone", None, None)
+        fresh: Change = ("note", f"{prefix}error is new", None, None)
+        return [gone] if old else [fresh] if new else [], 0
     changes: list[Change] = []
     for name in _ERRORS:
         # A number that is NaN in one report alone is a difference: something became, or stopped

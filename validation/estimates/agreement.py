@@ -246,9 +246,10 @@ def width_to_reach(statistics: Statistics, margin: float) -> float:
 
 def pixel_angle(reference: ReferenceScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
-    # The pixel in the middle and its neighbour; an image one pixel wide has the angle 0.
+    # The pixel in the middle and the one to its left, or above it in an image of one column. A
+    # single pixel has no neighbour, and the angle 0.
     middle = (reference.height // 2) * reference.width + reference.width // 2
-    beside = middle - 1 if reference.width > 1 else middle
+    beside = max(middle - 1, 0)
     return float(
         np.arccos(np.clip(reference.direction[middle] @ reference.direction[beside], -1, 1))
     )

@@ -27,6 +27,7 @@ import numpy as np
 from airlight.analytic.height_fog import HeightFog
 from airlight.analytic.phase import HenyeyGreenstein
 from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
 from airlight.validation.arrays import Array
@@ -230,7 +231,7 @@ class FogModel:
         # The radiance of surface points contains 1/r^2, which is taken out for the law of the fog;
         # the weight of nodes has no distance in it. A march that takes steps of depth for steps of
         # distance makes the nodes' lengths of ray shorter by `slant`.
-        strength = _falls(r, fog)
+        strength = _falls(r, fog) if self._sun(number) is None else np.ones_like(r)
         if places.is_surface:
             strength = strength * places.r**2
         else:
@@ -279,6 +280,13 @@ class FogModel:
                     )
         return total
 
+    def _sun(self, number: int) -> DirectionalLight | None:
+        """Return the directional light of a number; None for a light that has a place."""
+        # Lights count point and spot lights first, then directional ones, then area lights.
+        reference = self.view.reference
+        numbers = range(len(reference.lights), len(reference.lights) + len(reference.directional))
+        return reference.directional[number - numbers.start] if number in numbers else None
+
     def _by_height(
         self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
     ) -> tuple[Array, Array, Array]:
@@ -291,15 +299,11 @@ class FogModel:
         assert density is not None
         origin = reference.origin @ fog.up
         z = origin + places.x * (reference.direction[places.ray] @ fog.up)
-        # Lights count point and spot lights first, then directional ones: `sun` is the number of a
-        # directional light, and outside the range of these for all others.
-        camera, light, sun = camera.copy(), light.copy(), number - len(reference.lights)
+        camera, light, sun = camera.copy(), light.copy(), self._sun(number)
         camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
-        if 0 <= sun < len(reference.directional):
+        if sun is not None:
             # The column above a place over the sine of the light's height over the horizon.
-            light[:, AROUND] = density.column(z) / max(
-                float(-reference.directional[sun].direction @ fog.up), 1e-300
-            )
+            light[:, AROUND] = density.column(z) / max(float(-sun.direction @ fog.up), 1e-300)
         else:
             light[:, AROUND] = density.optical_depth(z - away @ fog.up, z, light[:, AROUND])
         return camera, light, np.zeros_like(z) if places.is_surface else density.log_density(z)
@@ -338,7 +342,7 @@ def _between_ends(length: Array, fog: Fog, slant: Array) -> Array:
 
 
 def _falls(r: Array, fog: Fog) -> Array:
-    """Return how light falls with the distance from its source, (n,)."""
+    """Return how the light of a source that has a place falls with the distance from it, (n,)."""
     falls = r**-2 if fog.distance_power == 2 else r**-fog.distance_power
     return falls if fog.window is None else falls * fog.window(r)
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -233,10 +234,10 @@ def name_shapes(scene) -> None:
     taken = {shape.id() for shape in scene.shapes()}
     for number, shape in enumerate(scene.shapes(), 1):
         if not shape.id():
-            # A name may already be taken by a shape of the file: the number of shapes makes it
-            # differ.
-            name = f"{shape.class_name().lower()}-{number}"
-            shape.set_id(name if name not in taken else f"{name}-{len(taken)}")
+            # A shape of the file may have the name already: the next number that is free is taken.
+            names = (f"{shape.class_name().lower()}-{free}" for free in count(number))
+            shape.set_id(next(name for name in names if name not in taken))
+            taken.add(shape.id())
 
 
 def resize(scene, size: tuple[int, int]) -> None:

@@ -165,8 +165,9 @@ def method_motion(
                 )
             )
         measured = [each for each in several if each is not None]
-        words = motion_verdict(measured[0]).words if measured else "the reference is dark"
         mean = mean_measures(measured) if measured else None
+        # The verdict is that on the numbers beside it.
+        words = motion_verdict(mean).words if mean else "the reference is dark"
         rows.append(MethodMotion(chosen.label, mean, words))
     return rows
 

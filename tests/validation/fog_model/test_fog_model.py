@@ -101,6 +101,21 @@ def test_laws_can_be_changed_one_by_one(variant):
         assert model.layers(replace(fog, **law))[0][:, 0] == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", [{"window": lambda r: np.exp(-r)}, {"distance_power": 1.0}])
+def test_the_light_of_a_sun_falls_with_no_distance(variant, tmp_path, law):
+    """A range of the lamps beside it leaves it as it is."""
+    path = tmp_path / "fog.xml"
+    path.write_text(fog_xml(LAMP, SUN, size=SIZE))
+    reference = read_reference(load_scene(str(path)).scene)
+    view = view_of(reference)
+    model, fog = FogModel(view, scattering_paths(view)), scene_fog(reference)
+    for intensity, alike in (((0.0, 1.0), True), ((1.0, 0.0), False)):
+        alone = replace(fog, intensity=intensity)
+        before, after = model.layers(alone), model.layers(replace(alone, **law))
+        assert before[0].mean() > 0
+        assert np.array_equal(before, after) is alike
+
+
 @pytest.mark.parametrize("radius", [1e-9, 1e-3, 0.3])
 def test_even_samples_of_a_sphere_give_its_light_however_small_and_far_it_is(radius):
     """By even normals: 2000 samples are the light of the sphere to 1 %, also where its
