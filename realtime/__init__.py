@@ -89,6 +89,6 @@ integral, `methods/equi_angular.py` of random samples. `airlight(view, light, st
 **A new medium** is one file in `scene/media/`, whose page lists what it must answer. Every method
 of fog then renders it.
 
-**A new kind of light** is an optional field of `Light` in `scene/lights.py`, whose page lists who
-asks for it; `scene/read_scene.py` makes it of an emitter.
+**A new kind of light** is an optional field of `Light` in `scene/lights.py`, whose page says more;
+`rays.py` says how its light falls off, and `scene/read_scene.py` makes it of an emitter.
 """

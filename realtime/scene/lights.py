@@ -14,18 +14,22 @@ A light sample stands for a part of an area light (`realtime.area_lights`). In t
 has the intensity I0 max(0, n . w), n its normal: it lights the half space before its plane.
 
 **A new kind of light** is an optional field of `Light`, and lights that have it are tables of their
-own by themselves (`realtime.scene.light_table`). `Light.kind` names it. Who asks:
+own by themselves (`realtime.scene.light_table`). Three files know it:
 
-- `realtime.scene.read_scene` makes it of an emitter; Mitsuba refuses parameters that its plugin does
-  not have, so that a new one needs a plugin, or a word in the emitter's name;
-- an intensity that depends on the direction: set `varies`, and write `RayGeometry.falloff`,
-  `falloff_beside` and `smooth_subsegments`, the places of its kinks, and `profile`, the same for
-  points (`realtime.rays`); every method and kernel asks these;
-- an irradiance that is no intensity over r^2: `LitRays.source`, `realtime.frame.surface` and
-  `froxel_fog.injection` divide by r^2, and `integrate`, `kernels.exact` and `marching` place their
-  nodes by it; `realtime.frame.light_on_ray` refuses a point light on a ray, as it is infinite there;
-- shadow maps (`realtime.shadow_maps.projection`): into which directions it shines;
-- `methods.shader.scene_arrays`: what a user's shader is told of it.
+1. This one: `Light.kind` names it, and `Light.varies` says that it has a profile.
+2. `realtime.rays`: its profile by `RayGeometry.falloff` and `falloff_beside`, the places of its kinks
+   by `smooth_subsegments`, and `profile`, the same for points. Every method and kernel asks these.
+3. `realtime.scene.read_scene` makes it of an emitter. Mitsuba refuses parameters that its plugin does
+   not have, so that a new one needs a plugin, or a word in the emitter's name.
+
+A profile is r^2 times the irradiance of a plane across the light, over the intensity. It may depend
+on the direction, as that of a spot, and on the distance: a ball of the radius R, whose light engines
+let fall as 1/max(r, R)^2, has min(1, r^2/R^2), with kinks where the ray meets the ball. Nodes and
+weights hold 1/r^2, and stay as they are.
+
+Two more files are asked by some: `realtime.shadow_maps.projection` has maps of the directions into
+which a light shines, all of them unless it says otherwise, and `methods.shader.scene_arrays` tells
+users' shaders of lights.
 """
 
 import math
@@ -125,8 +129,8 @@ class Light:
 
     @property
     def varies(self) -> bool:
-        """Whether the intensity varies along a ray, as in a soft spot; else it is
-        constant on the lit part.
+        """Whether it has a profile that varies along a ray, as a soft spot has; else the
+        intensity is constant on the lit part.
         """
         return self.beam is not None or self.facing is not None
 
