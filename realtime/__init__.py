@@ -67,24 +67,46 @@ them.
     scene = read_scene(load_scene("hall", size=(24, 18)).scene)  # or mi.load_dict(...), "double"
     renderer = frame_renderer(scene, METHODS["shadow-planes"], kernel=KERNELS["exact"])
     airlight = render_frame(renderer).airlight  # dataclasses.replace(renderer, run=1): new noise
+    march = frame_renderer(scene, METHODS["ray-march"], steps=400)  # parameters by their names
 
 **A new method** is one file in `methods/` and a line of `_CLASSES` in `methods/registry.py`; without
-that line it is a user's own, `--method FILE.py:Class`. `methods/unshadowed.py` is the model of an
-integral, `methods/equi_angular.py` of random samples. `airlight(view, light, state, kernel)` of
-`methods/interface/method.py` returns the radiance that one light scatters into every ray:
+that line it is a user's own, `--method FILE.py:Class`:
 
-- `rays = view.lit_by(light, kernel)` are the rays with the light. `rays.airlight(x0, x1)` is the
-  integral over lit segments [m], `rays.source(x)` the integrand, `rays.radiance(value)` makes
-  radiance of either.
-- `span = marched_steps(rays, view.distance, n, "equiangular")` (`methods/interface/marching.py`)
-  are n steps; the sample at `x = span.place(u)`, u from `span.begin` on, stands for
-  `span.stretch(x) * span.width` metres.
-- `view.visible(view.at(x), light)` asks a shadow ray, and `view.pattern(self.jitter, stream=k)` is
-  a random number for each ray, new in each frame and run; two streams k are independent.
-- The class says what the frame cannot see: `casts_rays = True` if it asks `visible`, `uses_kernel =
-  False` if it leaves `kernel` alone, `noisy = True` if it asks for random numbers (a parameter
-  `jitter` says it too), `by_rays = True` if no ray reads another one's values, `prepared_from` with
-  what its `prepare` looks at.
+    from airlight.realtime.methods.interface.marching import marched_steps
+    from airlight.realtime.methods.interface.method import Method
+
+    @dataclass(frozen=True)
+    class TwoSamples(Method):
+        """Two random samples of each ray and light."""
+
+        name, summary, source = "two-samples", "two samples a ray", "the author"
+        casts_rays, noisy, uses_kernel, by_rays = True, True, False, True
+
+        def airlight(self, view, light, state, kernel):
+            rays = view.lit_by(light)
+            span = marched_steps(rays, view.distance, 2, "equiangular")
+            integral = rays.nothing(dr.width(view.distance))
+            for k in range(2):
+                x = span.place(span.begin + (k + view.pattern("white", stream=k)) * span.width)
+                lit = span.width > 0
+                if view.features.shadows:
+                    lit &= view.visible(view.at(x), light)
+                integral += dr.select(lit, rays.source(x) * span.stretch(x) * span.width, 0)
+            return rays.radiance(integral)
+
+- `airlight` returns the radiance that one light scatters into every ray. `rays.airlight(x0, x1)` is
+  the integral over lit segments [m] by the `kernel` that `view.lit_by` was given, `rays.source(x)`
+  the integrand, and `rays.radiance(value)` makes radiance of either. A parameter is a field of the
+  class.
+- `marched_steps` has n steps of one `width`, which is 0 where the light cannot reach the ray; a
+  sample at x stands for `span.stretch(x) * span.width` metres.
+- `view.visible` asks a shadow ray, where anything can cast a shadow. `view.pattern` is a random
+  number for each ray, white, blue or interleaved, new in each frame and run; two streams are
+  independent.
+- The class says what the frame cannot see: whether it asks `visible`, whether it asks for random
+  numbers, whether it calls a kernel, whether no ray reads another one's values, and, with a
+  `prepare`, what that looks at (`prepared_from`). A method that renders all lights together has a
+  `render` and `at_once = True` in place of `airlight`, as `methods/equi_angular.py` does.
 
 **A new medium** is one file in `scene/media/`, whose page lists what it must answer. Every method
 of fog then renders it.

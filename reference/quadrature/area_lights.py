@@ -48,6 +48,7 @@ from airlight.reference.quadrature.replicates import (
     PointPlan,
     RayPoints,
     Sums,
+    keep_nothing,
     replicate_means,
 )
 from airlight.reference.quadrature.stretches import Terms, cosine_profile, sums_of
@@ -114,7 +115,7 @@ def area_airlight(
     plan: PointPlan,
     shadow_scale: float = 1.0,
     tell: Fraction = lambda fraction: None,
-    keep: Keep = lambda name, work: work(),
+    keep: Keep = keep_nothing,
 ) -> AreaAirlight:
     """Compute the airlight of all area lights along every ray.
 
@@ -291,7 +292,7 @@ def area_surface(
     plan: PointPlan,
     shadow_scale: float = 1.0,
     tell: Fraction = lambda fraction: None,
-    keep: Keep = lambda name, work: work(),
+    keep: Keep = keep_nothing,
 ) -> Array:
     """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3,
     replicates) [W/(m^2 sr)].

@@ -4,7 +4,6 @@
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,10 +111,15 @@ def _of_places(
     profile = terms.profile
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
     # The relative tolerance of the integral of each stretch.
-    how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or 1e-10}
-    ends = x0, np.maximum(x0, x1)
     value, error = height_fog_segments(
-        fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how
+        fog,
+        heights,
+        x0,
+        np.maximum(x0, x1),
+        medium.phase,
+        shadow_scale=terms.shadow_scale,
+        weight=weight,
+        rtol=terms.rtol or 1e-10,
     )
     # The uncertainty of an end is relative to its distance r from the light: the strip there is r
     # edge long, and r times the integrand, which has 1/r^2, gives 1/r.

@@ -10,8 +10,9 @@ finite. Under area lights each replicate also has light samples of its own: its 
 spread of positions and samples.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,12 +87,13 @@ def quadrature_image(
     `shadow_scale` leaves them as they are. A pixel whose centre ray meets a point light has an
     infinite airlight; the mean over its area is finite.
     """
-    how: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale}
+    shapes = read_shapes(reference.occluders)
+    traced = partial(ray_values, checks=checks, shadow_scale=shadow_scale, shapes=shapes)
     if pixel == "area":
-        return _means(reference, tolerance, plan, progress, how)
+        return _means(reference, tolerance, plan, progress, traced)
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; expected 'centre' or 'area'")
-    values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
+    values = traced(reference, progress=progress, plan=plan, keep=keep)
     # Airlight and surface have three columns each; emitted light three, or none.
     layers = np.concatenate(
         [values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1
@@ -114,14 +116,7 @@ def _image(
     are those of the centres.
     """
     shape, checked = (reference.height, reference.width), centre.random_checks
-    extra: dict[str, Any] = {"bound_kind": kind}
-    # Nine columns mean that area lights or a background are seen.
-    extra |= {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
-    if replicates is not None:
-        errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
-        extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
-        extra["replicate_means"] = replicates[:, :6].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
-    return ReferenceImage(
+    image = ReferenceImage(
         layers[:, :3].reshape(*shape, 3),
         bound.reshape(*shape, 3),
         layers[:, 3:6].reshape(*shape, 3),
@@ -133,7 +128,18 @@ def _image(
         checked.disagreements,
         checked.refined,
         checked.left,
-        **extra,
+        # Nine columns mean that area lights or a background are seen.
+        emitted=layers[:, 6:].reshape(*shape, 3) if layers.shape[1] > 6 else None,
+        bound_kind=kind,
+    )
+    if replicates is None:
+        return image
+    errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
+    return replace(
+        image,
+        airlight_se=errors[..., :3],
+        surface_se=errors[..., 3:],
+        replicate_means=replicates[:, :6].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2),
     )
 
 
@@ -142,10 +148,12 @@ def _means(
     tolerance: float,
     plan: PointPlan | None,
     progress: Progress | None,
-    how: dict[str, Any],
+    traced: Callable[..., RayValues],
 ) -> ReferenceImage:
-    """Return the means over the areas of all pixels."""
-    size, shapes = (reference.width, reference.height), read_shapes(reference.occluders)
+    """Return the means over the areas of all pixels; `traced`: `ray_values` with what all rays
+    have in common.
+    """
+    size = reference.width, reference.height
     corner = pixel_centres(size) - 0.5  # of each pixel on the film, in pixels
     sensor = reference.scene.sensors()[0]
     seed = plan.seed if plan is not None else 0
@@ -176,9 +184,7 @@ def _means(
                 seeds = np.random.default_rng((chosen.seed, chosen.most, group[0], first))
                 of_lights = replace(_LIGHTS, seed=int(seeds.integers(1 << 62)))
                 direction = film_directions(sensor, positions, size)
-                ray = ray_values(
-                    replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how
-                )
+                ray = traced(replace(reference, direction=direction), plan=of_lights)
                 emitted = ray.emitted.reshape(len(direction), -1)
                 values = np.concatenate([ray.airlight, ray.surface, emitted], axis=1)
                 parts.append(values.reshape(*square.shape[:3], -1).sum(axis=2))
@@ -194,7 +200,7 @@ def _means(
 
     # Distance and light angle of a pixel are those of its centre. Errors are relative to the means
     # alone: `known` is zero.
-    centre = ray_values(reference, plan=_LIGHTS, shapes=shapes, **how)
+    centre = traced(reference, plan=_LIGHTS)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)
     other_light = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
     means, counts = replicate_means(len(corner), other_light, chosen, sums)

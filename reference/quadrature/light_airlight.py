@@ -2,7 +2,6 @@
 """The airlight of one light along every ray, by the steps of `reference.quadrature.ray_values`."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +48,16 @@ def light_airlight(
     distance: Array,
     *,
     shadow_scale: float = 1.0,
-    **how: Any,
+    checks: int = 32,
+    shapes: Shapes | None = None,
 ) -> LightAirlight:
     """Compute the airlight of one point, spot or directional light along every ray.
 
     `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface,
     (rays,), infinite where there is none [m]; `shadow_scale`: see
-    `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
+    `reference.quadrature.image.quadrature_image`; `checks`, `shapes`: see `lit_rays`.
     """
-    illumination = lit_rays(reference, light, distance, **how)
+    illumination = lit_rays(reference, light, distance, checks=checks, shapes=shapes)
     rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
     if isinstance(light, DirectionalLight):
         strength = light.irradiance

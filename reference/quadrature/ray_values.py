@@ -22,7 +22,6 @@ standard errors.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ from numpy.typing import NDArray
 from airlight.reference.quadrature.area_lights import area_airlight, area_surface, beams_of
 from airlight.reference.quadrature.emission import emitted_light
 from airlight.reference.quadrature.light_airlight import light_airlight
-from airlight.reference.quadrature.replicates import Keep, PointPlan
+from airlight.reference.quadrature.replicates import Keep, PointPlan, keep_nothing
 from airlight.reference.quadrature.sky import sky_light
 from airlight.reference.quadrature.stretches import BoundKind
 from airlight.reference.quadrature.surface import lit_surface, surface_hits
@@ -123,14 +122,15 @@ def ray_values(
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     transitions, reports = 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
-    how = {"checks": checks, "shapes": shapes}
     # Progress counts a step for each light and `_STEPS` for each layer of area lights and for the
     # sky.
     wide_parts = 2 * bool(reference.area) + (reference.sky is not None)
     total = len(reference.lights) + len(reference.directional) + _STEPS * wide_parts
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for number, light in enumerate(lights):
-        received = light_airlight(reference, light, hits.distance, shadow_scale=shadow_scale, **how)
+        received = light_airlight(
+            reference, light, hits.distance, shadow_scale=shadow_scale, checks=checks, shapes=shapes
+        )
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
@@ -140,30 +140,48 @@ def ray_values(
         # off the surface: the surface is lit where such rays say so.
         lit_ends = received.reached
         if shadow_scale != 1 and not isinstance(light, DirectionalLight):
-            what = {"scene": reference.occluders, "shapes": shapes}
-            lit_ends = reached_by_shadow_rays(hits.interaction, light.position, lit_ends, **what)
+            lit_ends = reached_by_shadow_rays(
+                hits.interaction,
+                light.position,
+                lit_ends,
+                scene=reference.occluders,
+                shapes=shapes,
+            )
         reached.append(lit_ends)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(reference, hits, reached=reached, shadow_scale=shadow_scale)
-    wide: dict[str, Any] = {}
+    # Of area lights and the sky: empty arrays in other scenes.
+    emitted, replicates = np.empty((0, 0)), np.empty((0, 0, 0))
     if reference.area or reference.background is not None:
-        wide = {"emitted": emitted_light(reference, hits.distance)}
-    plan = plan or PointPlan()
+        emitted = emitted_light(reference, hits.distance)
+    plan, keep = plan or PointPlan(), keep or keep_nothing
     if reference.area:
         done = total - _STEPS * wide_parts
         tell = partial(_tell, progress, total)
         # Area lights: their samples need the airlight and the surface of all other lights, to which
         # errors are relative.
-        how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | (
-            {"keep": keep} if keep else {}
-        )
         beams = beams_of(reference, hits.distance)
-        scattered = area_airlight(reference, beams, airlight, tell=partial(tell, done), **how_kept)
+        scattered = area_airlight(
+            reference,
+            beams,
+            airlight,
+            tell=partial(tell, done),
+            plan=plan,
+            shadow_scale=shadow_scale,
+            keep=keep,
+        )
         lit = np.zeros_like(scattered.replicates)
         if plan.surfaces:
             lit = area_surface(
-                reference, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept
+                reference,
+                hits,
+                beams,
+                surface,
+                tell=partial(tell, done + _STEPS),
+                plan=plan,
+                shadow_scale=shadow_scale,
+                keep=keep,
             )
         tell(done + 2 * _STEPS, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
@@ -175,7 +193,6 @@ def ray_values(
             bound + scattered.bound,
         )
         reports.append(scattered.random_checks)
-        wide["replicates"] = replicates
     if reference.sky is not None:
         sky = sky_light(
             reference,
@@ -188,9 +205,18 @@ def ray_values(
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
         # Replicates of the sky and of area lights are independent: their sums are replicates of
         # both.
-        wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates
-    checked = RandomChecks.of_all(reports)
-    return RayValues(airlight, bound, surface, cast, light_angle, transitions, checked, **wide)
+        replicates = replicates + sky.replicates if reference.area else sky.replicates
+    return RayValues(
+        airlight,
+        bound,
+        surface,
+        cast,
+        light_angle,
+        transitions,
+        RandomChecks.of_all(reports),
+        emitted,
+        replicates,
+    )
 
 
 def _tell(progress: Progress | None, total: int, done: int, fraction: float) -> None:

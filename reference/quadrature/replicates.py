@@ -70,6 +70,11 @@ REPLICATES = 8  #: independent scramblings
 _AHEAD = 4  # times the points of a pilot: the most that it foresees
 
 
+def keep_nothing(name: str, work: Callable[[], Kept]) -> Kept:
+    """Do a part of the work: the `Keep` that keeps nothing."""
+    return work()
+
+
 @dataclass(frozen=True)
 class PointPlan:
     """How many points stand for a light."""

@@ -114,8 +114,8 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
             raise _refusal(
                 shape,
                 "is not convex",
-                "convex bounds: cut the body into convex parts, or for a cloud take the estimator "
-                "cloud-paths",
+                "convex bounds: cut the body into convex parts; clouds of any shape are for "
+                "`airlight reference --estimator cloud-paths` and methods of clouds",
             )
     if not np.any(sound):
         raise _refusal(shape, "has no volume", "a closed convex mesh")
