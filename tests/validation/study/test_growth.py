@@ -71,7 +71,10 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     study = Study(
         scenes=("sphere-spot",),
         sizes=((24, 18),),
-        configurations=(configuration("light-volumes"), configuration("unshadowed")),
+        configurations=(
+            configuration("ray-march", parameters={"shadow": "map", "steps": 3}),
+            configuration("unshadowed"),
+        ),
         measure=Measure("stages", 0.01),
     )
     found = study_growth(study, "map", steps, progress=lambda *done: told.append(done))
@@ -79,7 +82,7 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     assert (measured.scene, measured.size, measured.label) == (
         "sphere-spot",
         (24, 18),
-        "light-volumes (exact)",
+        "ray-march (shadow=map, steps=3)",
     )
     assert [cost.work for cost in measured.costs] == [128, 256]
     assert all(
