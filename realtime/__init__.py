@@ -77,8 +77,6 @@ that line it is a user's own, `--method FILE.py:Class`:
 
     @dataclass(frozen=True)
     class TwoSamples(Method):
-        """Two random samples of each ray and light."""
-
         name, summary, source = "two-samples", "two samples a ray", "the author"
         casts_rays, noisy, uses_kernel, by_rays = True, True, False, True
 
