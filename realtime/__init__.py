@@ -106,8 +106,9 @@ that line it is a user's own, `--method FILE.py:Class`:
   `prepare`, what that looks at (`prepared_from`). A method that renders all lights together has a
   `render` and `at_once = True` in place of `airlight`, as `methods/equi_angular.py` does.
 
-**A new medium** is one file in `scene/media/`, whose page lists what it must answer. Every method
-of fog then renders it.
+**A new medium** is one file in `scene/media/`, whose page lists what it must answer.
+`dataclasses.replace(scene, medium=...)` puts it in a scene that was read. Every method of fog then
+renders it, except for `light-volumes-2010`, which is of homogeneous fog.
 
 **A new kind of light** is an optional field of `Light` in `scene/lights.py`, whose page says more;
 `rays.py` says how its light falls off, and `scene/read_scene.py` makes it of an emitter.

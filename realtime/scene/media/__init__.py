@@ -3,9 +3,9 @@
 the medium for the rest.
 
 **A new medium** is a frozen dataclass derived from `Medium` whose fields are opaque Dr.Jit arrays
-(`dr.opaque`), `albedo` and `phase` among them. A grey medium that varies derives from
-`VaryingMedium`, which writes `channels`, `vacuum` and `length_of`, and lets all suns in. A medium
-must write
+(`dr.opaque`), `albedo` and `phase` among them. `rays` have an `origin` and a `direction`. A grey
+medium that varies derives from `VaryingMedium`, which writes `channels`, `vacuum` and `length_of`,
+and lets all suns in. A medium must write
 
 - `channels` and `vacuum`: one extinction or three, and whether a ray can leave the medium without
   end; False where `part` gives every ray an end;
@@ -15,9 +15,12 @@ must write
 - `longest(rays, light, x, change)`: a length from x on in which both depths and the logarithm of
   the extinction change by no more than a number together; an extinction that is linear between
   bends needs no share in it, even where it begins at 0;
-- `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any;
-- `length_of(depth)`: after which length no uniform step is needed; where it is infinite, `part`
-  too: from where to where a ray has extinction;
+- `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any; a place
+  that a ray never meets may be infinite or NaN;
+- `length_of(depth)`: after which length no uniform step is needed; where it is infinite,
+  `part(rays, x0, x1, *, uniform)` too: from where to where a ray has extinction, 0 and 0 where it
+  has none. With `uniform` the part has an end even where x1 is infinite, such as after
+  `OPTICAL_REACH` optical depths. `longest` and `bends` are asked for what `part` leaves;
 - `thicker(factor)`: itself, with more extinction.
 
 With these every method of lit intervals, the marchers, soft shafts, froxels, surfaces and user
@@ -28,7 +31,8 @@ density ramp. It may write, because it knows better,
 - `lit`: rays with a light, a class derived from `LitRays` with its own `airlight(x0, x1)`, a closed
   form or a kernel (`realtime.kernels` are those of the homogeneous medium), or its own `panel`,
   which shares work between nodes;
-- `check_beam`: which lights at infinity it lets in;
+- `check_beam(axis, name)`: which lights at infinity it lets in, by an InputError for others; the
+  axis is on the host, along the light;
 - `depth_to_light`: of whole paths from points to a light;
 - `rays`: what is found once for a ray, such as where it enters and leaves parts of the medium,
   for `Rays.crossed`;
