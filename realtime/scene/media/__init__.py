@@ -15,8 +15,8 @@ and lets all suns in. A medium must write
 - `longest(rays, light, x, change)`: a length from x on in which both depths and the logarithm of
   the extinction change by no more than a number together; an extinction that is linear between
   bends needs no share in it, even where it begins at 0;
-- `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any; a place
-  that a ray never meets may be infinite or NaN;
+- `bends(rays, light)`: where along rays the extinction or a depth has a kink, if it has any; a
+  place that a ray never meets may be infinite or NaN;
 - `length_of(depth)`: after which length no uniform step is needed; where it is infinite,
   `part(rays, x0, x1, *, uniform)` too: from where to where a ray has extinction, 0 and 0 where it
   has none. With `uniform` the part has an end even where x1 is infinite, such as after
