@@ -214,7 +214,10 @@ class PieceRays(LitRays):
             steepness, smooth = path.steepness(lines, start.x, start.r)
             rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
             bending = dr.maximum(bending, 1 / smooth)
-        return dr.maximum(rate * (1 / CHANGE), bending)
+        # Paths along a facet change without limit where they pass its edge: a panel shorter than a
+        # rounding error of x would end where it begins.
+        least = beyond(start.x) - start.x
+        return dr.minimum(dr.maximum(rate * (1 / CHANGE), bending), dr.rcp(least))
 
 
 def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:

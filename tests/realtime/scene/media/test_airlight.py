@@ -15,7 +15,7 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
-from airlight.validation.scenes.meshes import gem, icosphere, placed, prism, rotation
+from airlight.validation.scenes.meshes import box, gem, icosphere, placed, prism, rotation
 from airlight.validation.scenes.parts import medium_boundary
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import airlight_sum, frames
@@ -62,6 +62,27 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32
     # rays near an edge lose more.
     assert relative_rmse(airlight, expected) < (1e-6 if precision == "double" else 1e-5)
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_a_body_cut_in_two_along_the_light_is_one(variant, precision):
+    """Light paths run along the facets between both halves, all but parallel to them."""
+    light, sides = sun((5e-7, 0.0, -1.0)), np.array([0.8, 1.1, 1.4])
+
+    def body(name, at, wide):
+        mesh = placed(box(tuple(sides * (wide, 1, 1))), (at, 0.5, 0.8))
+        medium = {"type": "homogeneous", "sigma_t": 1.1}
+        return {name: medium_boundary(name, mesh, medium)}
+
+    def airlight(**bodies):
+        return render(
+            read(clear_scene(lamp=light, **bodies), precision), precision=precision
+        ).airlight
+
+    halves = airlight(**body("left", 0.3, 1), **body("right", 1.1, 1))
+    assert relative_rmse(halves, airlight(**body("whole", 0.7, 2))) < (
+        1e-9 if precision == "double" else 1e-5
+    )
 
 
 def under_lamp(*position):
