@@ -104,6 +104,8 @@ def certified(
     # a ray is not checked.
     finite = np.isfinite(x)
     ray, fraction, x = ray[finite], fraction[finite], x[finite]
+    if not len(ray):
+        return lit
     # Ends and places as fractions of the checked range. The number 2 ray + fraction orders the
     # places of all rays at once: the last interval that begins before a place, and the next one,
     # are the only ones that can hold the place or have an edge beside it.

@@ -196,6 +196,19 @@ def test_the_certificate_is_clean_and_notices_a_fault(variant):
 
 
 @pytest.mark.claim("shadow-ray-certificate")
+@pytest.mark.parametrize("z", [5.0, -1.0], ids=["behind a wall", "behind the camera"])
+def test_an_image_of_one_ray_along_the_line_of_the_light_is_not_checked(variant, z):
+    wall = Shapes(np.array([[[-9.0, -9, 2], [9.0, -9, 2], [0.0, 9, 2]]]))
+    light, direction, distance = np.array([0.0, 0.0, z]), np.array([[0.0, 0, 1]]), np.array([2.0])
+    known = obstacles_of(wall, Ball(light), np.zeros(3), direction, distance)
+    rays = rays_at(np.zeros(3), direction, light)
+    lit = lit_intervals(rays, (np.zeros(1), distance), known)
+    assert lit.random_checks.checked == 0
+    # The wall ends the ray, before it or behind it no shape is in the light that comes this way.
+    assert reaches(lit, distance).tolist() == [z < 0]
+
+
+@pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
     reference, rays, _, _ = setup(box_scene())
     light = reference.lights[0]
