@@ -81,6 +81,22 @@ def test_points_follow_the_error_that_is_asked_for():
         assert (standard_error(means)[:3] <= error * means.mean(axis=2)[:3]).all()
 
 
+def test_a_ray_that_meets_a_point_light_takes_no_points_from_the_others():
+    place = np.linspace(-1, 1, REPLICATES)
+
+    def sums(part, plan, active):
+        some = 10.0 * plan.most + 25 * place * plan.most**-0.25
+        return np.broadcast_to(some, (len(active), 3, REPLICATES))
+
+    plan = PointPlan(error=1e-3, first=16, most=256)
+    known = np.zeros((4, 3))
+    _, expected = replicate_means(4, known, plan, sums)
+    known[0] = np.inf
+    _, counts = replicate_means(4, known, plan, sums)
+    assert expected[0] > plan.first
+    assert counts[1:].tolist() == expected[1:].tolist()
+
+
 @pytest.mark.parametrize(
     "plan", [PointPlan(), PointPlan(first=4, most=128), PointPlan(error=0.0, first=4, most=4)]
 )
