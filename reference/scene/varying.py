@@ -10,9 +10,9 @@ for itself what follows from them.
 voxels, (i + 1/2)/n of the box of `to_world`. Between centres the extinction is trilinear, in the
 outer half voxels constant across the faces, beyond the box 0. Mitsuba tells Python the values and
 the box of the volume, and not which side of the box is which axis of the grid. Extinctions at
-random places are therefore compared with Mitsuba's for each way in which the grid can lie in the
-box, mirrored and turned by right angles. One must agree, so that no other filter, wrap mode or
-transform is taken for this.
+random places, most of them in dense voxels, are therefore compared with Mitsuba's for each way in
+which the grid can lie in the box, mirrored and turned by right angles. One must agree, so that no
+other filter, wrap mode or transform is taken for this.
 """
 
 from collections.abc import Iterator
@@ -170,8 +170,16 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
         largest=largest,
         plugin=medium,
     )
-    # Mitsuba's extinctions at 512 random places in the box.
-    fraction = np.random.default_rng(1).random((512, 3))
+    # Mitsuba's extinctions at random places in the box: 512 even ones, and, since a grid may be empty
+    # nearly everywhere, 64 in voxels that are drawn by their values, wherever a way puts these.
+    random = np.random.default_rng(1)
+    even = random.random((512, 3))
+    voxel = random.choice(values.size, 64, p=values.ravel() / values.sum())
+    dense = np.stack(np.unravel_index(voxel, values.shape), axis=1) + random.random((64, 3))
+    dense /= values.shape
+    ends = product((0.0, 1.0), repeat=3)
+    ways = [np.abs(end - dense[:, order]) for end, order in product(ends, permutations(range(3)))]
+    fraction = np.concatenate([even, *ways])
     interaction = dr.zeros(mi.MediumInteraction3f, len(fraction))
     interaction.p = mi.Point3f((low + fraction * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]

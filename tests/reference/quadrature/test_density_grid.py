@@ -174,6 +174,16 @@ def test_a_shape_that_holds_the_box_bounds_nothing(reference, tmp_path, size):
         read_reference(load_scene(str(path)).scene)
 
 
+SPIKE = np.zeros((24, 25, 26), np.float32)
+SPIKE[2, 3, 4] = 1.0
+
+
+@pytest.mark.claim("density-grid-reference", tolerance="none: the same voxel")
+def test_a_grid_that_is_empty_but_for_a_voxel_lies_as_mitsuba_puts_it(reference):
+    scene = reference(LAMP, values=SPIKE, turn='<scale x="-1"/>')
+    assert np.argwhere(scene.medium.values > 0).tolist() == [[2, 3, 21]]
+
+
 @pytest.mark.claim("density-grid-reference", tolerance="1e-12 relative: rounding")
 def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     count = 8
@@ -198,6 +208,10 @@ def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     ("how", "words"),
     [
         ({"more": '<string name="filter_type" value="nearest"/>'}, "filter_type 'trilinear'"),
+        (
+            {"values": SPIKE, "more": '<string name="filter_type" value="nearest"/>'},
+            "filter_type 'trilinear'",
+        ),
         ({"more": '<string name="wrap_mode" value="repeat"/>'}, "wrap_mode 'clamp'"),
         ({"turn": '<rotate z="1" angle="30"/>'}, "turns by right angles"),
         ({"values": np.repeat(ROUGH[..., None], 3, axis=3)}, "a grid of 3 channels"),
