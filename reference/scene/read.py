@@ -122,6 +122,10 @@ def read_reference(scene) -> ReferenceScene:
     if not scene.sensors():
         raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
+    if sensor.class_name() != "PerspectiveCamera":
+        raise InputError(
+            f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
+        )
     width, height = (int(n) for n in sensor.film().size())
     # Emitters by how they shine: around the scene, from a direction, from an area, from a place.
     background = _background(scene)

@@ -111,6 +111,8 @@ BOTH = [
         "'ball' bounds a medium and has a SmoothDielectric",
     ),
     (lambda: tiny_scene(**without_medium()), "the camera references no medium"),
+    (lambda: tiny_scene(sensor={"type": "thinlens", "aperture_radius": 0.1}), "ThinLens"),
+    (lambda: tiny_scene(sensor={"type": "orthographic"}), "Orthographic"),
     (clear_scene, "the camera references no medium"),
     (lambda: holding(around_the_camera()), "the camera is inside of shape 'puff'"),
     (lambda: holding(CUBE, exterior=FOG), "exterior medium of shape 'puff'"),
@@ -174,7 +176,6 @@ NUMBERS = [
 #: Scenes that only the methods refuse.
 METHODS = [
     (lambda: ball(**CLEAR), "'ball' is transparent and bounds no medium"),
-    (lambda: tiny_scene(sensor={"type": "thinlens", "aperture_radius": 0.1}), "ThinLens"),
     (lambda: mesh(BOX[0] * (1, 1, 0), BOX[1]), "has no volume|not a closed"),
 ]
 REFERENCE = [
