@@ -95,6 +95,7 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
         EOFError,
         AttributeError,
         TypeError,
+        RuntimeError,  # of an archive that seems encrypted, or compressed in an unknown way
         zipfile.BadZipFile,
         zlib.error,
     ):

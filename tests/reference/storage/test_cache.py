@@ -134,6 +134,13 @@ def archive(path, change):
     np.savez(path, **arrays)
 
 
+def flip(path, place, bits):
+    """Flip bits of the last entry in an archive's list of its files."""
+    content = bytearray(path.read_bytes())
+    content[content.rindex(b"PK\x01\x02") + place] ^= bits
+    path.write_bytes(bytes(content))
+
+
 DAMAGES = {
     "empty": lambda path: path.write_bytes(b""),
     "cut in the middle": lambda path: path.write_bytes(path.read_bytes()[:4000]),
@@ -141,6 +148,10 @@ DAMAGES = {
     "a flipped bit": lambda path: path.write_bytes(
         bytes(b ^ (k == 4000) for k, b in enumerate(path.read_bytes()))
     ),
+    # The words of the archive about its last array, by their places from the mark of its entry on.
+    "another compression": lambda path: flip(path, 10, 1),
+    "a newer version": lambda path: flip(path, 6, 64),
+    "as if encrypted": lambda path: flip(path, 8, 1),
     "text": lambda path: path.write_text("no archive\n" * 100),
     # Loading a pickle would run what a stranger wrote into the cache.
     "a pickle": lambda path: np.savez(path, a=np.array([{"code": 1}], dtype=object)),
