@@ -117,7 +117,9 @@ def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator
     target = ensure_writable(path)
     sweep_hidden(target.parent)
     # Not tempfile's: its files are readable by their owner alone and would stay so.
-    temporary = target.with_name(f".{target.stem[:100]}-{uuid.uuid4().hex}{target.suffix}")
+    # Systems count the bytes of a name, of which a letter has up to four.
+    stem = os.fsdecode(os.fsencode(target.stem)[:100])
+    temporary = target.with_name(f".{stem}-{uuid.uuid4().hex}{target.suffix}")
     try:
         yield temporary
         if flush:

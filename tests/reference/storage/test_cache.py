@@ -51,6 +51,12 @@ def test_an_exception_leaves_the_old_file_and_nothing_else(tmp_path, kind):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_name_may_have_as_many_bytes_as_the_system_allows(tmp_path):
+    path = tmp_path / f"{chr(0x96FE) * 80}.txt"  # three bytes each
+    write_text(path, "fog")
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.claim("files-whole-or-not-at-all")
 def test_a_killed_process_leaves_the_old_file_and_what_it_left_is_swept(tmp_path):
     path = tmp_path / "old.txt"
