@@ -343,9 +343,9 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
                 f"layers of two sizes: '{first}' {layers[first].shape}, '{name}' {values.shape}"
             )
     if "airlight" in layers:
-        total = (
-            layers["airlight"] + layers["surface"] if "surface" in layers else layers["airlight"]
-        )
+        total = layers["airlight"]
+        if "surface" in layers:
+            total = _float32(total.astype(np.float64) + layers["surface"], TOTAL)
         # A total read from a file is the same sum; one that is not is a stale or foreign one.
         given = layers.get(TOTAL, total)
         if not np.allclose(given, total, rtol=1e-5, atol=0, equal_nan=True):

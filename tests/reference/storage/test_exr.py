@@ -79,6 +79,13 @@ def test_what_is_not_finite_is_not_written(tmp_path, odd, layer):
     write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))
 
 
+def test_a_total_that_float32_does_not_hold_is_not_written(tmp_path):
+    large = np.full((1, 1, 3), 3e38)
+    with pytest.raises(InputError, match="3 values of 'total' exceed what float32 holds"):
+        write_exr(tmp_path / "a.exr", Image({"airlight": large, "surface": large}))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_attributes_keep_their_value(tmp_path):
     attributes = {
         "airlight:seed": 2**40 + 1,  # beyond the 32 bits of the format
