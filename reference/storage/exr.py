@@ -494,7 +494,10 @@ def _image(
         name, _, suffix = key.rpartition(".")
         groups.setdefault(name, {})[suffix] = key
     layers, used, grey = {}, set(), []
-    for name, group in groups.items():
+    # Plain channels come first: a layer that is called `total` beside them is left out.
+    for name, group in sorted(groups.items()):
+        if (name or TOTAL) in layers:
+            continue
         # Some programs write r, g, b or Red, Green, Blue.
         colours = {
             _COLOURS[suffix.lower()]: key

@@ -212,6 +212,16 @@ def write_parts(path, parts):
     )
 
 
+def test_plain_channels_are_the_total_whatever_layer_has_that_name(tmp_path):
+    channels = {f"total.{key}": np.full((2, 2), 5, np.float32) for key in "RGB"}
+    channels |= {key: np.ones((2, 2), np.float32) for key in "RGB"}
+    write_parts(tmp_path / "a.exr", [("", {}, channels)])
+    image = read_exr(tmp_path / "a.exr")
+    assert list(image.layers) == ["total"]
+    assert image.layers["total"].tolist() == np.ones((2, 2, 3)).tolist()
+    assert image.attributes["airlight:read"] == "channels left out: total.B, total.G, total.R"
+
+
 @pytest.mark.claim("image-parts", tolerance="none: equal")
 def test_reads_the_parts_of_a_file(tmp_path):
     """Blender names the layer in the channel, others in the part alone; a part named rgba is the
