@@ -475,6 +475,11 @@ def _read_light(emitter) -> ReferenceLight:
     parameters = mi.traverse(emitter)
     matrix = matrix_of(emitter.world_transform())
     spot = name == "SpotLight"
+    # With a texture its value on the axis would stand for all of the cone.
+    if spot and "texture.value" not in parameters:
+        raise InputError(
+            f"light '{emitter.id()}' has a texture; expected one intensity: remove the texture"
+        )
     if spot and stretch(matrix) - 1 > SAME:
         raise InputError(
             f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} "

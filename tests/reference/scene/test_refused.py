@@ -157,6 +157,7 @@ BOTH = [
         "light 'lamp'.* bounds a medium",
     ),
     (lambda: lit("rectangle", **radiance(texture())), "light 'lamp'.* textur"),
+    (lambda: tiny_scene(lamp=spot() | {"texture": texture()}), "light 'lamp' .*has a texture"),
 ]
 #: Numbers that are refused before either side reads a scene, and by both sides.
 NUMBERS = [
