@@ -52,6 +52,7 @@ from airlight.validation.motion.lag import SURE, Lag
 from airlight.validation.motion.measures import AGES, Measures, Sequence, measure
 from airlight.validation.scenes.changes import move_shapes, shift_film
 from airlight.validation.scenes.loading import load_scene
+from airlight.validation.statistics.comparison import check_margin
 from airlight.validation.statistics.estimate import Answer, Estimate, fact
 from airlight.validation.statistics.samples import UNTOLD_SERIES
 
@@ -157,6 +158,7 @@ def compare_frames(
     """
     # The first file says which layer is judged and what a pixel of it is. All other files must
     # agree with it. A size that the scene cannot have is refused before anything is computed.
+    check_margin(margin)
     record = read_frames(about)
     paths = frame_paths(pattern, record, str(about))
     first = read_exr(paths[0])

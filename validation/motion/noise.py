@@ -60,6 +60,7 @@ from airlight.validation.engine.seen import expected_layer, judged_layer, pixel_
 from airlight.validation.estimates.quadrature import known_to, known_words
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
 from airlight.validation.motion.lag import SURE
+from airlight.validation.statistics.comparison import check_margin
 from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
 from airlight.validation.statistics.samples import (
     first_equal,
@@ -109,6 +110,15 @@ class Noise:
         root = math.sqrt(variance)
         return Estimate(root, None if error is None else error / (2 * root), self.variance.kind)
 
+    @property
+    def lacks_values(self) -> bool:
+        """Whether rare values may be missing, so that the interval of the bias may not hold."""
+        # A value of more than 1 % of the sum of squares: see the module. A bias towards that value
+        # stands nevertheless.
+        low, high = self.bias_ci
+        towards = min(low * self.largest_deviation, high * self.largest_deviation) > 0
+        return self.largest_fraction > 0.01 and not towards
+
     def words(self) -> str:
         """Return the verdict on bias and noise."""
         low, high = (100 * end for end in self.bias_ci)
@@ -120,12 +130,7 @@ class Noise:
                 "them have another "
                 "error; expected renders with different seeds and no history"
             )
-        # A value of more than 1 % of the sum of squares: the interval may not hold, see the
-        # module. A bias towards that value stands nevertheless.
-        if (
-            self.largest_fraction > 0.01
-            and not min(low * self.largest_deviation, high * self.largest_deviation) > 0
-        ):
+        if self.lacks_values:
             kind = "brighter" if self.largest_deviation > 0 else "darker"
             return (
                 "whether there is a bias cannot be told: one value has "
@@ -403,6 +408,7 @@ def compare_runs(
     `validation.engine.judge.compare_scene`. Where files do not say what a pixel is, the kind that
     fits their mean is taken.
     """
+    check_margin(margin)
     paths = run_paths(pattern)
     images = [read_exr(path) for path in paths]
     layers = [
@@ -446,7 +452,9 @@ def compare_runs(
             else f" and {len(noise.correlated) - _NAMED} more pairs"
         )
         notes.append(f"the noise of {pairs}{more} is correlated: they are no independent renders")
-    if margin is not None and (noise.correlated or max(map(abs, noise.bias_ci)) > margin):
+    # An interval that may not hold shows nothing.
+    doubtful = bool(noise.correlated) or noise.lacks_values
+    if margin is not None and (doubtful or max(map(abs, noise.bias_ci)) > margin):
         failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
     return NoiseComparison(
         scene=loaded.name,

@@ -12,6 +12,7 @@ from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.columns import plain
 from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.motion.blocks import parts_of_error
+from airlight.validation.motion.judge import compare_frames
 from airlight.validation.motion.noise import Noise, compare_runs, detectable, measure_noise
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.estimate import Answer
@@ -219,3 +220,26 @@ def test_renders_of_a_scene_from_files(variant, tmp_path):
         compare_runs("open-fog", tmp_path / "###.exr")
     with pytest.raises(InputError, match="all are the same"):
         measure_noise(REFERENCE, [REFERENCE, REFERENCE])
+
+
+def test_a_margin_is_not_kept_by_an_interval_that_may_not_hold(variant, tmp_path):
+    """One value has most of the variance: the verdict could not tell a bias, and the margin of
+    100 % was kept.
+    """
+    exact = reference_image(load_scene("open-fog", (16, 12)).scene).airlight
+    random = np.random.default_rng(9)
+    for run in range(6):
+        noisy = exact + 1e-3 * exact.mean() * random.normal(size=exact.shape)
+        noisy[5, 5] += 3 * exact.mean() * (run == 2)
+        write_exr(tmp_path / f"{run}.exr", Image({"airlight": noisy}))
+    found = compare_runs("open-fog", tmp_path / "#.exr", pixel="centre", margin=1.0)
+    assert "cannot be told" in found.noise.verdict
+    assert max(map(abs, found.noise.bias_ci)) < 1.0
+    assert found.failures == ("the relative bias is not shown to be within +-1",)
+
+
+@pytest.mark.parametrize("margin", [0.0, -0.01, math.nan])
+def test_a_margin_that_nothing_keeps_or_misses_is_refused(margin):
+    for compare, about in ((compare_runs, ()), (compare_frames, ("frames.json",))):
+        with pytest.raises(InputError, match="margin: got"):
+            compare("open-fog", "#.exr", *about, margin=margin)
