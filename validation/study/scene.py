@@ -445,14 +445,14 @@ def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> K
         row = record_of(row, Row)  # without numbers that are not finite
         return Judged(row, None if frame is None else layered_frame(study.name, chosen, frame))
 
-    return stored(inputs, compute, Judged, _is_worth)
+    return stored(inputs, compute, Judged, lambda judged: _is_worth(judged.row))
 
 
-def _is_worth(judged: Judged) -> bool:
+def _is_worth(row: Row) -> bool:
     """Return whether a row is to be cached: a fault of the user's method may
     have gone by the next run.
     """
-    return judged.row.kind == "built-in" or judged.row.status == "done"
+    return row.kind == "built-in" or row.status == "done"
 
 
 def scene_times(
@@ -461,11 +461,13 @@ def scene_times(
     """Return the times of all cells of a scene, of one run; `rows`: what came of them,
     as not all can be timed.
     """
-    return stored(inputs, partial(_scene_times, study, rows, apart), list[CellTimes], _all_timed)
+    compute = partial(_scene_times, study, rows, apart)
+    return stored(inputs, compute, list[CellTimes], partial(_all_timed, rows))
 
 
-def _all_timed(timings: Sequence[CellTimes]) -> bool:
-    return not any(each.lost for each in timings)
+def _all_timed(rows: Sequence[Row], timings: Sequence[CellTimes]) -> bool:
+    """Return whether times are to be cached: a row that is tried again lacks its times."""
+    return all(map(_is_worth, rows)) and not any(each.lost for each in timings)
 
 
 def _scene_times(study: SceneStudy, rows: Sequence[Row], apart: Apart | None) -> list[CellTimes]:

@@ -5,8 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from airlight.validation.study.scene import open_scene
-from airlight.validation.study.study import standard_study
+import airlight.validation.study.scene as studies
+from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.run import cell_row
+from airlight.validation.study.scene import TimesInputs, open_scene, scene_times
+from airlight.validation.study.study import Cell, standard_study
+from airlight.validation.study.turns import CellTimes
 
 
 @pytest.mark.claim("report-kept")
@@ -20,3 +24,21 @@ def test_rows_hang_on_the_number_of_light_samples_of_their_reference(variant):
     ]
     assert len({study.reference_inputs.key for study in studies}) == 3
     assert len({study.inputs(study.configurations[0]).key for study in studies}) == 3
+
+
+@pytest.mark.claim("report-kept")
+def test_times_are_kept_only_with_those_of_a_method_that_is_tried_again(monkeypatch, own_cache):
+    """A user's method failed once; it was rendered in the next report, and never had times."""
+    asked = []
+
+    def timed(study, rows, apart):
+        asked.append([row.status for row in rows])
+        return [CellTimes(prepare_ms=1.0 if row.status == "done" else None) for row in rows]
+
+    monkeypatch.setattr(studies, "_scene_times", timed)
+    cell = Cell("open-fog", (8, 6), (), Configuration("own.py:fog"))
+    inputs = TimesInputs((cell,), ((),), {})
+    for status in ("refused", "done", "done"):
+        kept = scene_times(None, inputs, [cell_row(cell, status=status)], None)
+    assert asked == [["refused"], ["done"]]
+    assert kept.value[0].prepare_ms == 1.0
