@@ -178,11 +178,14 @@ def monte_carlo_batches(
                 asked = seeds[0] + max(at_once, len(seeds))
                 wanted = range(seeds[0], min(first_seed + batches, asked))
                 waited = stopwatch()
-                for batch, spent in bring([seed for seed in wanted if not _has(folder, seed)]):
+                lacking = [seed for seed in wanted if not _has(folder, seed)]
+                # Batches of the cache are done, too; those of earlier rounds are among them.
+                here = seeds[0] - first_seed + len(wanted) - len(lacking)
+                for number, (batch, spent) in enumerate(bring(lacking), 1):
                     _store(folder, batch, spent)
                     tally["brought"] += 1
                     if progress is not None:
-                        progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
+                        progress(here + number, batches, estimator)
                 add_spent(Spent() - waited())  # what they spent counts, when their batches are read
             # Blocks are added up in the order of their seeds, so that the sum does not depend on
             # the cache.
