@@ -41,7 +41,6 @@ from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.parameters import defaults
 from airlight.validation.readers import (
     Reader,
-    by_name,
     each_once,
     read_list,
     read_named,
@@ -80,6 +79,8 @@ _FOLDER = Path(__file__).parent / "studies"
 _METHOD_SETS = ("all", "quick", "standard", "growth", "causes", "noise", "motion")
 _LONGEST = 86400.0
 _MOST_SCENES = 10_000_000
+_MOST_SAMPLES = 256  # a pixel in a batch (DESIGN section 6.2)
+_MOST_RAYS = 1 << 20  # see `validation.kernels.rays`
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,10 @@ class Study(Settings):
         size, checked = (
             (width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size)
         )
-        samples = {**self.checks.samples, "volpath": 4 * self.checks.samples["volpath"]}
+        samples = {
+            name: (4 if name == "volpath" else 1) * count
+            for name, count in self.checks.samples.items()
+        }
         return replace(
             self,
             sizes=(size,),
@@ -257,6 +261,12 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
     if "timed" in given and times != "alone":
         raise InputError(
             f'timed: it is of times = "alone", got times = "{times}"; leave one of them out'
+        )
+    paths = given.get("checks", Checks()).samples.get("volpath", 0)
+    if given.get("half") and 4 * paths > _MOST_SAMPLES:
+        raise InputError(
+            f"checks.samples.volpath: got {paths}, expected at most {_MOST_SAMPLES // 4} beside "
+            "`half`, whose scenes have four times as many"
         )
     scenes = data.get("scenes", [])
     one = partial(_scene, folder=folder)
@@ -440,13 +450,17 @@ def _size(what: str, value: Any) -> tuple[int, int]:
 
 def _flip(what: str, value: Any) -> str:
     words = {True: "all", False: "none", "kinds": "kinds"}
-    if value not in words:
+    if not isinstance(value, bool | str) or value not in words:
         raise InputError(f'{what}: got {value!r}, expected true, false or "kinds"')
     return words[value]
 
 
 def _pair(what: str, value: Any) -> tuple[int, ...]:
-    return tuple(read_number(what, each, 1, 1 << 16) for each in read_list(what, value, 2)[:2])
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"{what}: got {value!r}, expected two whole numbers")
+    # A standard error needs two batches.
+    batches, samples = value
+    return read_number(what, batches, 2, 1 << 16), read_number(what, samples, 1, _MOST_SAMPLES)
 
 
 def _checks(what: str, value: Any) -> Checks:
@@ -456,6 +470,12 @@ def _checks(what: str, value: Any) -> Checks:
             f"{what}: margins and samples name other estimators; name the same in both"
         )
     return checks
+
+
+def _by_estimator(read: Reader) -> Reader:
+    """Return a reader of values by the estimators that can check a reference."""
+    names = dict.fromkeys(Checks().margins, read)
+    return lambda what, value: read_named(f"{what}.", read_table(what, value), names)
 
 
 _seconds = partial(read_number, least=0, most=_LONGEST, whole=False)
@@ -474,7 +494,7 @@ _STUDY: Mapping[str, Reader] = {
     "limit": partial(read_number, least=1e-3, most=_LONGEST, whole=False),
     "retries": partial(read_number, least=0, most=100),
     "checks": _checks,
-    "stability": _count,
+    "stability": partial(read_number, least=0, most=_MOST_RAYS),
     "growth": several(partial(read_one_of, names=GROWTH), 0),
 }
 _MEASURE: Mapping[str, Reader] = {
@@ -492,8 +512,8 @@ _RANDOM: Mapping[str, Reader] = {
 }
 _CHECKS: Mapping[str, Reader] = {
     "size": _size,
-    "margins": by_name(partial(read_number, least=0, most=1, whole=False)),
-    "samples": by_name(partial(read_number, least=1, most=256)),
+    "margins": _by_estimator(partial(read_number, least=1e-9, most=1, whole=False)),
+    "samples": _by_estimator(partial(read_number, least=1, most=_MOST_SAMPLES)),
     "batches": partial(read_number, least=2, most=1 << 16),
     "multiple": _pair,
     "patience": _seconds,

@@ -187,6 +187,12 @@ def test_every_combination_is_a_cell():
     assert {cell.medium for cell in cells} == {(), ("medium.sigma_t=0.17",)}
 
 
+def test_a_scene_at_half_the_width_may_be_checked_by_one_estimator():
+    one = {"margins": {"single-scatter": 0.01}, "samples": {"single-scatter": 8}}
+    study = parse_study({"scenes": ["fence"], "half": ["fence"], "checks": one})
+    assert study.of("fence").checks.samples == {"single-scatter": 8}
+
+
 def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
     (tmp_path / "hall.xml").write_text("<scene/>")
     (tmp_path / "study.toml").write_text(
@@ -229,6 +235,20 @@ def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
             "media: got 'light.intensity', expected medium.sigma_t",
         ),
         ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
+        ({"flip": [True]}, "flip: got .True., expected true, false"),
+        ({"flip": 1}, "flip: got 1, expected true, false"),
+        ({"stability": 2_000_000}, "stability: got 2000000, expected .* to 1.04858e.06"),
+        (
+            {"checks": {"margins": {"singlescatter": 0.01}, "samples": {"singlescatter": 8}}},
+            "got checks.margins.singlescatter, expected .* did you mean 'single-scatter'",
+        ),
+        ({"checks": {"margins": {"volpath": 0}}}, "margins.volpath: got 0, expected a number from"),
+        ({"checks": {"multiple": [8, 4, 2]}}, "multiple: got .8, 4, 2., expected two"),
+        ({"checks": {"multiple": [1, 4]}}, "multiple: got 1, expected a whole number from 2"),
+        (
+            {"half": ["fence"], "checks": {"samples": {"single-scatter": 128, "volpath": 128}}},
+            "checks.samples.volpath: got 128, expected at most 64 beside `half`",
+        ),
     ],
 )
 def test_mistakes_are_refused_by_name(data, message):
