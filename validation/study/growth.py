@@ -51,6 +51,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
 from airlight.errors import InputError
+from airlight.realtime.methods.shader.source import is_shader
 from airlight.realtime.scene.animate import turned_light
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles, scene_of
@@ -106,7 +107,8 @@ def _sizes(name: str, size: tuple[int, int]) -> list[Step]:
     width, height = size
     factors = (0.5, 1, 2, 4)  # of each side
     sizes = [(max(1, round(width * factor)), max(1, round(height * factor))) for factor in factors]
-    return [Step(at[0] * at[1], partial(_read, name, at)) for at in sizes]
+    # Half of one pixel is one pixel, too: a step has more work than the one before.
+    return [Step(at[0] * at[1], partial(_read, name, at)) for at in dict.fromkeys(sizes)]
 
 
 def _read(name: str, size: tuple[int, int]) -> Scene:
@@ -252,8 +254,15 @@ def study_growth(
 
     Methods take turns in each step; steps follow one another, as their scenes are too large to be
     loaded together. The anchor of all steps says whether the machine changed between them. A method
-    ends at the first step that it refuses.
+    ends at the first step that it refuses. Raises InputError for a shader, of which OpenGL times
+    the passes alone, and no frame after anything moved.
     """
+    for chosen in study.configurations:
+        if is_shader(chosen.method):
+            raise InputError(
+                f"scaling: {chosen.method} is a shader, whose frames are timed only while nothing "
+                "moves; expected methods of Python"
+            )
     # `rows`: for each configuration a row of each step, until it refuses one.
     name, rows, runs = (
         study.scenes[0],

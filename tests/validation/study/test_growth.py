@@ -14,7 +14,7 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.clock import peak_memory
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.meshes import rotation
-from airlight.validation.study.configuration import configuration
+from airlight.validation.study.configuration import Configuration, configuration
 from airlight.validation.study.growth import (
     growth,
     ladder,
@@ -63,6 +63,20 @@ def test_a_jump_is_a_cliff():
 def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):
     with pytest.raises(InputError, match=why):
         ladder(kind, scene, (24, 18))
+
+
+def test_each_step_has_more_work_than_the_one_before():
+    """One pixel had two steps of one pixel, and its exponent was a division by zero."""
+    works = [step.work for step in ladder("size", "open-fog", (1, 1))]
+    assert works == [1, 4, 16]
+    assert growth("size", "frame", works, works).exponent == pytest.approx(1)
+
+
+def test_a_shader_is_refused_before_anything_is_timed():
+    """It has no time of a frame after the light moved: the study ended with a KeyError."""
+    study = Study(scenes=("open-fog",), configurations=(Configuration("fog.glsl"),))
+    with pytest.raises(InputError, match=r"fog\.glsl is a shader"):
+        study_growth(study, "size", ladder("size", "open-fog", (4, 3)))
 
 
 def test_a_study_measures_every_step_and_says_who_refuses(variant):
