@@ -289,7 +289,7 @@ def integrals(
         read = replace(read, value=certified(read)[0])
     found = Integrals(
         name="integrals",
-        data=summary(read, J),
+        data=summary(read, J, precision),
         J=_sealed(J, shape),
         value=None if read.value is None else _sealed(read.value, shape),
         kernel=named,

@@ -153,9 +153,9 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
         )
 
 
-def summary(cases: Cases, results: Array) -> dict[str, Any]:
-    """Return quantiles of the relative error of results, (n,) [1/m],
-    where the cases have values.
+def summary(cases: Cases, results: Array, precision: str = "single") -> dict[str, Any]:
+    """Return quantiles of the relative error of results, (n,) [1/m], of a kernel
+    in a precision, where the cases have values.
     """
     quantiles: dict[str, Any] = {
         "rows": len(results),
@@ -164,7 +164,7 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
     }
     if cases.value is None:
         return quantiles
-    error = relative_error(results, cases.value, "single")
+    error = relative_error(results, cases.value, precision)
     finite = np.isfinite(error)
     if not finite.any():
         return quantiles
