@@ -166,7 +166,10 @@ def monte_carlo_reference(
     run = monte_carlo_batches(
         loaded.scene,
         estimator,
-        batches=batches if budget.samples is not None else min(batches, LARGEST_SEED - seed),
+        # At least the two that a standard error needs: a seed without two is refused by name.
+        batches=batches
+        if budget.samples is not None
+        else max(2, min(batches, LARGEST_SEED - seed)),
         samples=samples,
         first_seed=seed,
         orders=orders,

@@ -215,6 +215,18 @@ def test_a_fresh_run_traces_again_what_is_older_than_it(scene, traced):
         assert volpath(scene, batches=BLOCK + 1).cached == BLOCK + 1
 
 
+@pytest.mark.parametrize("budget", [{"error": 0.1}, {"seconds": 1.0}, {"samples": 2}])
+def test_the_last_seeds_are_refused_by_name(scene, budget):
+    """A run to an error from the last seed on had one batch: a traceback of a ValueError."""
+    with pytest.raises(InputError, match="seed: got 1048575 for 2 batches"):
+        monte_carlo_reference(
+            LoadedScene("fog", scene, "", ""),
+            "volpath",
+            budget=Budget(**budget),
+            seed=(1 << 20) - 1,
+        )
+
+
 SHAPE = (3, 4, 3)
 
 
