@@ -31,6 +31,8 @@ SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
 _number = partial(read_number, least=-1e30, most=1e30, whole=False)
+# A factor of 2^100 is 1e30; float64 has no number for some thousand stops.
+_stop = partial(read_number, least=-100, most=100, whole=False)
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ def _by_frame(read: Reader) -> Reader:
 
 
 def _stops(what: str, value: Any) -> float | tuple[float, ...]:
-    return _by_frame(_number)(what, value) if isinstance(value, list) else _number(what, value)
+    return _by_frame(_stop)(what, value) if isinstance(value, list) else _stop(what, value)
 
 
 def _values(what: str, value: Any) -> tuple[float, ...]:

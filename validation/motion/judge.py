@@ -49,7 +49,7 @@ from airlight.validation.estimates.quadrature import (
 from airlight.validation.motion.blocks import BLOCK
 from airlight.validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from airlight.validation.motion.lag import SURE, Lag
-from airlight.validation.motion.measures import AGES, Measures, Sequence, measure
+from airlight.validation.motion.measures import AGES, STARTING, Measures, Sequence, measure
 from airlight.validation.scenes.changes import move_shapes, shift_film
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.comparison import check_margin
@@ -160,6 +160,11 @@ def compare_frames(
     # agree with it. A size that the scene cannot have is refused before anything is computed.
     check_margin(margin)
     record = read_frames(about)
+    if not record.resets and record.frames <= STARTING:
+        raise InputError(
+            f"{about}: {record.frames} frames without resets: the first {STARTING} only start the "
+            'filter, as an earlier history is in them; expected more frames, or "resets": [0]'
+        )
     paths = frame_paths(pattern, record, str(about))
     first = read_exr(paths[0])
     judged = judged_layer(first, paths[0], name=layer or record.layer, holds=holds)

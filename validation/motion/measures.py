@@ -39,6 +39,7 @@ from airlight.validation.statistics.samples import mean_of_runs, mean_of_series
 _Record = TypeVar("_Record", "Measures", Lag)
 
 AGES = 12  #: of light that left [frames]
+STARTING = 16  #: first frames of a history that began before them: they only start the filter
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,8 @@ class Sequence:
 
     def counts(self, n: int) -> bool:
         """Return whether a frame counts, or only starts the filter."""
-        # A sequence without a reset at its first frame has an earlier history, which nobody knows:
-        # 16 frames only start the filter.
-        return self.start[n] in self.resets or n >= 16
+        # A sequence without a reset at its first frame has an earlier history, which nobody knows.
+        return self.start[n] in self.resets or n >= STARTING
 
     def pair_counts(self, n: int) -> bool:
         """Return whether the change from the frame before counts."""
