@@ -113,12 +113,14 @@ class MotionComparison:
             f"{lag.persistence.words()}, gain {lag.gain.words()}",
             f"ghost            {measures.ghost.percent()} of the light that left in {AGES} frames",
         ]
-        if measures.pop is not None:
-            # It is a pop where the error changes by three times the median change or more.
-            words = "a pop" if measures.pop >= 3.0 else "no pop"
+        if measures.pop_frame is not None:
+            # It is a pop where the error changes by three times the median change or more, and
+            # where it stays as it is in most frames.
+            pop = math.inf if measures.pop is None else measures.pop
+            words = "a pop" if pop >= 3.0 else "no pop"
             lines.append(
                 f"largest change   of the error in frame {measures.pop_frame}, "
-                f"{measures.pop:.3g} times the median: {words}"
+                f"{pop:.3g} times the median: {words}"
             )
         # A mask without measures (no pixel, or dark) has no entry, and so no line.
         for name, each in self.masks.items():

@@ -84,8 +84,8 @@ class Measures:
     lag: Lag
     ghost: Estimate
     ghost_by_age: tuple[Estimate, ...]  #: from one frame on
-    pop: float | None  #: ratio to the median
-    pop_frame: int | None
+    pop: float | None  #: ratio to the median; None where that is 0
+    pop_frame: int | None  #: None where the error never changes
     rmse_by_frame: tuple[float, ...]
     change_by_frame: tuple[float, ...]  #: of the reference
     #: frames that are the one before, bit by bit, though the reference moved
@@ -260,7 +260,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
             for age in range(1, AGES + 1)
         ),
         pop=float(jumps.max() / median) if median > 0 else None,
-        pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,
+        pop_frame=counted[places[int(np.argmax(jumps))]] if jumps.any() else None,
         rmse_by_frame=tuple(rmse.tolist()),
         change_by_frame=tuple(moved.tolist()),
         repeated=tuple(first.repeated),

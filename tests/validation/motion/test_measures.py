@@ -72,6 +72,16 @@ def test_exact_frames_have_no_error():
     assert found.reference_change == pytest.approx(CHANGE, rel=1e-12)
 
 
+def test_a_pop_of_frames_at_rest_has_its_frame():
+    """The median change is 0: the only frame that was wrong was not named."""
+    still = np.repeat(LIGHT[:1], 20, axis=0)
+    frames = 1.01 * still
+    frames[12:] *= 1.1
+    found = measured(frames, still)
+    assert (found.pop, found.pop_frame) == (None, 12)
+    assert measured(1.01 * still, still).pop_frame is None
+
+
 def test_a_common_factor_changes_nothing():
     frames = averaged(LIGHT) + noise(1, 0.1)
     one, other = (plain(measured(k * frames, k * LIGHT)) for k in (1.0, 128.0))
