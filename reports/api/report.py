@@ -34,6 +34,7 @@ from airlight.reports.tables.table import Table
 if TYPE_CHECKING:
     from airlight.reports.data import records
     from airlight.validation.engine.images import EngineImage
+    from airlight.validation.study.study import Study
 
 FOLDER = "airlight-report"  #: where a report is written by default
 
@@ -345,13 +346,13 @@ def _measured(
     from airlight.reports.api.render import asked_configurations
     from airlight.reports.report.measure import write_report
     from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
-    from airlight.validation.study.study import RandomScenes, read_study, standard_study
+    from airlight.validation.study.study import RandomScenes, standard_study
 
     # A study file replaces the effort: it says scenes, sizes and methods.
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
         exclude(asked[0], "the study says how much is measured", {effort: effort != "default"})
-        study, asked = read_study(Path(asked[0])), []
+        study, asked = _study_of(Path(asked[0])), []
     # Images from elsewhere decide the scenes where none is named.
     names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
     # With `apart` user code runs in other processes, which can be ended when a method hangs.
@@ -388,6 +389,21 @@ def _measured(
             noted=partial(note, progress),
             cluster=None if place is None else stack.enter_context(connected(place)),
         )
+
+
+def _study_of(path: Path) -> "Study":
+    """Return the study of a file; one whose sizes or media a report does not have is refused."""
+    from airlight.validation.study.study import read_study
+
+    study = read_study(path)
+    dropped = ["sizes"] if len(study.sizes) > 1 else []
+    dropped += ["media"] if any(study.media) else []
+    if dropped:
+        raise InputError(
+            f"study {path}: got {' and '.join(dropped)}, but a report has one size and the media "
+            f"of its scenes: leave them out, or airlight sweep {path}"
+        )
+    return study
 
 
 def _scenes_of_images(
