@@ -37,7 +37,7 @@ from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.parameters import defaults
 from airlight.realtime.scene.phase import Tabulated
 from airlight.realtime.scene.read_scene import Scene
-from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.quadrature.fields import field_of, optical_depth
 from airlight.reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.convex_bounds import normals_at
@@ -49,6 +49,7 @@ from airlight.reference.scene.read import (
     homogeneous_around,
     read_reference,
 )
+from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.visibility.distances import crossings
 from airlight.validation.arrays import Array, Index
 from airlight.validation.study.configuration import Configuration
@@ -182,7 +183,13 @@ def _angles_about(reference: ReferenceScene, light: ReferenceLight, distance: Ar
 
 def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: Array) -> Array:
     """Return distances at equal steps where rays scatter, (places, rays) [m]."""
-    low, high = scattering_range(camera_segments(reference, distance))
+    if isinstance(reference.medium, VaryingMedium):
+        # A level ray through height fog scatters without an end: its steps are none.
+        leave = field_of(reference).leave(reference.origin, reference.direction)
+        low, high = np.zeros_like(distance), np.minimum(distance, leave)
+        high = np.where(np.isfinite(high), high, 0.0)
+    else:
+        low, high = scattering_range(camera_segments(reference, distance))
     return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
 
 
@@ -222,6 +229,9 @@ def _scattered(
     # Light that arrives, attenuated on the way to the camera; each medium scatters it by its own
     # phase function, which has the mean 1 over the sphere.
     radiance = arriving * np.exp(-from_camera) / (4 * np.pi)
+    # What differs from place to place scatters nowhere more than this.
+    if isinstance(reference.medium, VaryingMedium):
+        return np.asarray(radiance * field_of(reference).strongest)
     total = np.zeros_like(radiance)
     for medium, inside in _media(reference, ray, x, distance):
         phase = medium.phase(np.clip(np.sum(segment * -direction, axis=1), -1, 1))

@@ -12,6 +12,7 @@ import pytest
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.parts import camera, fog, point_light, tabulated_phase
 from airlight.validation.study import stated_errors as bounds
 from airlight.validation.study.configuration import configuration
@@ -118,6 +119,17 @@ def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
     assert run(cell, read, reference, whole=scene)[0].stated.outside == 0
     monkeypatch.setattr(bounds, "END", 0.1 * bounds.END)
     assert run(cell, read, reference, whole=scene)[0].stated.outside > 0
+
+
+@pytest.mark.parametrize("name", ["street", "meadow", "smoke"])
+def test_ends_have_their_worth_in_media_that_vary(name):
+    """A pixel beyond the bound had its method refused there, with words on extinction."""
+    scene = load_scene(name, (8, 6)).scene
+    worth = bounds.worth_of_ends(scene, np.arange(48))
+    assert worth.shape == (48, 3)
+    assert np.isfinite(worth).all()
+    # Little beside the light of a picture, but not nothing.
+    assert 0 < worth.max() < 1e-2 * reference_image(scene).airlight.max()
 
 
 @pytest.mark.claim(
