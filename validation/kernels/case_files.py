@@ -24,7 +24,7 @@ from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
 from airlight.validation.arrays import Array, Bools
-from airlight.validation.readers import read_csv
+from airlight.validation.readers import each_once, read_csv
 
 _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
 _FOOT = ("foot", "height")
@@ -74,6 +74,8 @@ def read_cases(path: str | Path) -> Cases:
         raise InputError(
             f"{path} has {'a header only' if header else 'no lines'}; expected a header and cases"
         )
+    # Which of two columns of one name is meant nobody can tell.
+    each_once(f"{path}, header", tuple(filter(None, header)))
     # From rows of cells to columns of text, by the names of the header.
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))

@@ -247,6 +247,12 @@ def case_file(tmp_path, text):
 SHORT = "phase,t,h,x0,x1,sigma_t,value\n# a remark\n" + "isotropic,1,2,0,inf,0.5,1.0\n" * 4
 
 
+def test_two_columns_of_one_name_are_refused(tmp_path):
+    path = case_file(tmp_path, "t,h,x0,x1,sigma_t,x1\n1,2,0,3,0.5,4\n")
+    with pytest.raises(InputError, match="header: 'x1' is there twice; leave one out"):
+        read_cases(path)
+
+
 def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     cases = read_cases(case_file(tmp_path, SHORT))
     counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
