@@ -36,11 +36,8 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
-            rows = [
-                (reader.line_num, [cell.strip() for cell in cells])
-                for cells in reader
-                if any(cells)
-            ]
+            lines = ((reader.line_num, [cell.strip() for cell in cells]) for cells in reader)
+            rows = [(line, cells) for line, cells in lines if any(cells)]
     except (OSError, UnicodeDecodeError, csv.Error) as reason:
         raise InputError(
             f"{path} cannot be read as a CSV file: {reason}; give a text file"

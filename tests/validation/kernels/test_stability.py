@@ -253,6 +253,11 @@ def test_two_columns_of_one_name_are_refused(tmp_path):
         read_cases(path)
 
 
+def test_a_line_of_spaces_is_empty(tmp_path):
+    """It was a row of one cell in a file of seven columns."""
+    assert len(read_cases(case_file(tmp_path, SHORT + "   \n , \n")).x0) == 4
+
+
 def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     cases = read_cases(case_file(tmp_path, SHORT))
     counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
