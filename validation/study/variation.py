@@ -14,7 +14,7 @@ runs.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, islice
+from itertools import chain, cycle, islice
 from typing import Any
 
 import numpy as np
@@ -142,7 +142,7 @@ def method_motion(
     read = read_scene(scene)
     moves = Animation(moves=("light",), about=animation.about)
     places = (
-        list(islice(animate(read, moves, turn), frames))
+        list(islice(cycle(animate(read, moves, turn)), frames))
         if stimulus == "sweep"
         else _step(read, moves, frames)
     )

@@ -216,6 +216,16 @@ def test_a_noisy_march_with_history_is_measured_in_several_runs(variant):
     assert 0 < bias.error < row.measures.relative_rmse.value
 
 
+def test_a_sweep_of_more_frames_than_a_turn_goes_round_again(variant):
+    """There were as many places as frames of a turn: the next frame was an IndexError."""
+    loaded = load_scene("open-fog", (8, 6))
+    (row,) = method_motion(
+        loaded.scene, loaded.animation, [configuration("unshadowed")], frames=5, turn=3
+    )
+    assert len(row.measures.rmse_by_frame) == 5
+    assert row.measures.relative_rmse.value < 1e-4
+
+
 def test_what_does_not_move_is_refused(variant):
     loaded = load_scene("penumbra-plane", (16, 12))
     with pytest.raises(InputError, match="area lights"):
