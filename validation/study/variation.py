@@ -135,6 +135,8 @@ def method_motion(
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
+    if stimulus not in ("sweep", "step"):
+        raise InputError(f"stimulus: got {stimulus!r}, expected sweep or step")
     least = BEFORE + 2 if stimulus == "step" else 3
     if frames < least:
         raise InputError(f"frames: got {frames}, expected at least {least} for a {stimulus}")

@@ -230,6 +230,8 @@ def test_what_does_not_move_is_refused(variant):
     loaded = load_scene("penumbra-plane", (16, 12))
     with pytest.raises(InputError, match="area lights"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1])
+    with pytest.raises(InputError, match="stimulus: got 'Sweep', expected sweep or step"):
+        method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="Sweep")
     with pytest.raises(InputError, match="expected at least 10 for a step"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="step", frames=9)
     dark = replace(read_scene(loaded.scene), lights=(), area_lights=())
