@@ -349,17 +349,20 @@ def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float])
         (math.log(after / before) / math.log(second / first), second)
         for (first, before), (second, after) in steps
     ]
-    steepest, at = max(local, default=(None, None))
     # Steeper by 0.6, 4 times the work takes 2.3 times as long as it may. Below 5 ms launches and
     # clocks decide a time [ms].
     most, short = USUAL[kind][TIMES.index(name)] + 0.6, 5.0
-    cliff = any(slope > most and after > short for (slope, _), (_, (_, after)) in zip(local, steps))
+    cliffs = [
+        each for each, (_, (_, after)) in zip(local, steps) if each[0] > most and after > short
+    ]
+    # Of short times a steeper step may be none.
+    steepest, at = max(cliffs or local, default=(None, None))
     values = {
         "exponent": exponent,
         "standard_error": standard_error,
         "steepest": steepest,
         "at": at,
-        "cliff": cliff,
+        "cliff": bool(cliffs),
     }
     return record_of(values, TimeGrowth)
 

@@ -50,6 +50,10 @@ def test_a_jump_is_a_cliff():
     assert not growth("triangles", "frame", works, [32, 34, 38, 39, 45]).cliff
     # Short times are those of launches: a jump of them says nothing.
     assert not growth("triangles", "frame", works, [0.1, 0.1, 0.1, 3.9, 4.1]).cliff
+    # Nor is it the cliff that a sentence names where there is one behind it.
+    behind = growth("triangles", "frame", works, [0.1, 3.9, 8, 100, 200])
+    assert (behind.cliff, behind.at) == (True, 1310720)
+    assert behind.steepest == pytest.approx(np.log(100 / 8) / np.log(4))
 
 
 @pytest.mark.parametrize(
