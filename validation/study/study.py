@@ -53,7 +53,13 @@ from airlight.validation.readers import (
 )
 from airlight.validation.scenes.changes import change_words
 from airlight.validation.scenes.loading import parse_size
-from airlight.validation.scenes.random.design import PREFIX, is_random, random_name, read_ranges
+from airlight.validation.scenes.random.design import (
+    LARGEST_SEED,
+    PREFIX,
+    is_random,
+    random_name,
+    read_ranges,
+)
 from airlight.validation.scenes.registry import FOG_SCENES, SCENES
 from airlight.validation.study.configuration import (
     QUICK,
@@ -399,9 +405,11 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
             )
         return word
     if is_random(word):
-        if seed_of(word) is None:
+        seed = seed_of(word)
+        if seed is None or seed > LARGEST_SEED:
             raise InputError(
-                f"scenes: got {word!r}, expected random:SEED with a whole number from 0 on"
+                f"scenes: got {word!r}, expected random:SEED with a whole number from 0 to "
+                f"{LARGEST_SEED:g}"
             )
         return word
     path = folder / word
@@ -418,7 +426,13 @@ def _random(table: Any, folder: Path) -> RandomScenes:
     if "ranges" in given:
         given["ranges"] = (folder / given["ranges"]).resolve()
         read_ranges(given["ranges"])  # refuses what cannot be drawn
-    return RandomScenes(**given)
+    scenes = RandomScenes(**given)
+    if scenes.count and scenes.first + scenes.count - 1 > LARGEST_SEED:
+        raise InputError(
+            f"random: got {scenes.count} scenes from random:{scenes.first} on, expected seeds up "
+            f"to {LARGEST_SEED:g}"
+        )
+    return scenes
 
 
 def _medium(what: str, item: Any) -> tuple[str, ...]:

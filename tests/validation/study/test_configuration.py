@@ -235,6 +235,8 @@ def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
             "media: got 'light.intensity', expected medium.sigma_t",
         ),
         ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
+        ({"scenes": ["random:1000000001"]}, "'random:1000000001', expected .* from 0 to 1e.09"),
+        ({"random": {"count": 3, "first": 999_999_999}}, "3 scenes from random:999999999 on"),
         ({"flip": [True]}, "flip: got .True., expected true, false"),
         ({"flip": 1}, "flip: got 1, expected true, false"),
         ({"stability": 2_000_000}, "stability: got 2000000, expected .* to 1.04858e.06"),
