@@ -355,7 +355,7 @@ def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float])
     cliffs = [
         each for each, (_, (_, after)) in zip(local, steps) if each[0] > most and after > short
     ]
-    # Of short times a steeper step may be none.
+    # A steeper step of short times is none.
     steepest, at = max(cliffs or local, default=(None, None))
     values = {
         "exponent": exponent,

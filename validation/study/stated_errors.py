@@ -229,7 +229,7 @@ def _scattered(
     # Light that arrives, attenuated on the way to the camera; each medium scatters it by its own
     # phase function, which has the mean 1 over the sphere.
     radiance = arriving * np.exp(-from_camera) / (4 * np.pi)
-    # What differs from place to place scatters nowhere more than this.
+    # A medium that differs from place to place scatters nowhere more than this.
     if isinstance(reference.medium, VaryingMedium):
         return np.asarray(radiance * field_of(reference).strongest)
     total = np.zeros_like(radiance)
