@@ -192,12 +192,18 @@ def _least(
     A logarithm, or an artanh, does not go farther than 10 from where it starts, a factor of 22 000:
     an image that needs more says nothing of it, and an unbounded step may overflow.
     """
-    reach = np.array([math.inf if number.scale == "plain" else 10.0 for number in numbers])
+    reach = _farthest(numbers)
     low, high = (
         inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high")
     )
+    start = np.clip(start, low, high)
     ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
     return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
+
+
+def _farthest(numbers: Sequence[Number]) -> Array:
+    """Return how far a search goes from its start, for each number on the whole line."""
+    return np.array([math.inf if number.scale == "plain" else 10.0 for number in numbers])
 
 
 def _trials(model: Model) -> list[tuple[float, Array]]:
@@ -365,7 +371,7 @@ def interval_ends(model: Model, solution: Solution) -> Array:
 def _end(model: Model, solution: Solution, number: int, step: float) -> float:
     """Return one end of an interval; `step` leads to the end by the ellipse."""
     close = 0.02  # of half an interval
-    best = float(solution.inner[number])
+    best, farthest = float(solution.inner[number]), _farthest(model.numbers)
     # In a step of less than 1e-3 on the whole line the image is linear: the ellipse is right.
     if not 1e-3 < abs(step) < math.inf:
         return best + step
@@ -374,11 +380,17 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
     # Two places with the end between them: the distance from the best parameters, and how many
     # standard errors the profile there is beyond the end. `above` is not found yet.
     below, above = (0.0, -SIGMAS), (math.nan, math.nan)
-    distance = step
+    # An ellipse that is wider than a search may go ends where numbers overflow.
+    distance = float(np.clip(step, -farthest[number], farthest[number]))
     # Where ten turns find no place beyond the end, there is none.
     for _ in range(10):
-        place, errors = _profile(model, solution, number, solution.inner + distance * way)
-        way, beyond = (place - solution.inner) / distance, errors - SIGMAS
+        # The other parameters begin within a factor of 10^43, which overflows nowhere.
+        start = solution.inner + np.clip(distance * way, -10 * farthest, 10 * farthest)
+        start[number] = best + distance
+        place, errors = _profile(model, solution, number, start)
+        # Far beyond the end the profile may grow as an exponential, to which no line leads back: a
+        # place counts as one half of an interval beyond at most.
+        way, beyond = (place - solution.inner) / distance, min(errors - SIGMAS, SIGMAS)
         if abs(beyond) < close * SIGMAS or abs(above[0] - below[0]) < close * abs(above[0]):
             return best + distance
         # The root of a profile is nearly a line. An end that stays counts half each time
@@ -392,8 +404,9 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
             # No end yet: a step a little beyond where a line through the profile reaches it, three
-            # times as far at most. Where an image allows 30, a factor of 10^13, there is no end.
-            if abs(distance) > 30.0:
+            # times as far at most. Where an image allows 30 of a logarithm, a factor of 10^13, there
+            # is no end.
+            if abs(distance) > 3.0 * farthest[number]:
                 break
             distance *= min(1.1 * SIGMAS / max(errors, 1e-9), 3.0)
         else:

@@ -15,12 +15,13 @@ import pytest
 from airlight.errors import InputError
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import Image
+from airlight.validation.engine.fault import Number
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
 from airlight.validation.engine.seen import Seen
 from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.fit.fit import fit_image
 from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
-from airlight.validation.fit.unknowns import read_unknowns
+from airlight.validation.fit.unknowns import Unknown, read_unknowns
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import scene_xml
 
@@ -211,6 +212,39 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once
     # in 16 000, of which nine are looked at.
     assert (covered >= 177).all(), covered / trials
+
+
+class _Known:
+    """An image of white noise, and a model that is a function of the numbers that are looked for."""
+
+    def __init__(self, noise, function):
+        # Noise of the mean 0: the numbers to begin with explain the image best.
+        self.function, noise = function, noise - noise.mean()
+        self.image = function(1.0) + noise
+
+    def shown(self, guess):
+        return self.image
+
+    def predicted(self, guess):
+        return self.function(*guess.values)
+
+
+@pytest.mark.parametrize("times", [0.5, 5.0, 20.0, 1e3, 1e6])
+def test_an_end_that_noise_hides_is_found_far_away(times):
+    """The end of 1 + p/1000 is where p - 1 is so many noises of the mean: a factor, not an ellipse.
+
+    From twenty on, where the ellipse ends at e^20, it was 1.00004, and from 700 on no number.
+    """
+    generator = np.random.default_rng(3)
+    noise = 1e-3 * times / 1.96 * np.sqrt(300) * generator.standard_normal((100, 3))
+    number = Number(1e-300, 1e300, scale="log")
+    unknown = Unknown("p", "p", lambda predictor, guess, p: replace(guess, values=p), (number,))
+    predictor = _Known(noise, lambda p=1.0: np.full((100, 3), 1 + 1e-3 * p))
+    model = Model(predictor, (unknown,), np.zeros(1), Guess(None))
+    ((low, high),) = interval_ends(model, weighted_fit(model, model.at))
+    # Noise of 300 values has another size by 12 % at most, and an end is found to 2 % of its errors.
+    assert high == pytest.approx(np.log1p(times), abs=0.3)
+    assert low < -0.3
 
 
 @pytest.mark.parametrize("place", ["fog", "medium", "1"])
