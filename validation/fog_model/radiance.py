@@ -199,12 +199,12 @@ class FogModel:
             origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
             length[:, AROUND] = fog.height.along(origin, end, length[:, AROUND], rise)
-        # A vacuum attenuates nothing over any length, even an infinite one: it is left out.
-        attenuating = np.any(np.array(fog.sigma_t) > 0, axis=1)
-        depth = length[:, attenuating] @ np.array(fog.sigma_t)[attenuating]
+        # A medium that does not attenuate a channel does so over any length, even an infinite one:
+        # it is left out there.
+        depth = [length[:, own > 0] @ own[own > 0] for own in np.array(fog.sigma_t).T]
         count = np.bincount(view.ray_pixel)
         return np.stack(
-            [np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1
+            [np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth], axis=1
         )
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:

@@ -11,7 +11,7 @@ import pytest
 
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import ReferenceLight, read_reference
-from airlight.validation.fog_model.radiance import FogModel, scene_fog
+from airlight.validation.fog_model.radiance import Fog, FogModel, scene_fog
 from airlight.validation.fog_model.view import _level, scattering_paths, view_of
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
@@ -114,6 +114,20 @@ def test_the_light_of_a_sun_falls_with_no_distance(variant, tmp_path, law):
         before, after = model.layers(alone), model.layers(replace(alone, **law))
         assert before[0].mean() > 0
         assert np.array_equal(before, after) is alike
+
+
+def test_a_channel_without_extinction_attenuates_no_unbounded_ray():
+    """It was no number in all channels of such a medium: infinity times 0."""
+    fog = Fog(((0.1, 0.0, 0.2),), ((1.0,) * 3,), (None,), (1.0,), (1.0,), (1.0,), ((0.0,) * 3,))
+    rays = SimpleNamespace(direction=np.array([[0.0, 0.0, 1.0]] * 2), origin=np.zeros(3))
+    view = SimpleNamespace(
+        reference=rays,
+        axis=rays.direction[0],
+        length=np.array([[np.inf], [5.0]]),
+        ray_pixel=np.arange(2),
+    )
+    expected = [[0.0, 1.0, 0.0], [np.exp(-0.5), 1.0, np.exp(-1.0)]]
+    np.testing.assert_allclose(FogModel(view, ()).transmittance(fog), expected)
 
 
 @pytest.mark.parametrize("radius", [1e-9, 1e-3, 0.3])
