@@ -59,8 +59,8 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
     tst = np.where(np.isfinite(tst), tst, np.nan)
     if np.isnan(tst).all():
         return Hints(math.nan, math.nan, (), tst, "the image has no finite value")
-    mean = float(np.nanmean(ref)) if not np.isnan(ref).all() else 0.0
-    if mean <= 0:
+    mean = _mean(ref, tst)
+    if not mean > 0:
         return Hints(math.nan, math.nan, (), tst, "the reference is black")
     factor = _fitted(ref, tst)
     if math.isnan(factor):
@@ -68,6 +68,14 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
         return Hints(math.nan, math.nan, (), tst, f"the image is black {dark}")
     corrected, words = _suspects(ref, tst, mean)
     return Hints(factor, _rmse(ref, factor * tst) / mean, (*words, *_clipped(ref, tst)), corrected)
+
+
+def _mean(ref: Array, tst: Array) -> float:
+    """Return the mean of the reference over the values that are finite in both images; NaN for
+    none.
+    """
+    both = np.isfinite(ref) & np.isfinite(tst)
+    return float(ref[both].mean()) if both.any() else math.nan
 
 
 def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ...]]:
@@ -105,7 +113,7 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ..
 
 def _fitted(ref: Array, tst: Array) -> float:
     """Return the factor that fits best; NaN if no value is lit in both."""
-    lit = (ref > FLOOR * np.nanmean(ref)) & (np.abs(tst) > 0)
+    lit = (ref > FLOOR * _mean(ref, tst)) & (np.abs(tst) > 0)
     if not lit.any():
         return math.nan
     sign = float(np.sign(np.median(tst[lit])))
@@ -118,9 +126,10 @@ def _fitted(ref: Array, tst: Array) -> float:
 def _usual_error(ref: Array, tst: Array) -> float:
     """Return the rmse without the worst hundredth of the values that are lit in either image."""
     squared = _squared_errors(ref, tst)
-    floor = FLOOR * float(np.nanmean(ref))
+    floor = FLOOR * _mean(ref, tst)
     # A hundredth of the lit values, not of all: in a dark image all lit values could be outliers.
-    lit = int(np.count_nonzero((ref > floor) | (tst > floor)))
+    both = np.isfinite(ref) & np.isfinite(tst)
+    lit = int(np.count_nonzero(both & ((ref > floor) | (tst > floor))))
     count = max(len(squared) - int(OUTLIERS * lit), 1)
     return (
         math.sqrt(float(np.mean(np.partition(squared, count - 1)[:count])))

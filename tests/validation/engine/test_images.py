@@ -69,6 +69,19 @@ def test_files_are_found_by_the_name_of_their_scene(tmp_path):
     }
 
 
+def test_a_bright_pixel_that_a_mask_leaves_out_is_no_measure_of_the_others():
+    """All others were called black beside a light of ten million, which was masked."""
+    reference = np.ones((40, 40, 3))
+    reference[20, 20] = 1e7
+    image = np.ones((40, 40, 3))
+    image[20, 20] = np.nan
+    hints = find_hints(reference, image)
+    assert (hints.factor, hints.words, hints.reason) == (1.0, (), "")
+    hints = find_hints(reference, 3 * image)
+    assert hints.factor == pytest.approx(1 / 3)
+    assert "3 times as bright" in hints.words[0]
+
+
 def test_images_of_a_scene_have_one_size(tmp_path):
     first, second = written(tmp_path, "hall.a.exr"), written(tmp_path, "hall.b.exr")
     images = tuple(find_images(tmp_path, SCENES)["hall"])
