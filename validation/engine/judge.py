@@ -467,7 +467,7 @@ def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, flo
         for values in (finite.astype(float), correct, test, difference, difference**2)
     )
     # A block that is dimmer in both images than 5 % of the mean says nothing.
-    floor = 0.05 * float(correct.mean())
+    floor = 0.05 * float(correct[finite].mean()) if finite.any() else 0.0
     lit = (count > 0) & (np.maximum(light, test_light) > floor * count)
     if not lit.any():
         return math.nan, math.nan

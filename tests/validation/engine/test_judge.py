@@ -345,6 +345,20 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     assert dark.words == "not right: nothing is lit in the pixels that are compared"
 
 
+def test_a_mask_does_not_change_the_verdict_on_the_pixels_that_it_leaves():
+    """Masked pixels made the mean lower, below which a block says nothing: dim blocks counted."""
+    expected = np.ones((80, 80, 3))
+    expected[:, 40:] = 0.02
+    image = expected.copy()
+    image[:, 70:] *= 1.04
+    hints = find_hints(expected, image)
+    alone = judge(expected, image, hints, ())
+    masked = np.concatenate([image, np.full((240, 80, 3), np.nan)])
+    verdict = judge(np.concatenate([expected] * 4), masked, hints, ())
+    assert alone.right
+    assert (verdict.right, verdict.block_error) == (True, alone.block_error)
+
+
 @pytest.mark.claim(
     "engine-verdict", tolerance="none: one of 75 lit values is wrong by a tenth, 1.2 % RMS"
 )
