@@ -59,7 +59,10 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `light_pixels`: how far a light
     is, (height, width) [pixels].
     """
-    difference = np.where(np.isfinite(reference) & np.isfinite(image), image - reference, 0.0)
+    # Pixels that are not compared, such as those that a mask leaves out, have no error, and count
+    # in no mean.
+    compared = (np.isfinite(reference) & np.isfinite(image)).all(axis=2)
+    difference = np.where(compared[..., None], image - reference, 0.0)
     squared = (difference**2).sum(axis=2)
     total = float(squared.sum())
     if total == 0:
@@ -70,8 +73,8 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     count = min(int(np.searchsorted(below, 0.9)) + 1, squared.size)
     chosen = np.zeros(squared.size, dtype=bool)
     chosen[order[:count]] = True
-    rest = squared.reshape(-1)[~chosen]
-    mean = float(reference[np.isfinite(reference)].mean())
+    rest = squared.reshape(-1)[~chosen & compared.ravel()]
+    mean = float(reference[compared].mean())
     chosen = chosen.reshape(squared.shape)
     row, column = divmod(int(order[0]), squared.shape[1])
     # A kind of place is named where more than half of the pixels lie at it, a light before an edge.
@@ -88,7 +91,7 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
         (column, row),
         kind,
         rmse_without,
-        count <= max(1, 0.01 * squared.size),
+        count <= max(1, 0.01 * np.count_nonzero(compared)),
     )
 
 

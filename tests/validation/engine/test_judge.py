@@ -22,6 +22,7 @@ from airlight.validation.estimates.quadrature import (
     reference_layer,
     relative_error,
 )
+from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import scene_xml
 
@@ -320,6 +321,20 @@ def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     )
     assert error_place(expected, expected, lamp) is None
     assert not error_place(expected, 1.1 * expected, lamp).few
+
+
+def test_the_rest_of_an_error_is_that_of_the_pixels_that_are_compared():
+    """It was a mean with the pixels that a mask leaves out, which have no error: half of it."""
+    expected, lamp = np.ones((40, 40, 3)), np.full((40, 40), 99.0)
+    image = expected.copy()
+    image[:, :20] += 0.01
+    image[5, 5] = 3.0
+    masked = np.where(np.arange(40)[:, None, None] < 10, image, np.nan)
+    place = error_place(expected, masked, lamp)
+    others = np.isfinite(masked).all(axis=2)
+    others[5, 5] = False
+    metrics = error_metrics(expected, image, mask=others)
+    assert place.relative_rmse_without == pytest.approx(metrics.relative_rmse)
 
 
 @pytest.mark.claim(
