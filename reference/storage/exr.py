@@ -93,18 +93,19 @@ class Image:
     window: tuple[int, int, int, int] | None = None
 
     def with_data(self, mask: NDArray[np.bool_] | None = None) -> NDArray[np.bool_] | None:
-        """Return which pixels of a mask the file holds, (height, width); None where that is all."""
+        """Return which pixels of a mask the file holds, (height, width); None where that is all.
+
+        A mask of another size comes back as it is, for those who compare to refuse it.
+        """
         if self.window is None or not self.layers:
             return mask
         inside = np.zeros(next(iter(self.layers.values())).shape[:2], dtype=bool)
+        if mask is not None and np.shape(mask) != inside.shape:
+            return mask
         # Pixels outside of the window are 0, and no data.
         left, top, right, bottom = self.window
         inside[top:bottom, left:right] = True
-        return (
-            inside
-            if mask is None or np.shape(mask) != inside.shape
-            else inside & (np.asarray(mask) != 0)
-        )
+        return inside if mask is None else inside & (np.asarray(mask) != 0)
 
 
 def layer(

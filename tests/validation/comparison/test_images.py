@@ -152,6 +152,16 @@ def test_a_mask_from_a_file(pair, tmp_path):
         compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=read_mask(tmp_path / "m.exr"))
 
 
+def test_a_mask_of_another_size_is_refused_for_a_file_that_holds_a_part_of_the_frame_too():
+    """It was left out without a word, and all pixels of the file were compared."""
+    image = np.ones((8, 8, 3), dtype=np.float32)
+    part = Image({"total": image}, window=(0, 0, 8, 7))
+    mask = np.ones((4, 4), dtype=bool)
+    for pair in ((part, Image({"total": image})), (Image({"total": image}), part), (part, part)):
+        with pytest.raises(InputError, match=r"a mask of bool \(4, 4\); expected truth values"):
+            compare_images(*pair, mask=mask)
+
+
 def test_all_metrics_are_those_of_their_modules(pair):
     comparison = compare_images(*pair, all_metrics=True)
     reference, test = (image.layers["airlight"] for image in pair)
