@@ -254,7 +254,10 @@ def diagnose_image(
     if compared.verdict.right:
         return diagnosis
     if compared.hints.reason:
-        first = BLACK if "black" in compared.hints.reason else UNEXPLAINED
+        # A reference is black where nothing should be seen: the image is black only if it is right.
+        reason = compared.hints.reason
+        black = reason.startswith("the image is black") or diagnosis.residual == 0
+        first = BLACK if black else UNEXPLAINED
         row = Ranked(first, (), compared.hints.reason, diagnosis.residual, 0.0, ())
         return replace(diagnosis, first=first, ranked=(row,), rest="", explained=False)
     # Where a few pixels are wrong and all others right, such as a mark on the image, no path of

@@ -198,6 +198,17 @@ def test_a_black_image_is_black(reference):
     assert "The image is black" in "\n".join(diagnosis.lines)
 
 
+@pytest.mark.parametrize(("value", "first"), [(0.0, "black"), (1.0, "unexplained")])
+def test_an_image_of_what_should_be_black_is_black_only_if_it_is(variant, value, first):
+    """Light where the scene has no surface at all was called a black image."""
+    layers = {"surface": np.full((SIZE[1], SIZE[0], 3), value)}
+    scene = load_scene("open-fog", SIZE)
+    diagnosis = diagnose_image(Image(layers), scene, layer="surface", pixel="centre")
+    assert diagnosis.first == first
+    assert ("The image is black" in "\n".join(diagnosis.lines)) == (first == "black")
+    assert "the reference is black" in diagnosis.verdict
+
+
 def test_the_diagnosis_remembers_what_the_reader_of_the_file_said(reference):
     image = Image({"total": total(reference)}, attributes={NOTE: "colours of other primaries"})
     said = diagnose_image(image, load_scene("sphere-spot", SIZE), layer="total", pixel="centre")
