@@ -105,8 +105,10 @@ def measure_image(
     judged = judge_image(
         image, layer, loaded, reference_of, path=shown.path, mask=image.with_data()
     )
-    both = surfaces and AIRLIGHT in layers and SURFACE in layers
-    return judged, layers, error_metrics(judged.layers.surface, layers[SURFACE]) if both else None
+    if not (surfaces and AIRLIGHT in layers and SURFACE in layers):
+        return judged, layers, None
+    held = image.with_data()  # pixels that the file does not hold are no error of the surface
+    return judged, layers, error_metrics(judged.layers.surface, layers[SURFACE], mask=held)
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:

@@ -115,6 +115,17 @@ def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
     assert measured(path, surfaces=False)[2] is None
 
 
+def test_pixels_that_a_file_does_not_hold_are_no_error_of_its_surface(variant, monkeypatch):
+    """They are 0 in the layers of a file with a data window, and counted as black surfaces."""
+    part = np.arange(6)[None, :, None] < 4
+    layers = {"airlight": part * AIRLIGHT, "surface": part * SURFACE}
+    image = Image(layers, window=(0, 0, 4, 4))
+    monkeypatch.setattr("airlight.validation.engine.images.read_exr", lambda path: image)
+    judged, _, surface_error = measured("hall.exr")
+    assert judged.comparison.metrics.pixels == surface_error.pixels == 16
+    assert surface_error.rmse == 0
+
+
 def test_a_file_without_any_light_is_refused(variant, tmp_path):
     path = written(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
     for refused in (
