@@ -262,7 +262,7 @@ def diagnose_image(
         return replace(diagnosis, first=first, ranked=(row,), rest="", explained=False)
     # Where a few pixels are wrong and all others right, such as a mark on the image, no path of
     # light explains it: the costly faults are not tried.
-    few = "" if attempt.chosen.faults else all_but_few(compared)
+    few = "" if attempt.chosen.faults else all_but_few(compared, image.with_data())
     if not few:
         attempt.go_on()
     return _concluded(diagnosis, attempt, compared, few)

@@ -426,28 +426,32 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
     return Verdict(not reasons, tuple(reasons), side, error, noise)
 
 
-def all_but_few(compared: EngineComparison) -> str:
+def all_but_few(compared: EngineComparison, mask: Bools | None = None) -> str:
     """Say which pixels are wrong where these are few and all others are right;
     nothing where that is not so.
+
+    `mask`: which pixels were compared, (height, width); all by default.
     """
     reference, image = (
         np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image)
     )
+    chosen = np.ones(reference.shape[:2], dtype=bool) if mask is None else mask
     finite = np.isfinite(reference)
     floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
     # Six median errors: noise of a normal distribution is beyond in 5 pixels of 100 000.
-    wrong = errors > max(RIGHT, 6.0 * float(np.median(errors)))
+    wrong = chosen & (errors > max(RIGHT, 6.0 * float(np.median(errors[chosen]))))
+    count = np.count_nonzero(chosen)
     # A tenth of the pixels may be a mark on the image, or a hole in it; more are another image.
-    if not 0 < np.count_nonzero(wrong) <= 0.1 * wrong.size:
+    if not 0 < np.count_nonzero(wrong) <= 0.1 * count:
         return ""
     # All others must be right by the same verdict.
-    others = np.where(wrong[..., None], np.nan, image)
+    others = np.where((chosen & ~wrong)[..., None], image, np.nan)
     if not judge(reference, others, find_hints(reference, others), ()).right:
         return ""
     row, column = np.nonzero(wrong)
     return (
-        f"all is right but {len(row)} of {wrong.size} pixels, in columns {column.min()} to "
+        f"all is right but {len(row)} of {count} pixels, in columns {column.min()} to "
         f"{column.max()} and rows "
         f"{row.min()} to {row.max()} from the upper left"
     )

@@ -4,6 +4,7 @@ called right where it is.
 """
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,13 @@ from airlight.validation.comparison.images import compare_images
 from airlight.validation.engine.error_place import error_place
 from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import EngineImage, measure_image
-from airlight.validation.engine.judge import Verdict, compare_scene, judge, references
+from airlight.validation.engine.judge import (
+    Verdict,
+    all_but_few,
+    compare_scene,
+    judge,
+    references,
+)
 from airlight.validation.engine.seen import expected_layer, judged_layer, seen_image
 from airlight.validation.estimates.quadrature import (
     reference_error,
@@ -321,6 +328,16 @@ def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     )
     assert error_place(expected, expected, lamp) is None
     assert not error_place(expected, 1.1 * expected, lamp).few
+
+
+def test_pixels_that_a_file_does_not_hold_are_not_among_the_few_that_are_wrong():
+    """They were, as black ones: 'all is right but' named the columns outside of the data window."""
+    reference, held = np.ones((40, 40, 3)), np.arange(40)[None, :] < np.full((40, 1), 38)
+    image = reference * held[..., None]
+    image[7:9, 5] = 3.0
+    compared = SimpleNamespace(reference=reference, image=image)
+    words = "all is right but 2 of 1520 pixels, in columns 5 to 5 and rows 7 to 8"
+    assert words in all_but_few(compared, held)
 
 
 def test_the_rest_of_an_error_is_that_of_the_pixels_that_are_compared():
