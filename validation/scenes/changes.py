@@ -79,6 +79,14 @@ def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:
     ]
 
 
+def checked_changes(scene, changes: Mapping[str, Sequence[float]]) -> dict[str, Values]:
+    """Return the changes of an `mi.Scene`; names that it does not have, and values that it cannot
+    have, are refused.
+    """
+    known = changeable(scene)
+    return {name: _checked(name, values, known) for name, values in changes.items()}
+
+
 def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     """Change an `mi.Scene` in place: values by name, see the module.
 
@@ -87,7 +95,7 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     """
     # All values are checked before any is set: a refused change leaves the scene as it was.
     known = changeable(scene)
-    wanted = {name: _checked(name, values, known) for name, values in changes.items()}
+    wanted = checked_changes(scene, changes)
     camera = {
         name.partition(".")[2]: values
         for name, values in wanted.items()

@@ -19,7 +19,12 @@ from airlight.errors import InputError, nearest
 from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
 from airlight.validation.scenes.bodies import check_bodies
-from airlight.validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
+from airlight.validation.scenes.changes import (
+    change_scene,
+    checked_changes,
+    isotropic_media,
+    scene_with_lobes,
+)
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.numbers import check_numbers
 from airlight.validation.scenes.random.design import FILE as RANGES
@@ -76,6 +81,9 @@ def load_scene(
         loaded = LoadedScene(
             path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
         )
+    # Mitsuba builds no phase function of a g that is refused here.
+    if changes:
+        checked_changes(loaded.scene, changes)
     # The g of an isotropic medium has no parameter to set: such a scene is built again with phase
     # functions of another type.
     isotropic = isotropic_media(loaded.scene) if changes else {}

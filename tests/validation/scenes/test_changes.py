@@ -145,6 +145,12 @@ def test_a_change_that_cannot_be_is_one_line(change, message):
     assert "\n" not in str(raised.value)
 
 
+def test_a_lobe_that_no_medium_has_is_one_line_where_the_medium_is_isotropic_too():
+    """It ended in a RuntimeError of Mitsuba, which built the phase function first."""
+    with pytest.raises(InputError, match=r"got 1, expected finite numbers from -0\.99 to 0\.99"):
+        load_scene("open-fog", (16, 12), {"medium.g": (1.0,)})
+
+
 @pytest.mark.parametrize("as_file", [False, True])
 def test_an_isotropic_medium_gets_a_lobe_for_methods_and_reference(tmp_path, as_file):
     name = "open-fog"
