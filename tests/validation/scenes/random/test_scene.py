@@ -136,6 +136,8 @@ def test_what_is_set_is_drawn():
         ),
         ({"fov": [50, 20]}, r"fov: got \[50, 20\], expected \[from, to\]"),
         ({"fov": [50, 200]}, "fov: got 200, expected a number from 1 to 160"),
+        # Two offsets of 1 and one of -1 made an extinction of mean (1 - 0.9 4/3), below 0.
+        ({"colour_spread": 0.9}, "colour_spread: got 0.9, expected a number from 0 to 0.74"),
         ({"light_kinds": {"laser": 1}}, "got light_kinds.laser, expected one of point, spot"),
         ({"light_kinds": {"point": 0}}, "no weight is above 0"),
         ({"light_kinds": {"point": -1}}, "light_kinds.point: got -1, expected a number from 0 to"),
