@@ -306,7 +306,12 @@ def csv(table: Table) -> str:
         # Reasons and remarks have columns only if some row has one.
         said = {"reason": row.reason, "remarks": "; ".join(row.remarks)}
         rows.append(
-            {key: cell for key, value in row.values.items() for key, cell in _csv_cells(key, value)}
+            {
+                name: cell
+                for key, value in row.values.items()
+                if value is not None  # it has no ends, and a column of intervals has nothing else
+                for name, cell in _csv_cells(key, value)
+            }
         )
         rows[-1] |= {key: words for key, words in said.items() if words}
         keys |= dict.fromkeys(key for key in said if said[key])
@@ -516,4 +521,4 @@ def _csv_cells(key: str, value: Value) -> Iterator[tuple[str, str]]:
     elif isinstance(value, float):
         yield key, "" if math.isnan(value) else f"{value:.9g}"
     else:
-        yield key, "" if value is None else text_of(value)
+        yield key, text_of(value)

@@ -9,6 +9,7 @@ import pytest
 from airlight.reports.tables.drawing import csv, html, latex, markdown, text
 from airlight.reports.tables.table import (
     Column,
+    Interval,
     Measured,
     Name,
     Row,
@@ -85,6 +86,12 @@ def test_five_ways_carry_the_same_cells_and_escape_what_means_something_to_them(
         "name,time,time_low,time_high,reason\n<b> a|b & c_d 50 %,12.345,12,13,\nb,,,,no <light>\n"
     )
     assert csv(drawn).replace("\r", "") == wanted
+
+
+def test_an_interval_that_is_not_known_leaves_its_cells_of_csv_empty():
+    rows = [("a", Interval(1.0, 2.0)), ("b", None)]
+    drawn = csv(table("", (*words("name"), *numbers(bias="bias")), rows))
+    assert drawn == "name,bias_low,bias_high\na,1,2\nb,,\n"
 
 
 @pytest.mark.claim("tables-at-80-columns")
