@@ -105,8 +105,9 @@ const tellTimes = (said) => {
   }
 };
 
-const percent = (fraction) => `${(100 * fraction).toPrecision(3)} %`;
-const small = (fraction) => `${(100 * fraction).toExponential(1)} %`;
+// What is not known is not zero, as in the dark, where nothing is relative to the reference.
+const percent = (fraction) => fraction === null ? "not known" : `${(100 * fraction).toPrecision(3)} %`;
+const small = (fraction) => fraction === null ? "not known" : `${(100 * fraction).toExponential(1)} %`;
 hear.error = ({failure, error, done, frames, mean}) => {
   const words = $("#error");
   document.documentElement.dataset.reference = failure ? "failed" : done ? "done" : error ? "known" : "none";
