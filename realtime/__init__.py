@@ -69,8 +69,8 @@ them.
     airlight = render_frame(renderer).airlight  # dataclasses.replace(renderer, run=1): new noise
     march = frame_renderer(scene, METHODS["ray-march"], steps=400)  # parameters by their names
 
-**A new method** is one file in `methods/` and a line of `_CLASSES` in `methods/registry.py`; without
-that line it is a user's own, `--method FILE.py:Class`:
+**A new method** is one file in `methods/` and a line of `_CLASSES` in `methods/registry.py`.
+Without that line it is a user's own, `--method FILE.py:Class`:
 
     from airlight.realtime.methods.interface.marching import marched_steps
     from airlight.realtime.methods.interface.method import Method

@@ -253,8 +253,8 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
         mean = sums(PILOT, pilot, active) / count
         value = mean.mean(axis=-1) + known[active]
         # The error of a ray below a twentieth of the mean over rays need not be small relative to
-        # its value. The first pilot, of all rays, gives this floor; rays that meet a point light, an
-        # infinite value, have no part in it.
+        # its value. The first pilot, of all rays, gives this floor; rays that meet a point light,
+        # an infinite value, have no part in it.
         if floor is None:
             finite = np.isfinite(value).all(axis=1)
             floor = 0.05 * value[finite].sum(axis=0) / max(1, np.count_nonzero(finite))

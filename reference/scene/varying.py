@@ -170,8 +170,9 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
         largest=largest,
         plugin=medium,
     )
-    # Mitsuba's extinctions at random places in the box: 512 even ones, and, since a grid may be empty
-    # nearly everywhere, 64 in voxels that are drawn by their values, wherever a way puts these.
+    # Mitsuba's extinctions at random places in the box: 512 even ones, and, since a grid may be
+    # empty nearly everywhere, 64 in voxels that are drawn by their values, wherever a way puts
+    # these.
     random = np.random.default_rng(1)
     even = random.random((512, 3))
     voxel = random.choice(values.size, 64, p=values.ravel() / values.sum())

@@ -72,8 +72,8 @@ def write_report(
     """Study scenes and write the report into a folder; return the content of
     report.json, see docs/formats.md.
 
-    Only the first of the sizes of the study counts, and none of its media. `images` from elsewhere are judged,
-    by scene, at their size. The page names `command` under "how to reproduce". `fresh` computes
+    Only the first of the sizes of the study counts, and none of its media. `images` from elsewhere
+    are judged, by scene, at their size. The page names `command` under "how to reproduce". `fresh` computes
     everything again. With `apart` user methods run in separate processes, where a fault becomes a
     row (`own_faults`); else it ends the report. `noted` is called with notes on the scenes before
     the work. Workers of `cluster` compute references and the batches that check them; methods run

@@ -61,7 +61,7 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     """
     # Pixels that are not compared, such as those that a mask leaves out, have no error, and count
     # in no mean.
-    compared = (np.isfinite(reference) & np.isfinite(image)).all(axis=2)
+    compared = np.all(np.isfinite(reference) & np.isfinite(image), axis=2)
     difference = np.where(compared[..., None], image - reference, 0.0)
     squared = (difference**2).sum(axis=2)
     total = float(squared.sum())
