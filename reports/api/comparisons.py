@@ -17,6 +17,7 @@ from airlight.reports.api.results import Array, Pictured, as_array, read_only
 from airlight.reports.plotting.pictures import (
     ERROR_CEILING,
     ERROR_FLOOR,
+    error_colours,
     error_map,
     exposure,
     png_bytes,
@@ -218,15 +219,21 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
 
     An .exr file has test - reference [W/(m^2 sr)] in R, G, B, and (test - reference) /
     max(reference, 0.001 mean(reference)) in the layer `relative`; a .png file has the latter in
-    false colours, `error_map`. Images are (height, width, 3). Pixels outside of `kept`, (height,
-    width), and in EXR files those that are not finite, have no difference.
+    false colours, `error_map`. Images are (height, width[, channels]); one channel is grey. Pixels
+    outside of `kept`, (height, width), and in EXR files those that are not finite, have no
+    difference, and the mean is that of all others.
     """
-    reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
+    reference, test = (
+        colours(np.asarray(values, dtype=np.float64).reshape(*np.shape(values)[:2], -1))
+        for values in (reference, test)
+    )
     # A mask has one truth value a pixel; the new axis spreads it over the colours.
-    mask = np.ones_like(reference, dtype=bool) if kept is None else np.asarray(kept)[..., None]
-    # Masked pixels get the values of the reference, which the error map draws as no difference.
+    mask = np.asarray(np.ones(reference.shape[:2], dtype=bool) if kept is None else kept)[..., None]
+    # Masked pixels become NaN in the reference, so that one test finds masked pixels and pixels
+    # whose difference is not a number.
+    relative = relative_error(np.where(mask, reference, np.nan), test)
     if path.suffix.lower() == ".png":
-        write_png(path, error_map(reference, np.where(mask, test, reference)))
+        write_png(path, error_colours(np.where(mask, relative, 0)))
         return (
             "signed relative error, blue too dark, red too bright, "
             f"from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
@@ -234,9 +241,6 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     from airlight.reference.storage.exr import write_exr
     from airlight.reports.machine.environment import stamped
 
-    # Masked pixels become NaN in the reference, so that one test finds masked pixels and pixels
-    # whose difference is not a number.
-    relative = relative_error(np.where(mask, reference, np.nan), test)
     compared = ~np.isnan(relative)
     # Programs that open the file expect finite values: pixels without a difference hold 0, and the
     # attribute counts the unmasked ones.

@@ -160,7 +160,13 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     The error of a pixel is the largest `relative_error` over its channels, on a scale that is white
     below 1e-4 and logarithmic from there to 1 on either side, the same for every method.
     """
-    relative = relative_error(reference, test)
+    return error_colours(relative_error(reference, test))
+
+
+def error_colours(relative: NDArray[np.float64]) -> Picture:
+    """Return signed relative errors, (height, width, 3), in the false colours of `error_map`; what
+    is not a number is magenta.
+    """
     finite = ~np.isnan(relative)
     # The channel with the largest error decides, and keeps its sign.
     relative = np.where(finite, relative, 0)

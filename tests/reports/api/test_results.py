@@ -17,7 +17,7 @@ from airlight.reference.storage.build import build
 from airlight.reference.storage.exr import Image, read_exr
 from airlight.reports.api.compare import compare
 from airlight.reports.api.results import Reference, RenderedFrames, Rendering, sealed, write_image
-from airlight.reports.plotting.pictures import tone_curve
+from airlight.reports.plotting.pictures import signed_colours, tone_curve
 from airlight.reports.studies.methods import MethodsStudy
 from airlight.validation.estimates.images import MonteCarloReference, RelativeErrors
 from airlight.validation.study.row import Row
@@ -237,6 +237,31 @@ def test_a_comparison_is_an_array_of_relative_errors_and_one_line():
     grey = compare(exact.airlight[..., 0], 1.01 * exact.airlight[..., 0])
     assert grey.picture().shape == (4, 6, 3)
     assert grey.error.shape == (4, 6)
+
+
+def test_a_picture_of_a_difference_under_a_mask_has_the_errors_of_the_values(tmp_path):
+    """A light that is left out must not lift the floor under dark pixels, nor be shown itself."""
+    exact = np.full((4, 6, 3), 1e-4)
+    exact[0, 0], exact[0, 1] = np.inf, 1e6
+    test, kept = exact.copy(), np.isfinite(exact[..., 0]) & (exact[..., 0] < 1)
+    test[2, 2] = 2e-4
+    for name in ("values.exr", "picture.png"):
+        compare(exact, test, mask=kept, output=tmp_path / name)
+    relative = read_exr(tmp_path / "values.exr").layers["relative"]
+    np.testing.assert_allclose(relative[2, 2], 1.0, rtol=1e-5)
+    shown = pixels((tmp_path / "picture.png").read_bytes())
+    np.testing.assert_array_equal(shown[2, 2], signed_colours()[-1])
+    np.testing.assert_array_equal(shown[0, :2], [signed_colours()[127]] * 2)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_a_difference_of_images_of_one_value_a_pixel_is_grey(masked, tmp_path):
+    kept = np.arange(24).reshape(4, 6) != 3 if masked else None
+    for name in ("values.exr", "picture.png"):
+        compare(np.ones((4, 6)), np.full((4, 6), 1.5), mask=kept, output=tmp_path / name)
+    difference = read_exr(tmp_path / "values.exr").layers["total"]
+    assert difference.shape == (4, 6, 3)
+    assert np.count_nonzero(difference == 0.5) == 3 * (23 if masked else 24)
 
 
 def test_a_layer_is_found_by_its_name_and_one_that_lacks_is_refused():
