@@ -20,13 +20,12 @@ from airlight.reports.tables.agreement import verdict
 from airlight.reports.tables.costs import TIMES, WORK, same_records
 from airlight.reports.tables.table import Table, fields_of, table, words
 from airlight.validation.metrics.errors import Metrics
-from airlight.validation.papers.claims import Claim
+from airlight.validation.papers.claims import QUARTILES, Claim
 from airlight.validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
 from airlight.validation.study.row import Row
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
-#: Units of figures that depend on how busy the machine was: another verdict is a note.
-_TIMED = ("frames/s", "ms", "%", "times")
+_TIMED = ("frames/s", "ms")  #: units of times
 _COLUMNS = (
     *fields_of(Finding, "verdict", "scene", "method", "what"),
     *fields_of(Finding, "old", "new", digits=4),
@@ -302,8 +301,9 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
 
 
 def _kind(row: Claim, now: Claim) -> str:
-    # A busy machine can overturn a verdict on times.
-    if row.unit in _TIMED:
+    # A busy machine can overturn a verdict on times: on rates, and on quotients of what has
+    # quartiles.
+    if row.unit in _TIMED or QUARTILES in f"{row.interval} {now.interval}":
         return "note"
     if "reproduced" in (row.verdict, now.verdict):
         return "worse" if row.verdict == "reproduced" else "better"

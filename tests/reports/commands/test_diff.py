@@ -280,7 +280,7 @@ def test_reports_of_two_commits_of_one_version_say_so():
     ]
 
 
-def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
+def claimed(verdict, measured, *, unit="", published=None, item="eq. 1", interval=""):
     """Return a report with one verdict on a paper."""
     row = {
         "paper": "biri",
@@ -290,7 +290,25 @@ def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
         "published": published,
     }
     row |= {"measured": measured, "low": measured, "high": measured, "unit": unit, "why": "so"}
+    row["interval"] = interval
     return report() | {"papers": [row]}
+
+
+@pytest.mark.parametrize(
+    ("unit", "interval", "kind"),
+    [
+        ("%", "", "worse"),  # of Mie's theory
+        ("times", "", "worse"),  # an error over another one
+        ("times", "quartiles", "note"),
+        ("times", "quartiles over 95 % interval", "note"),
+        ("frames/s", "", "note"),
+    ],
+)
+def test_only_a_verdict_on_times_depends_on_how_busy_the_machine_was(unit, interval, kind):
+    good = claimed("reproduced", 1.0, unit=unit, interval=interval)
+    bad = claimed("not reproduced", 2.0, unit=unit, interval=interval)
+    difference = compare_reports(good, bad)
+    assert words(difference, kind) == ["biri, eq. 1: not reproduced, was reproduced"]
 
 
 def test_verdicts_on_papers_are_compared():
