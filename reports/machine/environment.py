@@ -300,10 +300,12 @@ def machine() -> dict[str, str]:
     keys of results with times.
     """
     environment = describe_environment()
-    return {
+    known = {
         name: str(environment.get(name))
         for name in ("processor", "threads", "variant", "llvm", "device")
     }
+    # Kernels that were compiled quickly run slowly: their times are others.
+    return known | ({"compilation": "quick"} if quick_compilation.is_asked_for() else {})
 
 
 def machine_in_words(environment: Mapping[str, Any]) -> str:

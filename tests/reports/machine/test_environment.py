@@ -157,6 +157,14 @@ def test_cuda_by_what_the_driver_says(driver, works, word, monkeypatch):
     assert word in status.reason
 
 
+def test_times_of_kernels_that_were_compiled_quickly_are_not_those_of_the_machine(monkeypatch):
+    keys = []
+    for value in ("full", "quick"):
+        monkeypatch.setenv("AIRLIGHT_COMPILATION", value)
+        keys.append(environment.machine())
+    assert keys[1] == keys[0] | {"compilation": "quick"}
+
+
 @pytest.fixture(scope="module")
 def diagnosis(variant):
     """Return the diagnosis of this machine, made once."""
