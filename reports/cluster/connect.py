@@ -155,14 +155,15 @@ def _remote(scheduler: str) -> Iterator[Client]:
     try:
         # A scheduler without workers accepts tasks and never does them: the command would wait for
         # ever.
-        client.wait_for_workers(1, timeout=30)
+        try:
+            client.wait_for_workers(1, timeout=30)
+        except TimeoutError:
+            raise InputError(
+                f"--cluster: the scheduler at {scheduler} has no worker: start `dask worker` with "
+                "its address, in an "
+                "environment that has airlight"
+            ) from None
         yield client
-    except TimeoutError:
-        raise InputError(
-            f"--cluster: the scheduler at {scheduler} has no worker: start `dask worker` with its "
-            "address, in an "
-            "environment that has airlight"
-        ) from None
     finally:
         # The scheduler may have disappeared during the work.
         with suppress(Exception):

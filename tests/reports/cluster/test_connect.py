@@ -9,6 +9,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -40,6 +41,12 @@ def test_where_no_scheduler_answers(monkeypatch):
     message = r"no scheduler answers at tcp://127\.0\.0\.1:9 .*start `dask scheduler`"
     with pytest.raises(InputError, match=message), connected("tcp://127.0.0.1:9"):
         pass
+
+
+def test_a_time_limit_of_the_work_is_not_taken_for_a_scheduler_without_workers(monkeypatch):
+    monkeypatch.setattr("distributed.Client", lambda **how: MagicMock())
+    with pytest.raises(TimeoutError, match="of the work"), connected("tcp://127.0.0.1:9"):
+        raise TimeoutError("of the work")
 
 
 def _dask(*words, root=ROOT):
