@@ -32,7 +32,7 @@ def save_figure(path: Path, draw: Callable[[str], "Figure"], column: str = "doub
     the path; return the path.
     """
     with figure_style(column):
-        write_bytes(path, file_bytes(draw(column), path.suffix))
+        write_bytes(path, file_bytes(draw(column), path.suffix.lower()))
     return path
 
 

@@ -214,7 +214,7 @@ class Integrals(Study):
         """Write the rows with a column `result` (.csv), or what `Study.save`
         writes; return the path.
         """
-        if Path(path).suffix != ".csv":
+        if Path(path).suffix.lower() != ".csv":
             return super().save(path, column)
         from airlight.validation.kernels.cases import write_results
 

@@ -75,8 +75,9 @@ class Study(Said):
         from airlight.reports.tables.drawing import csv, latex, markdown
 
         target = Path(path)
+        ending = target.suffix.lower()
         # The ending decides: a figure, tables or data.
-        if target.suffix in (".pdf", ".png"):
+        if ending in (".pdf", ".png"):
             if self.draw is None:
                 raise InputError(
                     f"{target}: the study {self.name} has no figure; write .csv, .tex, .md or .json"
@@ -84,16 +85,16 @@ class Study(Said):
             from airlight.reports.plotting.figure import save_figure
 
             return save_figure(target, self.draw, column)
-        if target.suffix == ".csv":
+        if ending == ".csv":
             write_text(
                 target,
                 _columns_csv(self.columns()) if self.rows else "\n".join(map(csv, self.tables)),
             )
-        elif target.suffix == ".tex":
+        elif ending == ".tex":
             write_text(target, "\n".join(latex([table]) for table in self.tables))
-        elif target.suffix == ".md":
+        elif ending == ".md":
             write_text(target, "\n".join(map(markdown, self.tables)))
-        elif target.suffix == ".json":
+        elif ending == ".json":
             write_text(
                 target,
                 json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n",

@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 import airlight
+from airlight.reports.api.inputs import output_files
 from airlight.reports.commands import main as cli
+from airlight.reports.plotting.figure import new_figure
+from airlight.reports.studies.registry import ENDINGS, Study
+from airlight.reports.tables.table import numbers, table
 from airlight.validation.kernels.case_files import read_cases
 from tests.helpers.api import third
 
@@ -155,6 +159,16 @@ QUICK = {
     "kernels": {"kernel": "taylor", "phase": "isotropic"},
     "slab": {"tau": 2, "sun": 30, "orders": "1,2", "photons": 50},
 }
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_an_ending_in_capitals_writes_the_same_file(ending, tmp_path):
+    """The command takes both before it measures for minutes."""
+    shown = table("t", numbers("a"), [(1,)])
+    made = Study(name="made up", data={}, tables=(shown,), draw=lambda column: new_figure(2, 1))
+    small, capital = tmp_path / f"a{ending}", tmp_path / f"b{ending.upper()}"
+    assert output_files(capital, *ENDINGS) == [capital]
+    assert made.save(small).read_bytes() == made.save(capital).read_bytes()
 
 
 @pytest.mark.slow
