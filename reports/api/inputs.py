@@ -175,7 +175,7 @@ def pixels_of(size: Any) -> tuple[int, int] | None:
         width, height = size
         if not (int(width) == width and int(height) == height):
             raise ValueError
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"size: got {size!r}, expected (width, height) in pixels, for example (800, 600)"
         ) from None

@@ -37,7 +37,7 @@ def test_a_size_is_two_whole_numbers_or_words():
         pixels_of("16x12") == pixels_of((16, 12)) == pixels_of(np.array([16.0, 12.0])) == (16, 12)
     )
     assert pixels_of(None) is None
-    for wrong in [(16.5, 12), (16,), 16, ("wide", 12)]:
+    for wrong in [(16.5, 12), (16,), 16, ("wide", 12), (float("inf"), 12)]:
         with pytest.raises(
             airlight.InputError, match=r"^size: got .*, expected \(width, height\) in pixels"
         ):
