@@ -418,7 +418,10 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
         reasons.append(f"the best factor is {hints.factor:.4g}")
     if not reasons and math.isnan(error):
         reasons.append("nothing is lit in the pixels that are compared")
-    if error > RIGHT:
+    # Light where the reference has none is wrong by no number.
+    if not reasons and math.isinf(error):
+        reasons.append("the reference is black")
+    if RIGHT < error < math.inf:
         size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
         scatter = ", most of it scatter of single pixels: render more samples, or march more steps"
         most = scatter if noise > error / math.sqrt(2) else ""
@@ -475,6 +478,9 @@ def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, flo
     lit = (count > 0) & (np.maximum(light, test_light) > floor * count)
     if not lit.any():
         return math.nan, math.nan
+    # Light where the reference has none at all is wrong by any factor, and that is no noise.
+    if floor == 0:
+        return math.inf, 0.0
     scale = np.maximum(light, floor * count)[lit]
     error = np.abs(offset[lit]) / scale
     # Noise that is independent from pixel to pixel gives the sum of a block the variance

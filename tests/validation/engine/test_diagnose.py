@@ -207,6 +207,7 @@ def test_an_image_of_what_should_be_black_is_black_only_if_it_is(variant, value,
     assert diagnosis.first == first
     assert ("The image is black" in "\n".join(diagnosis.lines)) == (first == "black")
     assert "the reference is black" in diagnosis.verdict
+    assert "inf" not in diagnosis.verdict
 
 
 def test_the_diagnosis_remembers_what_the_reader_of_the_file_said(reference):
