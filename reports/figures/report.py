@@ -205,7 +205,7 @@ def _pixels(path: Path, name: str) -> Any:
 
 def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ...]:
     """Return the corners (column, row) of two squares that do not overlap, with the
-    largest errors of all methods.
+    largest errors of all methods; of one where there is no room for another.
 
     Errors are divided by the largest of their method, so that every method counts.
     """
@@ -223,6 +223,8 @@ def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ..
     for _ in range(2):
         # The square with the largest error; corners whose squares would overlap it are then out of
         # question.
+        if np.all(inside == -1.0):
+            break
         row, column = (int(index) for index in np.unravel_index(int(inside.argmax()), inside.shape))
         corners.append((column, row))
         inside[max(0, row - side) : row + side, max(0, column - side) : column + side] = -1.0
@@ -234,8 +236,8 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     the signed relative error.
     """
     height, width = images[0].shape[:2]
-    # An inset shows a sixth of the image's shorter side.
-    side = max(4, min(height, width) // 6)
+    # An inset shows a sixth of the image's shorter side, of a tiny image all of that.
+    side = min(max(4, min(height, width) // 6), height, width)
     corners, factor = worst_squares(images, side), exposure(images[0])
     # Inches and points. Each image has a picture, two insets of half its width below, and an error
     # map.

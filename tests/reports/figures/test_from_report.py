@@ -119,6 +119,16 @@ def test_the_strip_shows_where_methods_are_wrong(report):
         figures._strip(data, place, None, ["nothing"])
 
 
+@pytest.mark.parametrize(("size", "insets"), [((1, 1), 1), ((5, 1), 2), ((4, 7), 1)])
+def test_the_strip_of_a_tiny_image_has_the_insets_that_it_has_room_for(report, size, insets):
+    data, place = load_report(report)
+    _, (method, *_), _ = figures._strip(data, place, None, None)
+    images = [np.full((*size, 3), value) for value in (1.0, 1.5)]
+    side = min(4, *size)
+    assert len(figures.worst_squares(images, side)) == insets
+    figures.draw_strip("tiny", [method], images, "double")
+
+
 def test_the_panels_of_the_strip_are_the_images_under_their_names(report):
     """Every picture and every error map against the data, in the order of the titles."""
     data, place = load_report(report)
