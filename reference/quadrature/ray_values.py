@@ -151,7 +151,7 @@ def ray_values(
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(reference, hits, reached=reached, shadow_scale=shadow_scale)
-    # Of area lights and the sky: empty arrays in other scenes.
+    # Area lights and the sky have these; in other scenes they are empty.
     emitted, replicates = np.empty((0, 0)), np.empty((0, 0, 0))
     if reference.area or reference.background is not None:
         emitted = emitted_light(reference, hits.distance)
