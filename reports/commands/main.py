@@ -43,8 +43,7 @@ from airlight.reports.machine.environment import (
     missing_packages,
 )
 from airlight.reports.machine.process_start import start_again_with
-from airlight.reports.studies.registry import ENDINGS as STUDY_ENDINGS
-from airlight.reports.studies.registry import STUDIES, find_study
+from airlight.reports.studies.registry import STUDIES, endings_of, find_study
 from airlight.reports.studies.registry import study as run_study
 from airlight.reports.tables.record import Result, colours_wanted, print_json, terminal_width
 
@@ -157,7 +156,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     # Commands whose result is a file have -o added here; others declare `output` themselves. A
     # study writes its data by -o and has no --json; neither have three commands.
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
-    if function not in (view, run_tests, export) and endings != STUDY_ENDINGS:
+    if function not in (view, run_tests, export) and ".json" not in endings:
         extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False
@@ -279,7 +278,7 @@ def _add_studies(app: App, words: Sequence[str]) -> None:
         asked = name in words[:1]
         sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=number, **how)
         if asked:
-            sub.default(_command(function, endings=STUDY_ENDINGS))
+            sub.default(_command(function, endings=endings_of(name)))
         app.command(sub)
 
 

@@ -141,6 +141,18 @@ STUDIES = {
 }
 
 
+_WITHOUT_FIGURE = ("methods", "stability", "integrals")
+
+
+def endings_of(name: str) -> tuple[str, ...]:
+    """Return the endings of the files that a study can write."""
+    return tuple(
+        ending
+        for ending in ENDINGS
+        if name not in _WITHOUT_FIGURE or ending not in (".pdf", ".png")
+    )
+
+
 def find_study(name: str) -> Callable[..., Any]:
     """Return the function of a study.
 

@@ -161,6 +161,13 @@ QUICK = {
 }
 
 
+@pytest.mark.parametrize("name", ["methods", "stability", "integrals"])
+def test_a_study_without_a_figure_refuses_its_name_before_it_measures(name, capsys, tmp_path):
+    words = ["no.csv"] if name == "integrals" else []
+    assert cli.run(["study", name, *words, "-o", str(tmp_path / "a.png")]) == 2
+    assert "ends in .csv or .tex or .md or .json" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_an_ending_in_capitals_writes_the_same_file(ending, tmp_path):
     """The command takes both before it measures for minutes."""
