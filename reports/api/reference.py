@@ -3,6 +3,7 @@
 samples, here or on workers.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -124,7 +125,8 @@ def reference(
         }
         others = {"pixel": pixel != "centre", "estimator": estimator != "quadrature"}
         exclude("merge", "traces nothing", budgets | of_tracing | others)
-        return _merged(str(scene), files)
+        named = isinstance(scene, str | os.PathLike)
+        return _merged(str(scene) if named else getattr(scene, "name", "scene"), files)
     if estimator not in _ESTIMATORS:
         raise InputError(
             f"estimator: got {estimator!r}, expected one of {', '.join(_ESTIMATORS)}"
@@ -146,7 +148,7 @@ def reference(
                 "seconds: how many batches workers trace in a time is chance; give samples with a "
                 "cluster"
             )
-        if not isinstance(scene, str):
+        if not isinstance(scene, str | os.PathLike):
             raise InputError("cluster: workers load a scene by its name or path; give that")
         place = parse_place(cluster)
     # A budget belongs to estimators that draw samples; the quadrature has none.

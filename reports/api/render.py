@@ -7,6 +7,7 @@ which it may end or never leave. A function that Python gives runs here.
 """
 
 import operator
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -183,7 +184,7 @@ def render(
     call: Any = operator.call
     # A loaded scene cannot leave this process, so that user code runs here then. A callback cannot
     # cross either: the other process shows the bar itself.
-    if apart and isinstance(scene, str):
+    if apart and isinstance(scene, str | os.PathLike):
         from airlight.reports.machine.own_process import in_own_process
 
         call, progress = partial(in_own_process, name=chosen.method), shown

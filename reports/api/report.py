@@ -348,6 +348,12 @@ def _measured(
     from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
     from airlight.validation.study.study import RandomScenes, standard_study
 
+    # Scenes are opened twice, and by other processes: by their names.
+    for each in scenes:
+        if not isinstance(each, str | os.PathLike):
+            raise InputError(
+                f"scenes: got {type(each).__name__}, expected the name or the path of a scene"
+            )
     # A study file replaces the effort: it says scenes, sizes and methods.
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):

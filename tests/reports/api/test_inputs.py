@@ -3,12 +3,16 @@
 say is refused in one line.
 """
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import airlight
 from airlight.errors import InputError
 from airlight.realtime.errors import NoDriverError
+from airlight.reference.storage import exr
 from airlight.reports.api.inputs import (
     changes_of,
     configuration_of,
@@ -110,6 +114,19 @@ def test_progress_is_told_shown_or_left(capsys):
     assert capsys.readouterr().out == ""  # a bar is on the error stream
 
 
+def test_files_are_merged_for_a_scene_that_is_loaded_by_its_name(monkeypatch):
+    made = {"airlight:scene": "open-fog", "airlight:estimator": "volpath"}
+    image = exr.Image({"airlight": np.ones((3, 4, 3))}, None, made)
+    monkeypatch.setattr(exr, "read_exr", lambda path: image)
+    monkeypatch.setattr(
+        "airlight.validation.estimates.merge.merged_references", lambda files: image
+    )
+    loaded = SimpleNamespace(name="open-fog")
+    assert airlight.reference(loaded, merge="a.exr").scene == "open-fog"
+    with pytest.raises(airlight.InputError, match="of the scene open-fog, got hall"):
+        airlight.reference(SimpleNamespace(name="hall"), merge="a.exr")
+
+
 OF_SCENE = {"reference": "open-fog", "test": np.ones((3, 4, 3))}
 
 
@@ -155,6 +172,16 @@ OF_SCENE = {"reference": "open-fog", "test": np.ones((3, 4, 3))}
             "animate: got no number of frames",
         ),
         (airlight.list, {"what": "scene"}, "did you mean 'scenes'"),
+        (
+            airlight.report,
+            {"scenes": object()},
+            "scenes: got object, expected the name or the path",
+        ),
+        (
+            airlight.reference,
+            {"scene": Path("no.xml"), "cluster": "nowhere"},
+            "--cluster: got 'nowhere'",
+        ),
     ],
 )
 @pytest.mark.claim("input-errors")
