@@ -127,12 +127,10 @@ def run_groups(
                     words = (
                         f"stopped after {guilty.limit:g} s"
                         if hung
-                        else "its process ended {} times while it ran"
+                        else f"its process ended {attempts} times while it ran"
                     )
                     reason = f"{guilty.name}: {words}" if in_first else words
-                    yield from _all(
-                        group, "hung" if hung else "aborted", reason.format(attempts), attempts
-                    )
+                    yield from _all(group, "hung" if hung else "aborted", reason, attempts)
             # what a task or the scheduler raises ends a row, not the run
             except Exception as error:
                 # Without a scheduler every group that is still flying is lost; the loop ends once

@@ -75,9 +75,13 @@ def test_what_belongs_together_is_done_by_one_process_and_all_have_work(cluster)
 @pytest.mark.claim("sweeps-end-what-hangs", tolerance="none")
 def test_a_task_that_ends_its_process_is_given_up_and_no_other(cluster):
     others = [Task(f"s{n}", tasks.square, (n, 0.05)) for n in range(12)]
-    ended = outcomes(cluster, alone(Task("bad", tasks.abort), *others), retries=1)
+    last = Group((Task("last", tasks.add, (1,)),), Task("reference of {a}", tasks.abort))
+    ended = outcomes(cluster, alone(Task("bad", tasks.abort), *others), last, retries=1)
     assert (ended["bad"].status, ended["bad"].attempts) == ("aborted", 2)
     assert ended["bad"].reason == "its process ended 2 times while it ran"
+    # A name of a user, here of a scene, stands as it is.
+    assert (ended["last"].status, ended["last"].attempts) == ("aborted", 2)
+    assert ended["last"].reason == "reference of {a}: its process ended 2 times while it ran"
     assert {ended[task.name].status for task in others} == {"done"}
 
 
