@@ -38,7 +38,7 @@ from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.build import build
 from airlight.reference.storage.files import write_bytes
 from airlight.reports.interchange.meshes import ShapeMesh, shape_mesh
-from airlight.reports.interchange.scene import describe_scene
+from airlight.reports.interchange.scene import describe_scene, surface
 from airlight.validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
@@ -67,12 +67,18 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     scene = read_reference(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
     # Surfaces, bounds of media, lights: the order in which `_document` lists their materials.
-    opaque = [shape_mesh(shape) for shape in scene.occluders.shapes() if not shape.is_emitter()]
-    area_lights = [shape_mesh(light.shape) for light in scene.area]
+    opaque = [shape for shape in scene.occluders.shapes() if not shape.is_emitter()]
     names = {medium.name for medium in scene.media}
-    bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
-    meshes = [*opaque, *bounds, *area_lights]
-    data = _container(*_document(described, turn, meshes))
+    bounds = [shape for shape in loaded.scene.shapes() if shape.id() in names]
+    lights = [light.shape for light in scene.area]
+    meshes = [shape_mesh(shape) for shape in (*opaque, *bounds, *lights)]
+    # A light that reflects is described as a surface too, and is one mesh: that of the light.
+    described |= {"surfaces": [surface(shape) for shape in opaque]}
+    colours = [
+        surface(light.shape)["reflectance"] if light.opaque else [0.0, 0.0, 0.0]
+        for light in scene.area
+    ]
+    data = _container(*_document(described, turn, meshes, colours))
     write_bytes(path, data)
     return {
         "path": str(path),
@@ -83,10 +89,10 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
 
 
 def _document(
-    described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]
+    described: dict[str, Any], turn: Array, shapes: list[ShapeMesh], colours: list[list[float]]
 ) -> tuple[dict[str, Any], bytes]:
     """Return the JSON and the binary part; the shapes are surfaces, bounds of
-    media, lights, as described.
+    media, lights, as described; `colours` are the reflectances of these lights.
     """
     buffer = _Buffer()
     # A light of KHR_lights_punctual has a node; an area light is a mesh that emits (see the
@@ -95,7 +101,7 @@ def _document(
     extended = [light for light in described["lights"] if light["kind"] == "area"]
     materials = [_material(surface) for surface in described["surfaces"]]
     materials += [_boundary(medium) for medium in described["bounded_media"]]
-    materials += [_emission(light) for light in extended]
+    materials += [_emission(*each) for each in zip(extended, colours, strict=True)]
     # glTF has no empty lists: a mesh without triangles is left out.
     meshes = [
         buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes) if len(mesh.faces)
@@ -240,23 +246,27 @@ def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
 
 def _material(surface: dict[str, Any]) -> dict[str, Any]:
     """Return a material that reflects diffusely and nothing else."""
-    colour = [*(min(1.0, value) for value in surface["reflectance"]), 1.0]
     extras = {key: surface[key] for key in ("reflectance", "textured", "diffuse")}
-    return _matte(surface["name"], colour, extras) | {"doubleSided": surface["two_sided"]}
+    matte = _matte(surface["name"], _opaque(surface["reflectance"]), extras)
+    return matte | {"doubleSided": surface["two_sided"]}
 
 
-def _emission(light: dict[str, Any]) -> dict[str, Any]:
-    """Return the material of an area light: black, and as bright as the light
-    on the side of its normal.
+def _opaque(reflectance: list[float]) -> list[float]:
+    return [*(min(1.0, value) for value in reflectance), 1.0]
+
+
+def _emission(light: dict[str, Any], reflectance: list[float]) -> dict[str, Any]:
+    """Return the material of an area light: black where it reflects nothing, and as
+    bright as the light on the side of its normal.
     """
-    # A black material reflects nothing; its emission is strength times factor.
+    # Its emission is strength times factor.
     largest = max(light["radiance"])
     extras = {
         "light": light,
         "note": "core glTF has no area light: this mesh emits; to some engines no mesh is a light",
         "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
     }
-    made = _matte(f"light {light['name']}", [0.0, 0.0, 0.0, 1.0], extras)
+    made = _matte(f"light {light['name']}", _opaque(reflectance), extras)
     made["emissiveFactor"] = [
         value / largest if largest > 0 else 0.0 for value in light["radiance"]
     ]

@@ -178,6 +178,22 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped)
 
 
 @pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
+def test_a_light_that_reflects_is_one_mesh_and_all_others_keep_their_materials(variant, tmp_path):
+    grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.5, 0.4, 0.3]}}
+    place = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1])
+    # It stands before the others: by their names the parts of a dictionary are in order.
+    write_gltf(tmp_path / "tiny.glb", loaded(a_lamp=lamp(bsdf=grey, to_world=place.scale(0.3))))
+    document, _ = parts(tmp_path / "tiny.glb")
+    names = {
+        mesh["name"]: document["materials"][mesh["primitives"][0]["material"]]["name"]
+        for mesh in document["meshes"]
+    }
+    assert names == {"ball": "ball", "floor": "floor", "a_lamp": "light a_lamp"}
+    (material,) = (each for each in document["materials"] if each["name"] == "light a_lamp")
+    assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0.5, 0.4, 0.3, 1.0]
+
+
+@pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
 @pytest.mark.parametrize(("kind", "flipped"), [("rectangle", True), ("sphere", False)])
 def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(
     variant, tmp_path, kind, flipped
