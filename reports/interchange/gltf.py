@@ -159,6 +159,7 @@ def _document(
 def _scene_extras(described: dict[str, Any], turn: Array) -> dict[str, Any]:
     return {
         "medium": described["medium"],
+        "sky": described["sky"],
         "radiance": described["radiance"],
         "scene_to_gltf": turn.astype(int).tolist(),
         "units": "m, 1/m, W/sr, W/(m^2 sr)",

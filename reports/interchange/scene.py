@@ -41,13 +41,16 @@ _FALLOFF = {
     "the media",
     "area": "the same radiance in every direction on the side of the normal, none behind: irradiance as the light's "
     "projected solid angle, times exp(-sigma_t r)",
+    "sky": "the same radiance from every direction, times exp(-sigma_t length) of its way in the media: the image has "
+    "what media scatter and surfaces reflect of it, and behind them no sky",
 }
 CONVENTION = (
     "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no "
     "tone mapping, no "
     "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse "
     "reflection - eye, "
-    "attenuated by exp(-sigma_t length) along both segments of the path; no ambient light, no sky. "
+    "attenuated by exp(-sigma_t length) along both segments of the path; no light but the lights "
+    "and the sky that are described. "
     "The airlight alone "
     "is the layer `airlight`; the plain channels are airlight + surface. One ray through the "
     "centre of every pixel, or "
@@ -63,10 +66,10 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     the kind of a light or a medium.
 
     These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`,
-    `lights`, `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`. Lengths in
-    metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black shapes of
-    area lights are among the lights, not the surfaces. A scene without a reference is refused, with
-    what is in the way.
+    `lights`, `sky`, `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`.
+    Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black
+    shapes of area lights are among the lights, not the surfaces. `sky` is None where no light of
+    one arrives. A scene without a reference is refused, with what is in the way.
     """
     # it refuses what `render` refuses, in its words
     notes = read_scene(loaded.scene).features.notes
@@ -90,6 +93,9 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             *map(_directional, scene.directional),
             *map(_area, scene.area),
         ],
+        "sky": None
+        if scene.sky is None
+        else {"radiance": _numbers(scene.sky), "falloff": _FALLOFF["sky"]},
         "surfaces": [
             surface(shape)
             for shape in scene.occluders.shapes()

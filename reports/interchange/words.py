@@ -53,6 +53,7 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
         yield from _block("bounded medium", medium)
     for light in described["lights"]:
         yield from _block("light", light)
+    yield from _block("sky", described["sky"] or {})
     surfaces = described["surfaces"]
     # A scene may have thousands of surfaces: the first ones and a count.
     yield "surfaces", "", f"{len(surfaces)}; diffuse: radiance = reflectance / pi irradiance"

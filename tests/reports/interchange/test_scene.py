@@ -227,6 +227,17 @@ def medium(variant, tmp_path):
     return read_reference(load_scene(str(path)).scene).medium
 
 
+def test_a_sky_that_lights_media_is_described_and_one_that_does_not_is_none(variant, tmp_path):
+    """The reference has its light: who renders without it is judged wrong."""
+    sky = '<emitter type="constant"><rgb name="radiance" value="0.07, 0.11, 0.21"/></emitter>'
+    (tmp_path / "fog.xml").write_text(fog_xml(LAMP + sky))
+    found = airlight.describe(str(tmp_path / "fog.xml"))
+    assert found.data["sky"]["radiance"] == [0.07, 0.11, 0.21]
+    assert "(0.07, 0.11, 0.21) W/(m^2 sr)" in found.text()
+    away = {"type": "constant", "radiance": {"type": "rgb", "value": [0.07, 0.11, 0.21]}}
+    assert described(sky=away)["sky"] is None  # through an unbounded medium nothing of it arrives
+
+
 @pytest.mark.claim("height-fog-grid", tolerance="1e-12 relative between nodes, u^2/8 of the whole")
 def test_optical_depths_between_nodes_are_exact(medium):
     density, fog = fog_grid(medium), fog_of(medium)
