@@ -7,6 +7,7 @@ nodes times tanh(u/2)/(u/2) have the optical depth of the layer between any two 
 H/20 densities differ by 2e-4 at the nodes.
 """
 
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from airlight.analytic.phase import HenyeyGreenstein, PhaseFunction, Tabulated
 from airlight.errors import InputError
 from airlight.reference.scene.varying import GridMedium, HeightMedium
+from airlight.reference.storage.files import write_bytes
 
 Array = NDArray[np.float64]
 
@@ -44,8 +46,8 @@ def fog_grid(medium: HeightMedium) -> Array:
 
 
 def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
-    """Write height fog or a grid as a volume file of Mitsuba, and return the
-    medium that reads it, as XML.
+    """Write height fog or a grid as a volume file of Mitsuba, whole or not at all, and
+    return the medium that reads it, as XML.
     """
     import mitsuba as mi
 
@@ -54,10 +56,12 @@ def write_fog_grid(path: Path, medium: HeightMedium | GridMedium) -> str:
         values, corner, size = medium.values, medium.low, medium.high - medium.low
     else:
         values, corner, size = _whole_grid(medium)
-    mi.VolumeGrid(values[..., None].astype(np.float32)).write(str(path))
+    stream = mi.MemoryStream()
+    mi.VolumeGrid(values[..., None].astype(np.float32)).write(stream)
+    write_bytes(path, stream.raw_buffer())
     words = [", ".join(f"{value:.9g}" for value in each) for each in (size, corner, medium.albedo)]
     parts = (
-        f'<volume type="gridvolume" name="sigma_t"> <string name="filename" value="{path}"/>',
+        f'<volume type="gridvolume" name="sigma_t"> <string name="filename" value="{escape(str(path))}"/>',
         '<boolean name="raw" value="true"/> <string name="wrap_mode" value="clamp"/>',
         f'<transform name="to_world"> <scale value="{words[0]}"/> <translate value="{words[1]}"/> '
         "</transform>",

@@ -3,9 +3,11 @@
 
 import json
 import math
+import os
 import re
 import runpy
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mitsuba as mi
 import numpy as np
@@ -257,6 +259,17 @@ def test_mitsuba_reads_the_file(medium, tmp_path):
     interaction.p = mi.Point3f(np.stack([31 - z, 3 * z, z]).astype(np.float32))
     found = np.array(read.get_scattering_coefficients(interaction)[2])[0]
     np.testing.assert_allclose(found, fog_of(medium).density(z), rtol=5e-4)
+
+
+def test_a_grid_takes_the_place_of_an_older_file_and_its_path_is_safe_in_xml(medium, tmp_path):
+    """Who reads the older file goes on to: nothing is written into it."""
+    path, kept = tmp_path / 'fog & "smoke".vol', tmp_path / "kept"
+    path.write_bytes(b"older")
+    os.link(path, kept)
+    text = write_fog_grid(path, medium)
+    assert kept.read_bytes() == b"older"
+    assert ElementTree.fromstring(text).find("volume/string").get("value") == str(path)
+    assert mi.VolumeGrid(str(path)).max() == pytest.approx(fog_grid(medium).max())
 
 
 def test_describe_writes_it(variant, tmp_path):
