@@ -275,8 +275,9 @@ def staged(target: Path) -> Iterator[Path]:
     # A killed run leaves its hidden folder behind; it is removed after a day, as a younger one may
     # belong to a run that is still at work.
     for left in target.glob(f"{_PREFIX}*"):
-        if time.time() - left.stat().st_mtime > 86400:
-            shutil.rmtree(left, ignore_errors=True)
+        with suppress(FileNotFoundError):  # another report has ended since
+            if time.time() - left.stat().st_mtime > 86400:
+                shutil.rmtree(left, ignore_errors=True)
     hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
     try:
         with alone(target):

@@ -9,6 +9,7 @@ import os
 import time
 from dataclasses import asdict, replace
 from functools import wraps
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -560,6 +561,15 @@ def test_a_full_disk_names_the_folder_that_the_user_knows_and_other_faults_are_a
             raise OSError(number, os.strerror(number), "hidden.exr")
         assert raised.value.filename == name
     assert list(tmp_path.iterdir()) == []
+
+
+def test_remains_that_another_report_removes_first_are_no_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        Path, "glob", lambda folder, words: iter([folder / ".airlight-report-gone"])
+    )
+    with staged(tmp_path) as hidden:
+        (hidden / "report.json").write_text("{}")
+    assert (tmp_path / "report.json").exists()
 
 
 def test_the_remains_of_a_killed_run_go_after_a_day(tmp_path):
