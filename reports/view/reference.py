@@ -109,11 +109,15 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
         return None
     reference, test = found.airlight[known], np.asarray(airlight, dtype=np.float64)[known]
     metrics = error_metrics(reference[None], test[None])
-    mean = float(reference.mean())
-    square = np.mean((test - reference) ** 2, axis=1)
+    # Pixels that are not finite are in no error, as in the metrics.
+    finite = (np.isfinite(reference) & np.isfinite(test)).all(axis=1)
+    if not finite.any():
+        return ViewError(None, None, None, None, None, count, pixels)
+    mean = float(reference[finite].mean())
+    square = np.mean((test - reference)[finite] ** 2, axis=1)
     # The standard error of the mean square, without replacement: it is zero when all pixels are
     # known. The error of its root is half of that over the root.
-    spread = float(square.std()) / np.sqrt(count) * np.sqrt(1 - count / pixels)
+    spread = float(square.std()) / np.sqrt(len(square)) * np.sqrt(1 - count / pixels)
     rmse = float(np.sqrt(square.mean()))
     interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
     # The reference's own error, which no number of pixels removes.

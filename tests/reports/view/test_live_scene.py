@@ -154,6 +154,21 @@ def test_error_of_a_part_covers_that_of_the_whole():
     np.testing.assert_array_equal(known.filled(known.airlight), reference)
 
 
+def test_a_pixel_that_is_not_finite_leaves_the_interval_of_the_error_as_wide_as_it_is():
+    known = KnownReference.of_size(WIDTH, HEIGHT)
+    for layer in (known.airlight, known.surface, known.bound):
+        layer[: HEIGHT // 2] = 1.0
+    test = np.where(np.random.default_rng(3).random((HEIGHT, WIDTH, 1)) < 0.5, 1.1, 1.4) * np.ones(
+        3
+    )
+    before = view_error(known, test)
+    test[2, 3, 1] = np.nan
+    after = view_error(known, test)
+    assert after.interval == pytest.approx(before.interval, rel=0.02)
+    nothing = view_error(known, np.full_like(test, np.nan))
+    assert (nothing.relative_rmse, nothing.interval, nothing.known) == (None, None, before.known)
+
+
 def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_finite_is_magenta(
     variant,
 ):
