@@ -251,6 +251,7 @@ class ReferenceInBackground:
         self.known: KnownReference | None = None
         self.done = False
         self.failure = ""  #: why there is no reference, in one line
+        self._ended = ""  # why no task is answered any more
         # A forked process would share the state of Dr.Jit, and deadlock in it.
         context = get_context("spawn")
         self._pipe, other = context.Pipe()
@@ -275,14 +276,15 @@ class ReferenceInBackground:
         with self._lock:
             # Answers to an older task carry its number and are dropped.
             self._number += 1
-            self.known, self.done, self.failure = KnownReference.of_size(*size), False, ""
+            self.known, self.done = KnownReference.of_size(*size), False
+            self.failure = self._ended
             self._send(Task(self._number, scene, size, dict(changes), most))
 
     def stop(self) -> None:
         """Compute nothing, and forget what was found."""
         with self._lock:
             self._number += 1
-            self.known, self.done, self.failure = None, False, ""
+            self.known, self.done, self.failure = None, False, self._ended
             self._send(None)
 
     def end(self) -> None:
@@ -300,10 +302,8 @@ class ReferenceInBackground:
             while True:
                 self._take(self._pipe.recv())
         with self._lock:
-            self.failure = (
-                self.failure
-                or "the process that computes the reference has ended; start the view again"
-            )
+            self._ended = "the process that computes the reference has ended; start the view again"
+            self.failure = self.failure or self._ended
         self._told()
 
     def _take(self, answer: Answer) -> None:

@@ -3,6 +3,8 @@
 its pictures and errors.
 """
 
+import threading
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -13,7 +15,7 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.reports.plotting.pictures import NOT_FINITE, tone_mapped
 from airlight.reports.view.live_scene import LiveScene
 from airlight.reports.view.picture import LAYERS, Pictures
-from airlight.reports.view.reference import KnownReference, view_error
+from airlight.reports.view.reference import KnownReference, ReferenceInBackground, view_error
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.study.configuration import configuration, prepared
@@ -167,6 +169,17 @@ def test_a_pixel_that_is_not_finite_leaves_the_interval_of_the_error_as_wide_as_
     assert after.interval == pytest.approx(before.interval, rel=0.02)
     nothing = view_error(known, np.full_like(test, np.nan))
     assert (nothing.relative_rmse, nothing.interval, nothing.known) == (None, None, before.known)
+
+
+def test_a_reference_whose_process_has_ended_says_so_for_each_scene(variant):
+    told = threading.Event()
+    reference = ReferenceInBackground(told.set, variant)
+    reference.end()
+    assert told.wait(60)
+    for _ in range(2):
+        reference.start("open-fog", SIZE, {})
+        assert "has ended" in reference.failure
+        reference.stop()
 
 
 def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_finite_is_magenta(
