@@ -167,11 +167,18 @@ class Session:
         if self._told < self._changed_at:
             waits.append(self._changed_at + _QUIET - now)
         # Without a frame no reference begins, and without a reference there is no news to wait for.
-        if self._reference_of is None and self._shown is not None:
+        if self._reference_of is None and self._is_shown:
             waits.append(self._changed_at + _STILL - now)
-        if self._news and self._reference_of is not None and self._shown is not None:
+        if self._news and self._reference_of is not None and self._is_shown:
             waits.append(self._news_at + _NEWS - now)
         return max(min(waits), 0.001)
+
+    @property
+    def _is_shown(self) -> bool:
+        """Whether the last frame is of the scene and the method as they are now: a page that has
+        two frames to show yet gets that of a change later.
+        """
+        return self._shown is not None and self._asked_at is None
 
     def _take(self, page: Page, said: list[tuple[Page, dict[str, Any]]]) -> None:
         """Do what the page asks; changes that follow one another are one, and of values
@@ -347,7 +354,7 @@ class Session:
         except InputError as error:
             page.tell("mistake", message=" ".join(str(error).split()))
             self._wanted, self._show["run"], self._asked_at = 0, False, None
-            self._last_judged = self._sent  # what is shown is no frame of the scene as it is
+            self._shown = None  # what is shown is no frame of the scene as it is
             return
         self._shown, self._wanted = shown, max(self._wanted - 1, 0)
         self._news |= self.live.goes_on
@@ -386,11 +393,7 @@ class Session:
         # While the scene changes, single frames are judged in some pixels.
         if self._moves_on:
             self._judge_motion(page)
-        if (
-            self._reference_of is None
-            and now >= self._changed_at + _STILL
-            and self._shown is not None
-        ):
+        if self._reference_of is None and now >= self._changed_at + _STILL and self._is_shown:
             self._reference_of = dict(self.live.changes)
             self._moves_on, self._judged = False, None
             self.reference.start(self._given.scene, self._given.size, self._reference_of)
@@ -398,9 +401,10 @@ class Session:
             self._news
             and now >= self._news_at + _NEWS
             and self._reference_of is not None
-            and self._shown is not None
+            and self._is_shown
         ):
             self._news, self._news_at = False, now
+            assert self._shown is not None
             self._tell_error(page, self._shown)
 
     def _judge_motion(self, page: Page) -> None:
@@ -427,7 +431,7 @@ class Session:
                 page.tell("motion", **plain(told))
         # A change that no frame shows yet has another reference. A frame that was not judged yet,
         # and that shows the last change, is judged in 256 pixels.
-        new = self._sent > self._last_judged and self._asked_at is None
+        new = self._sent > self._last_judged and self._is_shown
         if self._judged is None and self._shown is not None and new:
             with suppress(InputError):
                 self._last_judged, self._judged = (

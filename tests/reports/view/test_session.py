@@ -198,6 +198,27 @@ def test_the_mean_of_noisy_frames_comes_nearer_to_the_reference_until_something_
 
 
 @pytest.mark.claim("view-error")
+def test_no_error_is_told_of_a_frame_of_the_scene_before_a_change(view, monkeypatch):
+    """A page that has two frames to show yet gets the frame of a change later."""
+    for name in ("_QUIET", "_STILL", "_NEWS"):
+        monkeypatch.setattr(f"airlight.reports.view.session.{name}", 0.0)
+    session, page = view("open-fog", "unshadowed")
+    turns(session, lambda: any(said["kind"] == "error" for said in page.said))
+    session._sent += 2
+    said, starts = len(page.said), session.reference.starts
+    session.told(page, {"kind": "change", "changes": {"medium.sigma_t": [0.61]}})
+    for _ in range(2):
+        session._said.append((page, {}))  # the loop does not wait
+        session.turn()
+    assert session.reference.starts == starts
+    assert "error" not in [each["kind"] for each in page.said[said:]]
+    session.told(page, {"kind": "drawn", "frame": session._sent})
+    turns(session, lambda: "error" in [each["kind"] for each in page.said[said:]])
+    assert session.reference.starts > starts
+    assert page.last("error")["error"]["relative_rmse"] < 1e-4
+
+
+@pytest.mark.claim("view-error")
 @pytest.mark.parametrize("method", ["ray-march", "ray-march+history"])
 def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monkeypatch, method):
     """A history has the light of earlier frames: while a light moves it is further off than
