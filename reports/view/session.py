@@ -10,6 +10,7 @@ all that has come since the last frame at once, so frames that nobody would see 
 it waits for the page to show a frame before it sends the next but one.
 """
 
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -508,7 +509,16 @@ def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:
 
 def _number(value: Any) -> float:
     """Return a number of a page's message; 0 for anything else."""
-    return float(value) if isinstance(value, int | float) and np.isfinite(value) else 0.0
+    number = _float(value) if isinstance(value, int | float) else 0.0
+    return number if np.isfinite(number) else 0.0
+
+
+def _float(number: float) -> float:
+    """Return a number of JSON, whose whole numbers may be larger than any float."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
 
 
 def _numbers(changes: Any) -> dict[str, Values]:
@@ -518,7 +528,7 @@ def _numbers(changes: Any) -> dict[str, Values]:
     # Anything of another form is dropped.
     lists = {name: value for name, value in changes.items() if isinstance(value, list)}
     return {
-        name: tuple(float(number) for number in value)
+        name: tuple(_float(number) for number in value)
         for name, value in lists.items()
         if all(isinstance(number, int | float) for number in value)
     }

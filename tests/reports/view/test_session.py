@@ -273,6 +273,9 @@ def test_no_message_ends_the_view(view):
         {"kind": "change", "changes": {"a": "b", "c": [None]}},
         {"kind": "show", "layer": "no such", "exposure": "bright"},
         {"kind": "choose", "method": {}},
+        {"kind": "choose", "parameter": "points", "value": [1]},
+        {"kind": "drawn", "frame": 10**400},
+        {"kind": "change", "changes": {"medium.sigma_t": [10**400]}, "moves": -(10**400)},
     ):
         session.told(page, message)
         session.turn()
