@@ -116,12 +116,11 @@ class MotionComparison:
         if measures.pop_frame is not None:
             # It is a pop where the error changes by three times the median change or more, and
             # where it stays as it is in most frames.
-            pop = math.inf if measures.pop is None else measures.pop
-            words = "a pop" if pop >= 3.0 else "no pop"
-            lines.append(
-                f"largest change   of the error in frame {measures.pop_frame}, "
-                f"{pop:.3g} times the median: {words}"
-            )
+            size = "most others have none: a pop"
+            if measures.pop is not None:
+                words = "a pop" if measures.pop >= 3.0 else "no pop"
+                size = f"{measures.pop:.3g} times the median: {words}"
+            lines.append(f"largest change   of the error in frame {measures.pop_frame}, {size}")
         # A mask without measures (no pixel, or dark) has no entry, and so no line.
         for name, each in self.masks.items():
             if name != "all":
