@@ -42,7 +42,9 @@ class KeptScene:
 @cache
 def data() -> dict[str, Any]:
     """Return the numbers that the documentation keeps."""
-    return json.loads((DATA / "report.json").read_text(encoding="utf-8"))
+    kept = json.loads((DATA / "report.json").read_text(encoding="utf-8"))
+    records.rename_old_keys(kept)
+    return kept
 
 
 @cache
@@ -186,11 +188,12 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
         )
         words.append(f"- Medium: {kept.plan['medium']}; extinction: {kept.plan['extinction']}.")
         reference = kept.reference
-        if reference.relative_bound is not None:
-            bound = number(reference.relative_bound, 2)
+        if reference.relative_error is not None:
+            error = number(reference.relative_error, 2)
+            kind = f" ({reference.kind})" if reference.kind else ""
             words.append(
-                f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative bound "
-                f"{bound}."
+                f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative error "
+                f"{error}{kind}."
             )
         words.append(
             f"- Single scattering leaves out {_percent(kept.multiple.medium)} of the airlight."

@@ -24,12 +24,12 @@ from airlight.errors import InputError, nearest
 from airlight.realtime.frame.samples import render_samples
 from airlight.realtime.methods.registry import METHODS, PUBLISHED_METHODS
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.storage.files import temporary_folder, write_bytes, write_text
 from airlight.reports.data.records import read_report
 from airlight.reports.machine.environment import MissingError, activate, versions
 from airlight.reports.plotting.pictures import error_map, error_scale, preview, tone_curve
 from airlight.reports.tables.table import number
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene

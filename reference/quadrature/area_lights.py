@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.quadrature.fields import field_of, optical_depth
+from airlight.reference.quadrature.integrate import Terms, cosine_profile, sums_of
 from airlight.reference.quadrature.light_airlight import worth_of_doubt
 from airlight.reference.quadrature.light_samples import (
     Sections,
@@ -51,7 +52,6 @@ from airlight.reference.quadrature.replicates import (
     keep_nothing,
     replicate_means,
 )
-from airlight.reference.quadrature.stretches import Terms, cosine_profile, sums_of
 from airlight.reference.quadrature.surface import Reflection, SurfaceHits
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.read import ReferenceScene
@@ -79,9 +79,8 @@ class AreaAirlight:
     """The airlight of all area lights, by replicate."""
 
     replicates: Array  #: (rays, 3, replicates) [W/(m^2 sr)]
-    #: of the error of the lit intervals and their integrals, not of the
-    #: samples, (rays, 3) [W/(m^2 sr)]
-    bound: Array
+    #: of the lit intervals and their integrals, not of the samples, (rays, 3) [W/(m^2 sr)]
+    error: Array
     random_checks: RandomChecks
 
 
@@ -126,10 +125,10 @@ def area_airlight(
     a function that does it; may return what it did before.
     """
     count = len(reference.direction)
-    bound, checks = np.zeros((count, 3)), list[RandomChecks]()
+    error, checks = np.zeros((count, 3)), list[RandomChecks]()
 
     def add(active: Index, got: Kept) -> None:
-        bound[active] += got["bound"]
+        error[active] += got["error"]
         checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
         checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
 
@@ -138,7 +137,7 @@ def area_airlight(
 
     sums = _by_replicate("airlight", len(beams), plan, work, tell=tell, keep=keep, add=add)
     means, used = replicate_means(count, known, plan, sums)
-    return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+    return AreaAirlight(means, error / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
 
 
 def _by_replicate(
@@ -173,7 +172,7 @@ def _by_replicate(
                 if "fraction" in got
                 else got["radiance"]
             )
-            # Pilots only decide how many points count; their bounds and checks are not those of the
+            # Pilots only decide how many points count; their errors and checks are not those of the
             # result.
             if part != PILOT:
                 add(active[rows], got)
@@ -211,11 +210,11 @@ def turn_of_sections(plan: PointPlan, number: int) -> float:
 
 
 def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float) -> Kept:
-    """Return sums over samples: radiances, (rays, 3, replicates), bounds of their errors,
-    and counts of the checks.
+    """Return sums over samples: radiances, (rays, 3, replicates), their errors without that of
+    samples, (rays, 3), and counts of the checks.
     """
     reference, light, count, each = beam.scene, beam.light, len(active), len(points)
-    radiance, bound, checks = (
+    radiance, errors, checks = (
         np.zeros((count, 3, REPLICATES)),
         np.zeros((count, 3)),
         [RandomChecks()],
@@ -252,7 +251,7 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
         # Parts that shadow rays left in doubt may be lit or not: their largest airlight is added to
-        # the bound.
+        # the error.
         parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
         # dA of a sample and the radiance of the light make radiance of the sums. The samples of a
         # ray are in the order of replicates, and each replicate is added up on its own.
@@ -264,7 +263,7 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         return rows, lit.random_checks, np.moveaxis(value, 1, 2), error.sum(axis=1)
 
     def add(rows: slice, found: RandomChecks, value: Array, error: Array) -> None:
-        radiance[rows], bound[rows] = value, error
+        radiance[rows], errors[rows] = value, error
         checks.append(found)
 
     # NumPy, which sums, works on one processor and releases Python's lock meanwhile. Dr.Jit, which
@@ -280,7 +279,7 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
             add(*future.result())
     report = RandomChecks.of_all(checks)
     counts = report.checked, report.disagreements, report.refined, report.left, report.missed
-    return {"radiance": radiance, "bound": bound, "checks": np.array(counts)}
+    return {"radiance": radiance, "error": errors, "checks": np.array(counts)}
 
 
 def area_surface(

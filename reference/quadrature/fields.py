@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Media in the quadrature: the one interface, `Field`.
 
-All other code uses a field: the sums over lit intervals, surfaces, lights that the camera sees, and
-bounds. A new medium is a class with the four members of `Field` in its own file, and a line in
-`field_of`. Where its integrals have no closed form, `sums` cuts the stretches into smooth pieces
-(`whole` and `cut` of `reference.quadrature.pieces`), states its integrand, and gives both to
-`sum_pieces` of `reference.quadrature.adaptive_panels`, which treats lights, tolerances and edges.
-`reference.quadrature.density_grid` does so.
+All other code uses a field: the sums over lit intervals, surfaces, and lights that the camera sees.
+A new medium is a class with the members of `Field` in its own file, and a line in `field_of`. Where
+its integrals have no closed form, `sums` says where the corners of the medium are and how much
+light it scatters between them, an `Integrand` for some stretches, and `sum_stretches` of
+`reference.quadrature.integrate` does the rest: lights, tolerances and edges.
+`reference.quadrature.density_grid` is an example.
 """
 
 from typing import Protocol
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from airlight.reference.quadrature.density_grid import GridField
 from airlight.reference.quadrature.height_fog import HeightField
 from airlight.reference.quadrature.homogeneous import HomogeneousField
-from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms
+from airlight.reference.quadrature.integrate import TERMS, ErrorKind, Terms
+from airlight.reference.quadrature.intervals import Stretches
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import GridMedium, HeightMedium
 from airlight.reference.visibility.planes import Rays
@@ -29,7 +30,7 @@ class Field(Protocol):
     """The interface of a medium, or of all media of a scene together."""
 
     @property
-    def bound_kind(self) -> BoundKind:
+    def error_kind(self) -> ErrorKind:
         """The kind of the errors of `sums`."""
 
     @property
@@ -52,7 +53,7 @@ class Field(Protocol):
         self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS
     ) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and its error by
-        `bound_kind`, (rays, 3) each.
+        `error_kind`, (rays, 3) each.
 
         `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else
         directions [1/sr]; `stretches`: rays, and distances of both ends; the second may be infinite

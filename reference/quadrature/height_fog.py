@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of lit stretches in height fog, with a bound of its error:
-`analytic.height_fog` in the rays' planes.
-"""
+"""Height fog: its airlight is `analytic.height_fog` in the rays' planes."""
 
 from dataclasses import dataclass
 
@@ -15,14 +13,14 @@ from airlight.analytic.height_fog import (
     height_fog_segments,
     height_fog_sun,
 )
-from airlight.reference.quadrature.stretches import (
+from airlight.reference.quadrature.integrate import (
     TERMS,
-    BoundKind,
-    Stretches,
+    ErrorKind,
     Terms,
     strongest,
     sums_of,
 )
+from airlight.reference.quadrature.intervals import Stretches
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.planes import Rays
 
@@ -42,7 +40,7 @@ class HeightField:
     medium: HeightMedium
 
     @property
-    def bound_kind(self) -> BoundKind:
+    def error_kind(self) -> ErrorKind:
         """The kind of the errors: the integrand is analytic on a piece, and the worse
         rule bounds the better one.
         """

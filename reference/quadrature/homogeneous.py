@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of lit stretches in homogeneous media, bounded or not, added up for every
-ray, with an error bound.
+r"""Homogeneous media, bounded or not: optical depth, corners, and the light that they scatter.
+
+The bodies are disjoint, so the optical depth between two points is
+
+    tau = sigma_0 l + sum_j (sigma_j - sigma_0) l_j,
+
+l the distance, l_j what lies in body j, sigma_0 the extinction of what surrounds the bodies. A body
+holds one interval [enter, leave] of a straight line; l_j is the part of it between the points.
 
 The single scattering of a piece of a ray inside one medium m is, for a light at a place (w = 1) or
 in a direction (w = 0, `reference.visibility.planes`),
@@ -16,7 +22,7 @@ v = asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth
 far from it; else in x.
 
 Lit stretches are cut at the bounds of the media, where a shadow segment passes a corner of a body
-or touches it (`reference.quadrature.segments`), and at the kinks of tabulated phase functions. On
+or touches it (`reference.quadrature.intervals`), and at the kinks of tabulated phase functions. On
 such a piece the segment enters and leaves a polyhedron through the same two facets n . p = d, at
 the distance
 
@@ -33,17 +39,27 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
-from airlight.reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
-from airlight.reference.quadrature.segments import (
+from airlight.reference.quadrature.integrate import (
+    AT_LIGHT,
+    TERMS,
+    ErrorKind,
+    Terms,
+    strongest,
+    sum_stretches,
+)
+from airlight.reference.quadrature.intervals import (
+    AMBIENT,
+    Kinks,
+    Pieces,
     Segments,
+    Stretches,
     camera_segments,
-    depth_through_media,
+    cut,
+    parts_in_media,
     shadow_kinks,
 )
-from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
 from airlight.reference.scene.convex_bounds import Bounds, Sphere
-from airlight.reference.scene.read import ReferenceScene, homogeneous_around
+from airlight.reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
 from airlight.reference.visibility.distances import crossed_facets, crossings, sphere_crossings
 from airlight.reference.visibility.planes import Rays
 
@@ -60,7 +76,7 @@ class HomogeneousField:
     reference: ReferenceScene
 
     @property
-    def bound_kind(self) -> BoundKind:
+    def error_kind(self) -> ErrorKind:
         """The kind of the errors: the integrand is analytic on a piece, and the worse
         rule bounds the better one.
         """
@@ -78,8 +94,20 @@ class HomogeneousField:
         )
 
     def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
-        """Return the optical depth of parts of straight lines, (n, 3) [1]."""
-        return depth_through_media(self.reference, origin, direction, low, high)
+        """Return the optical depth of parts of straight lines, (n, 3) [1]: the tau of the
+        derivation, for any points, inside or outside of the media.
+        """
+        # The medium around over all of the part, then what each body differs from it over what lies
+        # in the body.
+        around = self.reference.medium.sigma_t
+        total = np.maximum(high - low, 0.0)[:, None] * around
+        for medium in self.reference.media:
+            enter, leave = crossings(medium.bounds, origin, direction)
+            inside = np.maximum(np.minimum(leave, high) - np.maximum(enter, low), 0.0)
+            total += inside[:, None] * (medium.sigma_t - around)
+        # A body thinner than the medium around it leaves a difference, which rounding may turn
+        # negative.
+        return np.maximum(total, 0.0)
 
     def leave(self, origin: Array, direction: Array) -> Array:
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
@@ -97,40 +125,60 @@ class HomogeneousField:
         """Return the airlight of each ray from its lit stretches, and a bound of
         its error, (rays, 3) each.
         """
-        segments = camera_segments(replace(self.reference, direction=rays.direction), distance)
-        count = len(rays.foot)
-        total, bound = np.zeros((count, 3)), np.zeros((count, 3))
         if not self.strongest.any():
-            return total, bound
-        ray, x0, x1 = stretches
-        step = 4096  # rays at once
-        for first in range(0, count, step):
-            # Cutting needs intervals of a positive length.
-            chosen = (ray >= first) & (ray < first + step) & (x1 > x0)
-            pieces, kinks = smooth_pieces(
-                self.reference, rays, segments, (ray[chosen], x0[chosen], x1[chosen])
+            return np.zeros((len(rays.foot), 3)), np.zeros((len(rays.foot), 3))
+        segments = camera_segments(replace(self.reference, direction=rays.direction), distance)
+
+        def source(lit: Stretches) -> "_Integrand | None":
+            parts = parts_in_media(self.reference, rays, segments, lit)
+            if not len(parts.ray):
+                return None
+            pieces, kinks = _cut_at_kinks(self.reference, rays, parts, np.unique(lit[0]))
+            # The optical depth between camera and piece grows linearly on a part, which lies in one
+            # medium: from the camera to the part once, then by sigma_t times the distance into it.
+            before = self.optical_depth(
+                rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
             )
-            if len(pieces.ray):
-                block = slice(first, first + step)
-                integrand = _Integrand(
-                    self.reference, pieces, rays[pieces.ray], kinks, terms.shadow_scale
-                )
-                total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, terms)
-        # The pieces carry phase functions of mean 1; 1/(4 pi) makes a density over the sphere of
-        # them.
-        return total / (4 * np.pi), bound / (4 * np.pi)
+            into = (pieces.x0 - parts.x0[pieces.part])[:, None]
+            depth = before[pieces.part] + into * by_medium(self.reference, "sigma_t", pieces.medium)
+            return _Integrand(
+                self.reference, pieces, depth, rays[pieces.ray], kinks, terms.shadow_scale
+            )
+
+        return sum_stretches(rays, stretches, source, terms, rtol=1e-10, step=4096)
+
+
+def medium_of(reference: ReferenceScene, number: int) -> ReferenceMedium:
+    """Return the medium of this number."""
+    return homogeneous_around(reference) if number == AMBIENT else reference.media[number]
+
+
+def by_medium(reference: ReferenceScene, name: str, numbers: Index) -> Array:
+    """Return a property of the media of these numbers, (n, 3)."""
+    media = (*reference.media, reference.medium)  # AMBIENT is the last
+    return np.stack([getattr(medium, name) for medium in media])[numbers]
 
 
 def smooth_pieces(
     reference: ReferenceScene, rays: Rays, segments: Segments, stretches: Stretches
-) -> tuple[Pieces, list[Kinks]]:
-    """Cut lit stretches at the bounds of media and at the kinks of shadow
-    segments and of phase functions.
-
-    Returns the pieces, and rays and distances of the kinks of the shadow segments through
-    each of the bounded media.
+) -> Pieces:
+    """Cut lit stretches at the bounds of media and at the kinks of shadow segments and of phase
+    functions.
     """
-    used = np.unique(stretches[0])  # rays that have a lit stretch
+    parts = parts_in_media(reference, rays, segments, stretches)
+    if not len(parts.ray):  # of a batch of rays none is lit within the media
+        return parts
+    return _cut_at_kinks(reference, rays, parts, np.unique(stretches[0]))[0]
+
+
+def _cut_at_kinks(
+    reference: ReferenceScene, rays: Rays, parts: Pieces, used: Index
+) -> tuple[Pieces, list[Kinks]]:
+    """Return the smooth pieces of parts in one medium each, and the kinks of the shadow segments
+    through each of the bounded media.
+
+    `used`: rays that have a lit stretch.
+    """
     body_kinks: list[Kinks] = []
     for medium in reference.media:
         row, x = shadow_kinks(medium.bounds, rays[used])
@@ -139,7 +187,7 @@ def smooth_pieces(
     phases = _kinks_of_phases(reference, rays, used) if rays.w else []
     none = np.empty(0, np.int64), np.empty(0)
     ray, x = (np.concatenate(column) for column in zip(none, *body_kinks, *phases, strict=True))
-    return cut_pieces(reference, rays, segments, stretches, (ray, x)), body_kinks
+    return cut(parts, (ray, x)), body_kinks
 
 
 def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
@@ -158,13 +206,14 @@ def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list
 @dataclass
 class _Integrand:
     """exp(-tau) p on the pieces of one block of rays
-    (`reference.quadrature.adaptive_panels.Integrand`).
+    (`reference.quadrature.integrate.Integrand`).
     """
 
     reference: ReferenceScene
     pieces: Pieces
+    depth: Array  # optical depth between camera and each piece, (pieces, 3)
     own: Rays  # the ray of each piece
-    kinks: list[Kinks]  # of each bounded medium, see `smooth_pieces`
+    kinks: list[Kinks]  # of the shadow segments through each bounded medium
     scale: float
     factor: Array = field(init=False)  # albedo sigma_t of the medium of each piece, (pieces, 3)
     extinction: Array = field(init=False)  # the largest of the channels, (pieces,)
@@ -197,7 +246,7 @@ class _Integrand:
     ) -> tuple[Array, Array]:
         reference = self.reference
         depth = (
-            self.pieces.depth[rows][:, None, self.different]
+            self.depth[rows][:, None, self.different]
             + inside[:, :, None] * self.sigma_t[rows, None]
         )
         around = reference.medium.sigma_t[self.different]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of one light along every ray, by the steps of `reference.quadrature.ray_values`."""
+"""The airlight of one light along every ray, by the steps of `reference.quadrature.image`."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.quadrature.fields import field_of
-from airlight.reference.quadrature.stretches import Stretches, Terms, lit_stretches, profile_of
+from airlight.reference.quadrature.integrate import Terms, profile_of
+from airlight.reference.quadrature.intervals import Stretches, lit_stretches
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.scene.shapes import Shapes, read_shapes
@@ -24,7 +25,7 @@ class LightAirlight:
     """The airlight of one light in the rays."""
 
     radiance: Array  #: in-scattered, (rays, 3) [W/(m^2 sr)]
-    bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]
+    error: Array  #: its error, of the kind of the field, (rays, 3) [W/(m^2 sr)]
     #: between the ray and the direction to the light, pi where that is not before the surface [rad]
     angle: Array
     lit: LitIntervals  #: the intervals that were integrated
@@ -61,16 +62,16 @@ def light_airlight(
     rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
     if isinstance(light, DirectionalLight):
         strength = light.irradiance
-        radiance, bound = _sun_sums(reference, light, illumination)
+        radiance, error = _sun_sums(reference, light, illumination)
     else:
         strength = light.intensity
-        radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)
+        radiance, error = lit_sums(reference, light, rays, lit, distance, shadow_scale)
         # The angle at the camera between ray and light counts where the foot of the light is before
         # the surface.
         in_front = (rays.foot > 0) & (rays.foot < distance)
         angle = np.where(in_front, np.arctan2(rays.height, rays.foot), angle)
-    bound = bound + worth_of_doubt(reference, rays, lit) * strength
-    return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
+    error = error + worth_of_doubt(reference, rays, lit) * strength
+    return LightAirlight(radiance, error, angle, lit, reaches(lit, distance))
 
 
 def lit_sums(
@@ -82,12 +83,12 @@ def lit_sums(
     shadow_scale: float = 1.0,
 ) -> tuple[Array, Array]:
     """Return the airlight of a point or spot light from the lit intervals of rays, and
-    its bound, (rays, 3) each.
+    its error, (rays, 3) each.
     """
     stretches = lit_stretches(light, rays, lit)
     terms = Terms(profile_of(light, rays), shadow_scale, lit.edge)
-    value, bound = field_of(reference).sums(rays, stretches, distance, terms)
-    return value * light.intensity, bound * light.intensity
+    value, error = field_of(reference).sums(rays, stretches, distance, terms)
+    return value * light.intensity, error * light.intensity
 
 
 def _sun_sums(
@@ -100,8 +101,8 @@ def _sun_sums(
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
     terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
-    value, bound = field_of(reference).sums(rays, stretches, found.distance, terms)
-    return value * light.irradiance, bound * light.irradiance
+    value, error = field_of(reference).sums(rays, stretches, found.distance, terms)
+    return value * light.irradiance, error * light.irradiance
 
 
 def lit_rays(

@@ -49,7 +49,7 @@ class SkyLight:
     """The light of a sky, by replicate."""
 
     replicates: Array  #: airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]
-    bound: Array  #: of the error of its suns, not of their number, (rays, 3) [W/(m^2 sr)]
+    error: Array  #: the error of its suns, not of their number, (rays, 3) [W/(m^2 sr)]
 
 
 def sky_light(
@@ -69,7 +69,7 @@ def sky_light(
     assert reference.sky is not None
     # A replicate has at most 64 directions, each a sun for all rays.
     count, most = len(hits.distance), min(plan.most, 64)
-    replicates, bound = np.zeros((count, 6, REPLICATES)), np.zeros((count, 3))
+    replicates, error = np.zeros((count, 6, REPLICATES)), np.zeros((count, 3))
     visible = np.flatnonzero(np.isfinite(hits.distance)) if plan.surfaces else np.empty(0, np.int64)
     point = reference.origin + hits.distance[visible, None] * reference.direction[visible]
     start = np.zeros(len(visible))
@@ -89,9 +89,9 @@ def sky_light(
             sun = DirectionalLight(direction, reference.sky * 4 * np.pi / most, None)
             received = light_airlight(reference, sun, hits.distance, shapes=shapes, checks=0)
             replicates[:, :3, replicate] += received.radiance
-            # Bounds of the suns of a replicate add up; the bound of the mean is their mean over
+            # Errors of the suns of a replicate add up; the error of the mean is their mean over
             # replicates.
-            bound += received.bound / REPLICATES
+            error += received.error / REPLICATES
             # Surfaces that this sun reaches: f cos, attenuated to the sun and to the camera.
             lit = received.reached[visible]
             row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
@@ -103,7 +103,7 @@ def sky_light(
                 radiance = reflected * transmittance[lit] * sun.irradiance
                 replicates[row, 3:, replicate] += radiance
             tell((replicate + (number + 1) / most) / REPLICATES)
-    return SkyLight(replicates, bound)
+    return SkyLight(replicates, error)
 
 
 def _directions(square: Array) -> Array:

@@ -1,15 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit surface of the reference: Mitsuba's own materials and lights, attenuated in float64.
+"""What the camera sees through the medium: lit surfaces, area lights, and the background.
+
+**Lit surfaces** have Mitsuba's own materials and lights, attenuated in float64:
 
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment
-(see `reference.quadrature.ray_values`). Through bounded media the optical depth is the sum over
+(see `reference.quadrature.image`). Through bounded media the optical depth is the sum over
 both ways, piece by piece. A directional light has its irradiance in the place of I / r^2, and an
 unbounded shadow segment: only bodies attenuate it.
+
+**The error of a surface** is estimated: Mitsuba computes f cos I / r^2 in single precision. The
+place of a hit is known to a few roundings of its coordinates, and with it the direction to a light
+at the distance r to
+
+    e = 2^-22 (1 + max |p| / r).
+
+The error is the difference that a turn of this direction by e towards the normal makes, which is
+large at grazing incidence and in a sharp lobe, and e itself, and 16 roundings, times the radiance.
+It is no part of it which point a ray meets, which is Mitsuba's, and whether that point is lit, which
+the lit intervals of the ray say.
+
+**Area lights and the background** are seen with their own radiance, a layer beside the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +34,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.quadrature.fields import optical_depth
-from airlight.reference.scene.area_light import is_area
+from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene, scene_from
+from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -75,22 +91,21 @@ def lit_surface(
     *,
     reached: Sequence[NDArray[np.bool_]],
     shadow_scale: float = 1.0,
-) -> Array:
-    """Return the radiance of the surface at each pixel centre that point, spot and
-    directional lights give it.
-
-    In W/(m^2 sr), (pixels, 3).
+) -> tuple[Array, Array]:
+    """Return the radiance of the surface at each pixel centre that point, spot and directional
+    lights give it, and an estimate of its error, (pixels, 3) each [W/(m^2 sr)].
 
     `reference`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones
     last, whether it reaches the surface at the end of each ray, as its lit intervals say;
-    `shadow_scale`: see `reference.quadrature.ray_values`.
+    `shadow_scale`: see `reference.quadrature.image`.
     """
     interaction = hits.interaction
-    total = np.zeros((len(hits.distance), 3))
+    total, error = np.zeros((2, len(hits.distance), 3))
     if not reference.occluders.shapes():
-        return total
+        return total, error
     far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
     point = reference.origin + far[:, None] * reference.direction
+    size = np.abs(point).max(axis=1)
     to_camera = optical_depth(
         reference, reference.origin, reference.direction, np.zeros(len(far)), far
     )
@@ -100,6 +115,12 @@ def lit_surface(
     facing = interaction.is_valid()
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
+        if isinstance(light, DirectionalLight):
+            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), UNBOUNDED)
+        else:
+            way = light.position - point
+            r = np.linalg.norm(way, axis=1)
+            way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
         # I / r^2 of this emitter, or its irradiance, without visibility: the lit intervals say
         # that.
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
@@ -107,15 +128,112 @@ def lit_surface(
             mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing
         )
         radiance = as_rows(reflected * arriving)
-        if isinstance(light, DirectionalLight):
-            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), UNBOUNDED)
-        else:
-            way = light.position - point
-            r = np.linalg.norm(way, axis=1)
-            way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
+        # The same from a direction that is turned towards the normal by its uncertainty: e of the
+        # derivation, at most a right angle or so, for a light on the surface.
+        turn = 2.0**-22 * (1 + size / np.maximum(r, 2.0**-22 * size + np.finfo(float).tiny))
+        turned = dr.normalize(towards.d + interaction.n * on_device(mi.Float, turn))
+        other = interaction.bsdf().eval(
+            mi.BSDFContext(), interaction, interaction.to_local(turned), facing
+        )
+        with np.errstate(invalid="ignore"):  # inf - inf where a light lies on a surface
+            doubt = np.abs(as_rows(other * arriving) - radiance)
+            doubt += (turn + 16 * 2.0**-24)[:, None] * np.abs(radiance)
+        # Of a radiance that a turn makes no number nothing is known.
+        doubt = np.where(np.isfinite(doubt), doubt, np.abs(radiance))
         # A directional light's segment goes to the end of all floats: only bounded media can be on
         # it.
         depth = to_camera + optical_depth(reference, point, way, np.zeros(len(point)), r)
-        lit = np.array(facing, dtype=bool) & reaches
-        total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
+        lit = (np.array(facing, dtype=bool) & reaches)[:, None]
+        transmittance = np.exp(-depth)
+        total += np.where(lit, radiance * transmittance, 0.0)
+        error += np.where(lit, doubt * transmittance, 0.0)
+    return total, error
+
+
+def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
+    """Return the radiance of area lights before the visible surface, and of the
+    background where there is none.
+
+    In W/(m^2 sr), (rays, 3).
+
+    `reference`: the scene; `distance`: to the visible surface, (rays,), infinite
+    where there is none [m].
+
+    Valid for the side that emits; a light of material `null` is seen with what is behind it,
+    a black one ends the ray.
+    """
+    total = np.zeros((len(distance), 3))
+    for light in reference.area:
+        places = (
+            _mesh_distances(light, reference)
+            if light.kind == "mesh"
+            else [_distance(light, reference)]
+        )
+        for at in places:
+            # A surface as close to a light as 1e-4 of its distance is the light's own, or touches
+            # it. NaN, where the ray misses the light, compares as false.
+            rows = np.flatnonzero(at <= distance * (1 + 1e-4))
+            depth = optical_depth(
+                reference,
+                reference.origin,
+                reference.direction[rows],
+                np.zeros(len(rows)),
+                at[rows],
+            )
+            total[rows] += light.radiance * np.exp(-depth)
+    if reference.background is not None:
+        rows = np.flatnonzero(np.isinf(distance))
+        # The background is seen through all media: 1e30 m is beyond their bounds.
+        depth = optical_depth(
+            reference,
+            reference.origin,
+            reference.direction[rows],
+            np.zeros(len(rows)),
+            np.full(len(rows), 1e30),
+        )
+        interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
+        interaction.wi = vectors(mi.Vector3f, -reference.direction[rows])
+        total[rows] += as_rows(reference.background.eval(interaction)) * np.exp(-depth)
     return total
+
+
+def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
+    """Yield where rays meet a mesh from the side that emits, crossing after
+    crossing, (rays,) [m]; else NaN.
+    """
+    mesh = scene_from([light.shape])
+    start, walking = np.zeros(len(reference.direction)), np.ones(len(reference.direction), bool)
+    while walking.any():
+        place = reference.origin + start[:, None] * reference.direction
+        hit = mesh.ray_intersect(
+            mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, reference.direction))
+        )
+        at = start + np.array(hit.t, dtype=np.float64)
+        walking &= np.isfinite(at)
+        # A black mesh hides what is behind its first crossing; through one of material `null` the
+        # ray goes on, and may meet the emitting side again.
+        yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
+        walking &= not light.opaque
+        # The next crossing is looked for 1e-5 of the distance and 1e-5 m beyond this one, which
+        # float32 rays would otherwise meet again.
+        start = np.where(walking, at * (1 + 1e-5) + 1e-5, start)
+
+
+def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
+    """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
+    origin, direction = reference.origin, reference.direction
+    away = light.centre - origin
+    if light.kind == "sphere":
+        middle = direction @ away
+        miss = np.linalg.norm(away - middle[:, None] * direction, axis=1)
+        at = middle - half_chord(light.radius, miss)
+        return np.where((miss < light.radius) & (at > 0), at, np.nan)
+    rate = direction @ light.normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = (away @ light.normal) / rate
+        x, y = ((at[:, None] * direction - away) @ light.frame[:2].T).T
+    a, b = light.half
+    inside = (
+        (np.abs(x) <= a) & (np.abs(y) <= b) if light.kind == "rectangle" else x * x + y * y <= a * a
+    )
+    return np.where((rate < 0) & (at > 0) & inside, at, np.nan)

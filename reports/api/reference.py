@@ -64,7 +64,7 @@ def reference(
         A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
         `load_scene` takes or returns.
     estimator
-        quadrature has an error bound in every pixel. single-scatter and volpath use random samples
+        quadrature has an error in every pixel, proven or estimated. single-scatter and volpath use random samples
         and have standard errors. cloud-paths is for clouds, in which light scatters many times.
     change
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
@@ -259,10 +259,10 @@ def _elsewhere(
 def _quadrature(
     loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]
 ) -> "Reference":
+    from airlight.reference.quadrature.reference import reference_image
     from airlight.reports.api.results import Reference, sealed
     from airlight.reports.report.scene import reference_record
     from airlight.validation.estimates.images import layered_reference
-    from airlight.validation.estimates.quadrature import reference_image
 
     # The whole image, from the cache where it was computed before.
     quadrature = reference_image(
@@ -273,7 +273,7 @@ def _quadrature(
         scene=loaded.name,
         image=sealed(layered_reference(loaded, quadrature, pixel=pixel)),
         estimator="quadrature",
-        relative_error=float("nan") if said.relative_bound is None else said.relative_bound,
+        relative_error=float("nan") if said.relative_error is None else said.relative_error,
         how=said,
     )
 

@@ -240,12 +240,27 @@ class Reference(LayeredImage):
     how: QuadratureReference | MonteCarloReference | None = None
 
     @property
-    def bound(self) -> Array | None:
-        """The error of the airlight, of the kind that `how` says [W/(m^2 sr)], (height, width, 3).
+    def error(self) -> Array | None:
+        """The error of the airlight without that of samples [W/(m^2 sr)], (height, width, 3).
 
-        Without that of samples of lights; None for an estimator that samples.
+        It is proven where it is a `bound`, else estimated; None for an estimator that samples.
+        """
+        return self.image.layers.get("airlight_error", self.bound)
+
+    @property
+    def bound(self) -> Array | None:
+        """The proven bound of the error of the airlight [W/(m^2 sr)], (height, width, 3).
+
+        None where the error is estimated, as in density grids, or statistical.
         """
         return self.image.layers.get("airlight_bound")
+
+    @property
+    def surface_error(self) -> Array | None:
+        """The estimated error of the surface without that of samples [W/(m^2 sr)],
+        (height, width, 3); None for an estimator that samples.
+        """
+        return self.image.layers.get("surface_error")
 
     @property
     def standard_error(self) -> Array | None:
@@ -284,11 +299,15 @@ class Reference(LayeredImage):
         for name, mean in made["means"].items():
             unit = "" if name == "opacity" else " W/(m^2 sr)"
             lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
-        # The quadrature states an error of the airlight, and its kind: proven, estimated or
+        # The quadrature states the errors of both layers, and what they are: proven, estimated or
         # statistical.
         how = self.how
-        if isinstance(how, QuadratureReference) and how.relative_bound is not None:
-            lines.append(f"  airlight known to {how.relative_bound:.2g} of its mean ({how.kind})")
+        if isinstance(how, QuadratureReference) and how.relative_error is not None:
+            lines.append(f"  airlight known to {how.relative_error:.2g} of its mean ({how.kind})")
+        if isinstance(how, QuadratureReference) and how.surface_error is not None:
+            lines.append(
+                f"  surface known to {how.surface_error:.2g} of its mean ({how.surface_kind})"
+            )
         if "batches" not in made:
             return lines
         batches = int(made["batches"])

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from airlight.analytic.clock import Spent, stopwatch
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import ReferenceInputs, reference_result
+from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import fresh_results, fresh_since, is_kept, keep
 from airlight.reports.cluster.connect import Client, facts
 from airlight.reports.cluster.run import Group, Task, run_groups
 from airlight.validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
-from airlight.validation.estimates.quadrature import reference_inputs, reference_result
 from airlight.validation.scenes.changes import change_words
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.study.configuration import Configuration
@@ -46,31 +47,32 @@ def image_of(
     return Cell(name, size, tuple(change_words(changes)), Configuration("reference"))
 
 
-def bring_references(cluster: Client, images: Sequence[Cell], **how: Any) -> None:
+def bring_references(
+    cluster: Client, images: Sequence[Cell], *, pixel: str = "centre", points: int | None = None
+) -> None:
     """Let workers compute the quadrature references of images that are not in the
     cache, and keep them here.
 
-    `how`: arguments of `validation.estimates.quadrature.reference_inputs`.
+    `pixel`, `points`: see `reference.quadrature.reference.ReferenceInputs`.
     """
+
+    def inputs_of(image: Cell) -> ReferenceInputs:
+        content = scene_content(load_cell(image).scene)
+        return ReferenceInputs(content, pixel=pixel, points=points)
+
     # The key of an image needs its scene loaded, here and later: nothing else says what is in the
     # cache.
-    lacking = [
-        image
-        for image in images
-        if not is_kept(reference_inputs(load_cell(image).scene, **how).key)
-    ]
+    lacking = [image for image in images if not is_kept(inputs_of(image).key)]
     named = {f"reference {number}": image for number, image in enumerate(lacking)}
     # Workers must compute what `--fresh` asks for again, and not take it from a cache of their own.
-    given = how, fresh_since()
+    given = pixel, points, fresh_since()
     groups = [
         Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()
     ]
     # The value goes to the cache under the key that this process computed, together with the time
     # that it took the worker.
     for name, (reference, spent) in _done(cluster, groups):
-        keep(
-            reference_inputs(load_cell(named[name]).scene, **how), reference, spent, ReferenceImage
-        )
+        keep(inputs_of(named[name]), reference, spent, ReferenceImage)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -125,11 +127,12 @@ def spread(cluster: Client, image: Cell) -> ElsewhereFor:
 
 
 def _reference(
-    image: Cell, how: Mapping[str, Any], since: float | None
+    image: Cell, pixel: str, points: int | None, since: float | None
 ) -> tuple[ReferenceImage, Spent]:
     with fresh_results(since):
         scene = load_cell(image).scene
-        found = reference_result(scene, reference_inputs(scene, **how))
+        inputs = ReferenceInputs(scene_content(scene), pixel=pixel, points=points)
+        found = reference_result(scene, inputs)
     return found.value, found.spent
 
 

@@ -90,12 +90,22 @@ class Reference:
     """The accuracy of the quadrature."""
 
     mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
-    relative_bound: Number = column(
-        meaning="its error over that mean, three standard errors of area lights added"
+    relative_error: Number = column(
+        meaning="its error over that mean, three standard errors of area lights added; `relative_bound` in reports "
+        "of 1.0.0"
     )
     kind: str | None = column(
         meaning="of that error: `proven`, `estimated` (density grids) or `statistical` (area lights, skies); `null` in "
         "reports of 1.0.0",
+        default=None,
+    )
+    surface_error: Number = column(
+        meaning="the error of the surface over its mean, standard errors of area lights added; `null` in the dark and "
+        "in reports of 1.0.0",
+        default=None,
+    )
+    surface_kind: str | None = column(
+        meaning="of that error: `estimated` (Mitsuba's single precision) or `statistical`",
         default=None,
     )
     transitions: int = column(meaning="edges of lit intervals")
@@ -103,7 +113,7 @@ class Reference:
     checked: int = column(meaning="shadow rays that checked the lit intervals")
     disagreements: int = column(meaning="of these")
     refined: int = column(meaning="disagreements that were resolved")
-    left: int = column(meaning="disagreements that were not: the bound has them")
+    left: int = column(meaning="disagreements that were not: the error has them")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,6 +227,7 @@ def read_report(path: Path | str) -> Report:
         )
     from msgspec import ValidationError
 
+    rename_old_keys(data)
     try:
         return record_of(data, Report)
     except ValidationError as error:
@@ -227,6 +238,15 @@ def read_report(path: Path | str) -> Report:
         raise InputError(
             f"{file} does not keep to {SCHEMA}: {where}: {words}; make the report again"
         ) from None
+
+
+def rename_old_keys(data: dict[str, Any]) -> None:
+    """Give the error of a reference in a report of 1.0.0 the name that it has now."""
+    scenes = data.get("scenes")
+    for scene in scenes if isinstance(scenes, list) else ():
+        reference = scene.get("reference") if isinstance(scene, dict) else None
+        if isinstance(reference, dict) and "relative_bound" in reference:
+            reference["relative_error"] = reference.pop("relative_bound")
 
 
 def load_report(path: Path | str) -> tuple[Report, Path]:

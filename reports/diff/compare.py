@@ -154,7 +154,7 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
         return None
     # Each error is that of the mean absolute value, so the means differ by at most the sum of both.
     # A dark reference has no relative error: its mean is 0.
-    errors = [each for scene in (old, new) if (each := scene.reference.relative_bound) is not None]
+    errors = [each for scene in (old, new) if (each := scene.reference.relative_error) is not None]
     if abs(after - before) > (sum(errors) + FLOORS["mean"]) * abs(before):
         words = (
             "the reference moved (mean radiance): another scene by this name, or another reference; "

@@ -85,8 +85,8 @@ def latex_table(scenes: Sequence[Scene]) -> str:
     tables = []
     # The accuracy of the reference stands in the table, as no error below it means anything.
     for scene in scenes:
-        bound = scene.reference.relative_bound
-        known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
+        error = scene.reference.relative_error
+        known = f", reference known to {number(error, 2, zeros=True)}" if error else ""
         about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene.size) + known
         rows = [_latex_row(entry) for entry in scene.methods]
         tables.append(

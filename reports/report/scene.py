@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from airlight.realtime.scene.read_scene import describe
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reports.data.records import Method, Reference, Scene, SceneFiles
 from airlight.reports.machine.environment import stamped
 from airlight.reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from airlight.validation.columns import record_of
 from airlight.validation.estimates.images import layered_reference
-from airlight.validation.estimates.quadrature import known_to
+from airlight.validation.estimates.quadrature import known_to, relative_error
 from airlight.validation.scenes.loading import scene_stem
 from airlight.validation.study.reference import of_image
 from airlight.validation.study.scene import Judged, SceneResult
@@ -96,11 +96,15 @@ def reference_record(reference: ReferenceImage) -> Reference:
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
-    bound = float(of_image(reference).bound[finite].mean()) / mean if mean > 0 else None
+    error = float(of_image(reference).error[finite].mean()) / mean if mean > 0 else None
+    surface = known_to(reference, "surface")
+    surface_error = relative_error(surface)
     values = {
         "mean": mean,
-        "relative_bound": bound,
+        "relative_error": error,
         "kind": known_to(reference, "airlight").kind,
+        "surface_error": surface_error,
+        "surface_kind": None if surface_error is None else surface.kind,
     } | {name: getattr(reference, name) for name in numbers}
     return record_of(values, Reference)
 

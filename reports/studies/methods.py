@@ -59,8 +59,8 @@ def cells_of(
     Methods of users run in separate processes if they can be found there, `apart`.
     """
     from airlight.realtime.scene.read_scene import read_scene
+    from airlight.reference.quadrature.reference import reference_result
     from airlight.reports.machine.own_process import in_own_process
-    from airlight.validation.estimates.quadrature import reference_result
     from airlight.validation.study.reference import of_image
     from airlight.validation.study.run import run
     from airlight.validation.study.study import Cell

@@ -84,7 +84,7 @@ def margin_words(statistics: Statistics) -> str:
 
 
 def trust_table(scenes: Sequence[Scene]) -> Table:
-    """Return how far the reference of each scene can be trusted: its own bound, its checks,
+    """Return how far the reference of each scene can be trusted: its own errors, its checks,
     the estimators' intervals.
 
     An estimator has the interval that fills most of its margin, over the layers of a scene.
@@ -95,8 +95,10 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
     )
     columns = (
         *words("scene"),
-        *numbers(bound="its error", how={"fraction": True, "digits": 2}),
+        *numbers(error="its error", how={"fraction": True, "digits": 2}),
         *words(kind="which is"),
+        *numbers(surface_error="error of surfaces", how={"fraction": True, "digits": 2}),
+        *words(surface_kind="and its kind"),
         *numbers(left="unresolved shadow rays", how={"alarm": True}),
         *(
             Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2)
@@ -106,8 +108,10 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
     )
     order = [
         "scene",
-        "bound",
+        "error",
         "kind",
+        "surface_error",
+        "surface_kind",
         "left",
         *(key for name in estimators for key in (name, f"{name} agrees")),
     ]
@@ -119,7 +123,8 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
             "The reference is a quadrature in double precision, with its error as a fraction of "
             "the mean airlight: "
             "proven, estimated in density grids, or three standard errors of samples of area "
-            "lights and skies. Two "
+            "lights and skies. The error of surfaces is estimated, as Mitsuba computes them in "
+            "single precision, or the standard error of samples. Two "
             "Monte Carlo estimators, which share no derivation with it, check it: the 95 % "
             "interval of their relative "
             "bias must lie inside a margin. Among several layers the interval that fills most of "
@@ -130,8 +135,12 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
 
 
 def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
-    values: dict[str, Value] = {"scene": scene.name, "bound": scene.reference.relative_bound}
+    values: dict[str, Value] = {"scene": scene.name, "error": scene.reference.relative_error}
     values |= {"kind": scene.reference.kind, "left": scene.reference.left}
+    values |= {
+        "surface_error": scene.reference.surface_error,
+        "surface_kind": scene.reference.surface_kind,
+    }
     for name in estimators:
         # An estimator that did not check this scene leaves its cells empty. A disagreement in one
         # layer decides over all layers, then an undecided one.

@@ -46,8 +46,8 @@ class KnownReference:
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     surface: Array  #: [W/(m^2 sr)]
-    #: of the error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
-    bound: Array
+    #: error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
+    error: Array
 
     @staticmethod
     def of_size(width: int, height: int) -> "KnownReference":
@@ -59,12 +59,12 @@ class KnownReference:
         """Which pixels are known, (height, width)."""
         return np.isfinite(self.airlight[..., 0])
 
-    def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, bound: Array) -> None:
+    def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, error: Array) -> None:
         """Note the reference of some pixels, (pixels, 3) each."""
         for layer, values in (
             (self.airlight, airlight),
             (self.surface, surface),
-            (self.bound, bound),
+            (self.error, error),
         ):
             layer.reshape(-1, 3)[pixels] = values
 
@@ -92,8 +92,8 @@ class ViewError:
     interval: float | None
     relative_bias: float | None
     p99: float | None  #: see `validation.metrics.errors`
-    #: root mean square of the reference's own bound: the most by which it changes the error
-    bound: float | None
+    #: root mean square of the reference's own error: the most by which it changes the error
+    own_error: float | None
     known: int  #: pixels
     pixels: int
 
@@ -121,13 +121,13 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
     rmse = float(np.sqrt(square.mean()))
     interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
     # The reference's own error, which no number of pixels removes.
-    bound = float(np.sqrt(np.mean(found.bound[known] ** 2)))
+    own_error = float(np.sqrt(np.mean(found.error[known] ** 2)))
     return ViewError(
         metrics.relative_rmse,
         interval / mean if mean > 0 else None,
         metrics.relative_bias,
         metrics.p99,
-        bound / mean if mean > 0 else None,
+        own_error / mean if mean > 0 else None,
         count,
         pixels,
     )
@@ -164,8 +164,8 @@ class Answer:
     pixels: Any = None  #: numbers of pixels, (rays,)
     airlight: Any = None  #: (rays, 3) [W/(m^2 sr)]
     surface: Any = None  #: (rays, 3) [W/(m^2 sr)]
-    #: of the error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
-    bound: Any = None
+    #: error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
+    error: Any = None
     done: bool = False
     failure: str = ""
 
@@ -182,7 +182,8 @@ def yield_processor() -> None:
 
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
-    from airlight.validation.estimates.quadrature import reference_error, reference_of_pixels
+    from airlight.reference.quadrature.reference import reference_of_pixels
+    from airlight.validation.estimates.quadrature import reference_error
     from airlight.validation.scenes.loading import load_scene
 
     # This process has the scene by its name and its changes; nothing on the device is shared.
@@ -200,13 +201,13 @@ def answers(task: Task) -> Iterator[Answer]:
         begin, seconds = begin + len(chosen), took().seconds
         rays = int(np.clip(rays * np.clip(0.25 / max(seconds, 1e-3), 0.25, 2), 16, 20000))
         # The lights that the camera sees are left out: the frames beside this show none.
-        layers = found.airlight, found.surface, found.airlight_bound
-        airlight, surface, bound = (layer.reshape(-1, 3) for layer in layers)
+        layers = found.airlight, found.surface, found.airlight_error
+        airlight, surface, error = (layer.reshape(-1, 3) for layer in layers)
         # Area lights add two standard errors of their samples.
-        error = reference_error(found, "airlight")
-        if error is not None:
-            bound = bound + 2 * error.reshape(-1, 3)
-        yield Answer(task.number, chosen, airlight, surface, bound)
+        by_chance = reference_error(found, "airlight")
+        if by_chance is not None:
+            error = error + 2 * by_chance.reshape(-1, 3)
+        yield Answer(task.number, chosen, airlight, surface, error)
     yield Answer(task.number, done=True)
 
 
@@ -312,6 +313,6 @@ class ReferenceInBackground:
             if answer.task != self._number or self.known is None:
                 return
             if answer.pixels is not None:
-                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
+                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.error)
             self.done, self.failure = answer.done, answer.failure
         self._told()

@@ -169,7 +169,7 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
     """
 
     from airlight.realtime.scene.read_scene import read_scene
-    from airlight.validation.estimates.quadrature import reference_image
+    from airlight.reference.quadrature.reference import reference_image
     from airlight.validation.study.reference import of_image
     from airlight.validation.study.run import run
     from airlight.validation.study.study import Cell, Measure

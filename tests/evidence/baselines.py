@@ -25,9 +25,9 @@ import numpy as np
 
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.scene.read_scene import Scene, read_scene
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.columns import plain
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.registry import SCENES
 from airlight.validation.statistics.noise import ERROR_TOLERANCE, error_band

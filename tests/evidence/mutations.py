@@ -199,11 +199,16 @@ def _behind(function, reference, light, rays, lit, *others, **named):
 
 
 def _surface(change: Callable[..., Any]) -> Wrap:
-    """Change the lit surface: change(function, reference, hits, named)."""
-    return Wrap(
-        "airlight.reference.quadrature.surface:lit_surface",
-        lambda function, reference, hits, **named: change(function, reference, hits, named),
-    )
+    """Change the lit surface: change(function, reference, hits, named) -> radiance."""
+
+    def around(function, reference, hits, **named):
+        def radiance(*arguments, **changed):
+            return function(*arguments, **changed)[0]
+
+        changed = change(radiance, reference, hits, named)
+        return changed, np.zeros_like(changed)
+
+    return Wrap("airlight.reference.quadrature.surface:lit_surface", around)
 
 
 def _without_cosine(function, reference, hits, named):
@@ -467,7 +472,7 @@ _SUN = _all(
         "directional-chord-both-ways": Rewrite(_MEDIA, "np.maximum(enter, 0.0)", "enter"),
         "directional-forward-is-backward": _BACKWARD,
         "directional-corners-behind": Rewrite(
-            "airlight.reference.quadrature.segments",
+            "airlight.reference.quadrature.intervals",
             "(y_ > 0) & (w_ * y_ < height_)",
             "(y_ < 0) & (w_ * y_ < height_)",
         ),

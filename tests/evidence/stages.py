@@ -23,7 +23,7 @@ from airlight.reference.monte_carlo import volpath
 from airlight.reference.monte_carlo.batches import LAYERS, Batches, merged
 from airlight.reference.monte_carlo.single_scatter import integrator as single_scatter
 from airlight.reference.quadrature import image as quadrature
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene import read
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon

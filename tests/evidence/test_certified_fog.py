@@ -17,7 +17,8 @@ import pytest
 from airlight.analytic.phase import HenyeyGreenstein, Isotropic
 from airlight.reference.quadrature.homogeneous import HomogeneousField
 from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.stretches import Terms, lit_stretches, profile_of
+from airlight.reference.quadrature.integrate import Terms, profile_of
+from airlight.reference.quadrature.intervals import lit_stretches
 from airlight.reference.scene.read import (
     ReferenceLight,
     ReferenceMedium,
@@ -167,9 +168,9 @@ def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
     difference = np.abs(image.airlight.reshape(-1, 3) - value)
     # The last term: both routes take the directions through the pixel centres for
     # themselves, 3e-16 apart.
-    allowed = image.airlight_bound.reshape(-1, 3) + bound(certified[name]) + 1e-13 * value
+    allowed = image.airlight_error.reshape(-1, 3) + bound(certified[name]) + 1e-13 * value
     assert np.all(difference <= allowed), (difference / np.maximum(allowed, 1e-300)).max()
-    assert image.airlight_bound.max() < 1e-9 * value.max()
+    assert image.airlight_error.max() < 1e-9 * value.max()
     assert image.left == 0
     distance = np.array([float(pixel["distance"]) for pixel in certified[name]["pixels"]])
     # `distance` is as it was cast, in float32: a few roundings of coordinates of a few metres.

@@ -10,8 +10,8 @@ from airlight.analytic.panels import airlight_segments
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.projection import Projection
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import error_metrics
 from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap
 from tests.evidence.oracles.light_volume import oracle_airlight

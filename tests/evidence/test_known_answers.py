@@ -23,7 +23,7 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.analytic.geometry import foot_and_height
-from airlight.reference.quadrature.ray_values import ray_values
+from airlight.reference.quadrature.image import ray_values
 from airlight.reference.quadrature.replicates import PointPlan
 from tests.evidence.certified.model import SIZE, FogLight, load_fog, mitsuba_dict
 from tests.evidence.closed_forms import disk_fraction, polygon_in_disk, polygon_overlap

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.phase import HenyeyGreenstein
-from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage, quadrature_image
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.camera import film_directions, pixel_centres

@@ -87,7 +87,7 @@ def method(label, **changes):
 
 AGREEMENT = agreement(margin=0.005, detectable=0.0021, relative_bias_ci=[-0.0011, 0.0014])
 _FLAT = {"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"}
-_REFERENCE = {"mean": 0.98765, "relative_bound": 1.2e-6, "transitions": 4321, "missed": 0.0007}
+_REFERENCE = {"mean": 0.98765, "relative_error": 1.2e-6, "transitions": 4321, "missed": 0.0007}
 _REFERENCE |= {"checked": 98765, "disagreements": 12, "refined": 11, "left": 1}
 _HALL = scene(
     "hall",

@@ -200,7 +200,7 @@ def agreement(
 def reference(**changes: Any) -> dict[str, Any]:
     """Return how exact the reference of a scene is."""
     counts = dict.fromkeys(("transitions", "checked", "disagreements", "refined", "left"), 0)
-    return {"mean": 1.0, "relative_bound": 1e-10, "missed": 0.0} | counts | changes
+    return {"mean": 1.0, "relative_error": 1e-10, "missed": 0.0} | counts | changes
 
 
 def fraction(value: float) -> dict[str, Any]:

@@ -120,8 +120,9 @@ def compare_images(
 
     Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both
     count. The header attribute `airlight:batches` says from how many batch means they come. An
-    error that is no noise is in the layer `<layer>_bound` of either image, and the attribute
-    `airlight:bound` says whether it is proven or estimated.
+    error that is no noise is in the layer `<layer>_bound` of either image where it is proven, and
+    in `<layer>_error` where it is estimated; older files have estimates in `<layer>_bound` too, and
+    the attribute `airlight:bound` says which it is.
 
     The mask says which pixels to compare, (height, width) of truth values; pixels of the frame that
     a file does not hold are left out too. The `margin` is the largest relative bias that counts as
@@ -162,10 +163,10 @@ def _compared(
     stated, statistics = _stated_errors(named, layer, mask), None
     # The verdict on a margin counts noise and stated errors together.
     if expected.standard_error is not None or tested.standard_error is not None:
-        bound = (
+        own = (
             0.0 if stated is None else math.inf if stated.bias_error is None else stated.bias_error
         )
-        statistics = compare_statistics(expected, tested, mask=mask, margin=margin, bound=bound)
+        statistics = compare_statistics(expected, tested, mask=mask, margin=margin, stated=own)
         equivalent = statistics.equivalent
     elif stated is not None and margin is not None:
         bias = Estimate(metrics.relative_bias, stated.bias_error, stated.kind)
@@ -177,7 +178,7 @@ def _compared(
         raise InputError(
             f"a margin needs errors, and neither {named[0][0]} nor {named[1][0]} has a layer "
             f"'{layer}_se' or "
-            f"'{layer}_bound'; leave the margin out, or make the reference by airlight reference"
+            f"'{layer}_error'; leave the margin out, or make the reference by airlight reference"
         )
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
     ref, tst, chosen = compared(*images, mask)
@@ -249,17 +250,15 @@ def _stated_errors(
     r). The rounding of a file to single precision, up to half an epsilon of each pixel, is a part
     of t and r.
     """
-    bounds = [image.layers.get(f"{layer}_bound") for _, image in named]
-    if all(bound is None for bound in bounds):
+    errors = [_error_layer(path, image, layer) for path, image in named]
+    if all(error is None for error in errors):
         return None
     layers = [np.asarray(image_layer(image, layer, path)) for path, image in named]
     *images, chosen = compared(layers[0], layers[1], mask)
     finite = chosen & np.isfinite(images).all(axis=(0, 3))
     sides = [
-        None
-        if bound is None
-        else _stated(path, image, values[finite], np.asarray(bound, dtype=np.float64)[finite])
-        for (path, image), values, bound in zip(named, layers, bounds)
+        None if error is None else _stated(values[finite], error[0][finite], error[1])
+        for values, error in zip(layers, errors)
     ]
     # A file without a stated error is compared as it is; an error that is stated
     # and no number is not known.
@@ -276,21 +275,30 @@ def _stated_errors(
     return StatedErrors(sides[0], sides[1], change, kind)
 
 
-def _stated(path: str, image: Image, values: Array, bound: Array) -> Estimate:
-    """Return the mean of the compared pixels of one image, and the mean of
-    their errors by its file.
-    """
+def _error_layer(path: str, image: Image, layer: str) -> tuple[Array, Kind] | None:
+    """Return the error that is no noise of a layer, and its kind; None where an image states none."""
+    if f"{layer}_error" in image.layers:
+        return np.asarray(image.layers[f"{layer}_error"], dtype=np.float64), "estimated"
+    if f"{layer}_bound" not in image.layers:
+        return None
     kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
     said = image.attributes.get(BOUND, "estimated")
     if said not in kinds:
         raise InputError(
             f"{path} has the attribute {BOUND} {said!r}; expected {' or '.join(kinds)}; correct it"
         )
-    if not (values.size and np.isfinite(bound).all() and (bound >= 0).all()):
-        return Estimate(float(values.mean()) if values.size else None, None, kinds[said])
+    return np.asarray(image.layers[f"{layer}_bound"], dtype=np.float64), kinds[said]
+
+
+def _stated(values: Array, error: Array, kind: Kind) -> Estimate:
+    """Return the mean of the compared pixels of one image, and the mean of
+    their errors by its file.
+    """
+    if not (values.size and np.isfinite(error).all() and (error >= 0).all()):
+        return Estimate(float(values.mean()) if values.size else None, None, kind)
     rounding = float(np.finfo(np.result_type(values, np.float32)).eps) / 2
     mean, size = (float(each.mean(dtype=np.float64)) for each in (values, np.abs(values)))
-    return Estimate(mean, float(bound.mean()) + rounding * size, kinds[said])
+    return Estimate(mean, float(error.mean()) + rounding * size, kind)
 
 
 def _stated_lines(stated: StatedErrors) -> list[str]:

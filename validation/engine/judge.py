@@ -34,7 +34,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import REPLICATES
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
@@ -59,7 +60,6 @@ from airlight.validation.estimates.quadrature import (
     known_to,
     known_words,
     reference_error,
-    reference_image,
     reference_layer,
 )
 from airlight.validation.metrics.errors import FLOOR

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from airlight.errors import InputError
-from airlight.reference.quadrature.emission import emitted_light
-from airlight.reference.quadrature.ray_values import ReferenceImage
-from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.surface import emitted_light, surface_hits
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.varying import GridMedium
 from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names
@@ -109,8 +108,8 @@ def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
 
 def _usual(image: Image, path: str | os.PathLike[str]) -> str:
     """Return the name of the layer to judge where the user names none."""
-    # Standard errors are no image.
-    colours = [each for each in image.layers if not each.endswith("_se")]
+    # Errors are no image.
+    colours = [each for each in image.layers if not each.endswith(("_se", "_error", "_bound"))]
     for usual in (AIRLIGHT, TOTAL):
         if usual in colours:
             return usual

@@ -28,17 +28,14 @@ import numpy as np
 
 from airlight.analytic.clock import stopwatch
 from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, allocated
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import REPLICATES
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
-from airlight.validation.estimates.quadrature import (
-    reference_error,
-    reference_image,
-    reference_layer,
-)
+from airlight.validation.estimates.quadrature import reference_error, reference_layer
 from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
 from airlight.validation.statistics.records import Agreement, Statistics
 
@@ -68,7 +65,7 @@ def agreement(
     most `batches` are traced, of `samples` a pixel each; volpath places its samples where its pilot
     spread most (`reference.monte_carlo.batches`). After `seconds`, the pilot not counted, no
     further batch is traced; `spread` lets other processes trace some. `points` are those of area
-    lights in the reference of volpath (`validation.estimates.quadrature.reference_image`), whose
+    lights in the reference of volpath (`reference.quadrature.reference.reference_image`), whose
     margins are wider; single-scatter is compared with as many as the error of a pixel needs. The
     result is by layer, without the surface where nothing lit is visible.
     """

@@ -28,7 +28,7 @@ from airlight.analytic.geometry import foot_and_height
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
 from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.replicates import REPLICATES
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
@@ -38,6 +38,7 @@ from airlight.reference.storage.scene_digest import scene_digest
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
 from airlight.validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
+from airlight.validation.estimates.quadrature import stated_error
 from airlight.validation.scenes.loading import LoadedScene
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
@@ -77,11 +78,12 @@ def layered_reference(
     """Return the quadrature reference of a loaded scene as layers; the header says of
     which bytes of the scene.
     """
-    layers = {
-        "airlight": reference.airlight,
-        "airlight_bound": reference.airlight_bound,
-        "surface": reference.surface,
-    }
+    layers = {"airlight": reference.airlight, "surface": reference.surface}
+    for layer in LAYERS:
+        if (stated := stated_error(reference, layer)) is not None:
+            # The name of a layer says what its error is; a standard error is `<layer>_se`.
+            error, error_kind = stated
+            layers[f"{layer}_bound" if error_kind == "proven" else f"{layer}_error"] = error
     # Only area lights have standard errors and light that the camera sees.
     extent = {
         "airlight_se": reference.airlight_se,
@@ -94,7 +96,8 @@ def layered_reference(
         "airlight:estimator": "quadrature",
     }
     made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
-    made[BOUND] = reference.bound_kind
+    if "airlight_bound" in layers:
+        made[BOUND] = "proven"
     if reference.airlight_se is not None:
         made[BATCHES] = REPLICATES
     return Image(layers, reference.distance, made)

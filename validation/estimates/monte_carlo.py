@@ -26,6 +26,7 @@ from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_ba
 from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from airlight.reference.monte_carlo.volpath import volpath_batch, volpath_orders_batch
+from airlight.reference.quadrature.reference import check_camera, check_rays
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
 from airlight.reference.scene.read import read_reference
@@ -44,7 +45,6 @@ from airlight.reference.storage.store import (
     store,
 )
 from airlight.validation.arrays import Counted
-from airlight.validation.estimates.quadrature import check_camera, check_rays
 
 Trace = Callable[[int], Batches]  # from the seed
 

@@ -1,157 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of a scene, from the cache where it was computed before, and what the image
-of a renderer holds of it.
-
-Refused are references that are infinite, of rays that meet a light, and what is not
-finite for any other reason.
-
-With q = (x - t) + r = h E, t the foot of the light and h its distance from
-the ray (DESIGN section 2),
-
-    h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
-
-Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all
-E > 0 and the exponential depends on t alone:
-
-    h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
-
-J and the radiance grow like 1/h, without a bound. A ray that ends at the light has E up to 1, one
-that begins there, at the camera, E from 1 on: parts of the same integral. A light at the camera is
-on every ray. That the samples of an estimator are finite makes no difference: their mean is
-infinite.
-
-The mean over the area of a pixel is finite, since int 2 pi h dh / h is: `pixel="area"` is refused
-only where the camera is at the light.
-
-How near is on the ray? Mitsuba holds positions as float32 numbers, the largest coordinate of camera
-and light known to 2^-24 of it. A smaller h is not known to be anything but 0.
-"""
-
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+"""The layers of a reference, each with its error: proven, estimated or statistical."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airlight.analytic.clock import stopwatch
-from airlight.analytic.geometry import foot_and_height
-from airlight.errors import InputError
-from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.ray_values import ReferenceImage
-from airlight.reference.quadrature.replicates import Keep, PointPlan
-from airlight.reference.quadrature.surface import surface_hits
-from airlight.reference.scene.convex_bounds import holds
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.storage.exr import TOTAL
-from airlight.reference.storage.scene_digest import scene_content
-from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
-from airlight.validation.arrays import Array, Bools, Counted
+from airlight.validation.arrays import Array
 from airlight.validation.statistics.estimate import UNKNOWN, Estimate, Kind
-
-
-@dataclass(frozen=True)
-class ReferenceInputs(Inputs):
-    """The inputs of the quadrature reference of a scene at its own size."""
-
-    kind = "quadrature"
-    scene: Content
-    checks: int = 32  #: see `reference.quadrature.image.quadrature_image`
-    shadow_scale: float = 1.0  #: the same
-    pixel: str = "centre"  #: the same
-    #: samples of area lights of each replicate; None for as many as their error needs
-    points: int | None = None
-
-
-def reference_inputs(scene, **settings: Any) -> ReferenceInputs:
-    """Return the inputs of the reference of an `mi.Scene`, `settings` by the
-    names of `ReferenceInputs`.
-    """
-    return ReferenceInputs(scene_content(scene), **settings)
-
-
-def reference_result(
-    scene, inputs: ReferenceInputs | None = None, *, progress: Counted | None = None
-) -> Kept[ReferenceImage]:
-    """Return the quadrature reference of an `mi.Scene`, and what it took, from
-    the cache or computed now.
-
-    `inputs`: of this scene, with the settings of `reference_inputs`; by default with its defaults.
-
-    Raises InputError for radiance that is not finite.
-    """
-    asked = inputs or reference_inputs(scene)
-    return stored(asked, lambda: _computed(scene, asked, progress), ReferenceImage)
-
-
-def reference_image(scene, *, progress: Counted | None = None, **settings: Any) -> ReferenceImage:
-    """Return the quadrature reference of an `mi.Scene` at its own size,
-    (height, width, 3) [W/(m^2 sr)].
-
-    `settings`: by the names of `ReferenceInputs`.
-
-    Raises InputError for radiance that is not finite.
-    """
-    return reference_result(scene, reference_inputs(scene, **settings), progress=progress).value
-
-
-def _computed(scene, inputs: ReferenceInputs, progress: Counted | None) -> ReferenceImage:
-    reference, points = read_reference(scene), inputs.points
-    # Only area lights take so long that a run is worth going on with.
-    keep = _parts(inputs.key) if reference.area and inputs.pixel == "centre" else None
-    # A given number of points is taken as it is: first and most are the same, and no error is asked
-    # for.
-    settings = {
-        "checks": inputs.checks,
-        "shadow_scale": inputs.shadow_scale,
-        "pixel": inputs.pixel,
-        "plan": PointPlan(error=0.0, first=points, most=points) if points else None,
-    }
-    return _checked_image(reference, settings, keep=keep, progress=progress)
-
-
-def reference_of_pixels(
-    scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
-) -> ReferenceImage:
-    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row,
-    (1, count, 3); not kept.
-
-    `plan`: how many samples stand for area lights.
-    """
-    whole = read_reference(scene)
-    some = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
-    return _checked_image(some, {"plan": plan})
-
-
-def _checked_image(
-    reference: ReferenceScene,
-    settings: Mapping[str, Any],
-    *,
-    keep: Keep | None = None,
-    progress: Counted | None = None,
-) -> ReferenceImage:
-    """Return the reference of an image whose every value is finite."""
-    check_camera(reference)
-    # The mean over a pixel is finite even where its centre ray meets a light.
-    if settings.get("pixel", "centre") == "centre":
-        check_rays(reference, surface_hits(reference).distance)
-    image = quadrature_image(reference, **settings, keep=keep, progress=progress)
-    check_values(reference, image)
-    return image
-
-
-def _parts(key: str | None) -> Keep:
-    """Return a store for parts of a reference until it is done: a run that was
-    interrupted goes on from them.
-    """
-
-    def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        part = None if key is None else f"{key}/{name}"
-        # Without a key nothing can be kept: the work is done each time.
-        found, spent = load(part), stopwatch()
-        return (found or store(part, work(), spent())).value
-
-    return keep
 
 
 def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
@@ -184,27 +39,39 @@ def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     return np.asarray(getattr(reference, f"{layer}_se"))
 
 
+def stated_error(reference: ReferenceImage, layer: str) -> tuple[Array, Kind] | None:
+    """Return the error of a layer without that of samples, (height, width, 3) [W/(m^2 sr)], and its
+    kind; None where it is not known.
+
+    The error of the airlight is proven or estimated, the error of a surface is estimated, and those
+    of the total add up.
+    """
+    if layer == "airlight":
+        return reference.airlight_error, reference.airlight_kind
+    if reference.surface_error is None:
+        return None
+    if layer == "surface":
+        return reference.surface_error, "estimated"
+    return reference.airlight_error + reference.surface_error, "estimated"
+
+
 def known_to(reference: ReferenceImage, layer: str) -> Estimate:
     """Return the mean of a layer, and the mean error of its pixels, where these
     are finite [W/(m^2 sr)].
 
-    That of the airlight is proven or estimated as its bound is, and statistical where lights or
-    positions are sampled: a standard error then. Surfaces are Mitsuba's in single precision:
-    nothing says how far they are off where they are not sampled.
+    It is proven or estimated as `stated_error` says, and statistical where lights or positions are
+    sampled: a standard error and the stated error together then.
     """
-    # The mean error of the pixels: standard errors where something is sampled, and the bound of the
-    # airlight.
     values, sampled = reference_layer(reference, layer), reference_error(reference, layer)
-    kind: Kind = reference.bound_kind if sampled is None else "statistical"
-    errors = np.zeros_like(values) if sampled is None else sampled
-    if layer != "surface":
-        errors = errors + reference.airlight_bound
+    stated = stated_error(reference, layer)
+    kind: Kind = "estimated" if stated is None else stated[1]
+    errors = np.zeros_like(values) if stated is None else stated[0]
+    if sampled is not None:
+        kind, errors = "statistical", errors + sampled
     finite = np.isfinite(values) & np.isfinite(errors)
     if not finite.any():
         return UNKNOWN
-    # Surfaces are Mitsuba's, in single precision, and say nothing about their error unless they are
-    # sampled.
-    unknown = layer != "airlight" and sampled is None
+    unknown = stated is None and sampled is None
     return Estimate(
         float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind
     )
@@ -223,86 +90,3 @@ def relative_error(estimate: Estimate) -> float | None:
     return (
         estimate.error / estimate.value if estimate.value and estimate.error is not None else None
     )
-
-
-def check_camera(reference: ReferenceScene) -> None:
-    """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
-    for number, light in enumerate(reference.lights, 1):
-        distance = float(np.linalg.norm(light.position - reference.origin))
-        if distance <= _uncertainty(reference, light) and _scatters(reference, light):
-            raise InputError(
-                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which "
-                "grows like "
-                "1/distance, is infinite in every pixel; move the light or the camera"
-            )
-
-
-def check_rays(reference: ReferenceScene, distance: Array) -> None:
-    """Refuse rays through pixel centres that meet a light before the visible surface,
-    so far away, (rays,) [m].
-    """
-    ends = np.ravel(distance)
-    for number, light in enumerate(reference.lights, 1):
-        origin = np.broadcast_to(reference.origin, reference.direction.shape)
-        foot, height = foot_and_height(origin, reference.direction, light.position)
-        # A light counts as on the ray where its distance from it is not known to be more than 0; it
-        # must be in front of the camera, before the surface, and shine along the ray.
-        known = _uncertainty(reference, light)
-        meets = (
-            (height <= known)
-            & (foot > 0)
-            & (foot <= ends + known)
-            & _looks_along(light, reference.direction)
-        )
-        if meets.any() and _scatters(reference, light):
-            pixel = int(np.argmax(meets))
-            row, column = divmod(pixel, reference.width)
-            raise InputError(
-                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre "
-                "of the pixel in "
-                f"column {column} of row {row}: the airlight there, which grows like 1/distance, "
-                "is infinite; move the "
-                "light or the camera, take another size, or the mean over pixels (--pixel area)"
-            )
-
-
-def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
-    """Refuse a reference that is not finite, by its first pixel."""
-    for what in ("airlight", "airlight_bound", "surface"):
-        values: Any = getattr(image, what)
-        wrong = ~np.isfinite(values).all(axis=2)
-        if wrong.any():
-            # The first pixel in reading order.
-            row, column = np.argwhere(wrong)[0]
-            raise InputError(
-                f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not "
-                "finite, first in "
-                f"column {column} of row {row}; a light may lie on its ray, or a number of the "
-                "scene be too large: "
-                "move the light, or use other units"
-            )
-
-
-def _name(number: int, light: ReferenceLight) -> str:
-    return f"light {number} at ({', '.join(f'{coordinate:g}' for coordinate in light.position)})"
-
-
-def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
-    """Return how well the distance from the camera to a light is known [m]."""
-    # Positions are float32 numbers, known to 2^-24 of the largest coordinate.
-    return 2.0**-24 * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
-
-
-def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
-    """Return whether there is a medium where a light is: beside it the airlight is finite."""
-    # A light within a bounded medium is in that medium, else in the one around all.
-    inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
-    medium = inside[0] if inside else reference.medium
-    return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
-
-
-def _looks_along(light: ReferenceLight, direction: Array) -> Bools:
-    """Return which rays through a light pass its cone, before it or behind it."""
-    if light.axis is None:
-        return np.ones(len(direction), dtype=bool)
-    return np.abs(direction @ light.axis) >= np.cos(light.cutoff)

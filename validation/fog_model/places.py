@@ -13,7 +13,7 @@ extinction adds exp(-sigma_t height e^w), entire in w. Only a panel over which t
 many orders is hard, and the light beyond such a panel is small.
 
 The path from a directional light is unbounded, so that only media with bounds attenuate it; between
-the kinks of its lengths (`reference.quadrature.segments`) the integrand is an exponential of a
+the kinks of its lengths (`reference.quadrature.intervals`) the integrand is an exponential of a
 linear function, and eight nodes are exact to rounding over up to four optical depths.
 
 In height fog pieces end where the density has kinks too, and panels span four scale heights at
@@ -30,11 +30,17 @@ import numpy as np
 
 from airlight.analytic.panels import equal_panels
 from airlight.reference.quadrature.height_fog import fog_of
-from airlight.reference.quadrature.homogeneous import smooth_pieces
+from airlight.reference.quadrature.homogeneous import by_medium, smooth_pieces
+from airlight.reference.quadrature.integrate import profile_of
+from airlight.reference.quadrature.intervals import (
+    Pieces,
+    Stretches,
+    camera_segments,
+    cut,
+    lit_stretches,
+    whole,
+)
 from airlight.reference.quadrature.light_airlight import LitRays, sun_stretches
-from airlight.reference.quadrature.pieces import Pieces, by_medium, cut, whole
-from airlight.reference.quadrature.segments import camera_segments
-from airlight.reference.quadrature.stretches import Stretches, lit_stretches, profile_of
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
@@ -118,7 +124,7 @@ def point_nodes(
     rays = reach.rays
     stretches = _within(lit_stretches(light, rays, reach.lit), ends)
     if reference.media:
-        pieces, _ = smooth_pieces(
+        pieces = smooth_pieces(
             reference, rays, camera_segments(reference, reach.distance), stretches
         )
     else:
@@ -180,7 +186,7 @@ def parallel_nodes(
     if isinstance(reference.medium, HeightMedium):
         pieces, depth = _before_sun(reference, light, stretches)
     else:
-        pieces, _ = smooth_pieces(
+        pieces = smooth_pieces(
             reference, rays, camera_segments(reference, reach.distance), stretches
         )
         depth = (pieces.x1 - pieces.x0) * by_medium(reference, "sigma_t", pieces.medium).max(axis=1)

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from airlight.errors import InputError
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.camera import film_positions
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.storage.exr import NOTE, read_exr
@@ -40,12 +41,7 @@ from airlight.validation.engine.seen import (
     pixel_kinds,
     scene_of_size,
 )
-from airlight.validation.estimates.quadrature import (
-    known_to,
-    known_words,
-    reference_image,
-    relative_error,
-)
+from airlight.validation.estimates.quadrature import known_to, known_words, relative_error
 from airlight.validation.motion.blocks import BLOCK
 from airlight.validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from airlight.validation.motion.lag import SURE, Lag

@@ -24,9 +24,9 @@ from airlight.errors import InputError
 from airlight.realtime.frame.image import Frame, render_frame
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.quadrature.reference import reference_of_pixels
 from airlight.validation.arrays import Array
 from airlight.validation.clock import time_repeated, timed
-from airlight.validation.estimates.quadrature import reference_of_pixels
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.papers.claims import Figure, quartiles
 from airlight.validation.scenes.loading import load_scene, resize

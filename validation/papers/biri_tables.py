@@ -15,8 +15,8 @@ import numpy as np
 
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.clock import time_in_turns
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import error_metrics, known
 from airlight.validation.papers.claims import quartiles
 from airlight.validation.scenes.loading import load_scene, resize

@@ -51,10 +51,10 @@ from airlight.realtime.methods.published.billeter2010.tessellation import (
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.clock import time_in_turns
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import error_metrics, known
 from airlight.validation.papers.claims import quartiles
 from airlight.validation.scenes.loading import load_scene, resize

@@ -21,9 +21,9 @@ import numpy as np
 from airlight.analytic.geometry import foot_and_height
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.validation.arrays import Array, Bools
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.metrics.errors import Metrics, error_metrics, known
 from airlight.validation.scenes.loading import load_scene, resize
 from airlight.validation.scenes.parts import camera, fog, point_light

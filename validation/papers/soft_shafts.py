@@ -33,9 +33,9 @@ from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.clock import time_in_turns
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.papers.claims import INTERVAL, Figure, quartiles
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.samples import LEVEL, student_quantile

@@ -131,7 +131,7 @@ def compare_statistics(
     *,
     mask: ArrayLike | None = None,
     margin: float | None = None,
-    bound: float = 0.0,
+    stated: float = 0.0,
 ) -> Statistics:
     """Test two images against each other (derivations: see the module).
 
@@ -147,7 +147,7 @@ def compare_statistics(
     (height, width) of truth values, or that are not finite in either mean are not compared:
     `error_metrics` counts the latter, and batch means, which would not be of these pixels, are then
     ignored. A relative bias up to the `margin` [1] counts as agreement, such as 0.005. The relative
-    bias may have an error of up to the `bound` [1] that is no noise: agreement allows for it on
+    bias may have an error of up to `stated` [1] that is no noise: agreement allows for it on
     both sides of each interval.
     """
     check_margin(margin)
@@ -176,7 +176,7 @@ def compare_statistics(
         "margin": margin,
         "equivalent": None
         if margin is None
-        else all(bound - margin < low and high < margin - bound for low, high in intervals),
+        else all(stated - margin < low and high < margin - stated for low, high in intervals),
     }
     return record_of(found, Statistics)
 

@@ -2,8 +2,8 @@
 """The reference of the cells of one image, computed once, with its own error.
 
 It is the quadrature at pixel centres. An area light needs many light samples, each as costly as a
-point light: it has fewer here than in `airlight reference`, and their standard error is part of the
-bound. A sixteenth of the pixels has a reference there, chosen by chance once for all: quantiles of
+point light: it has fewer here than in `airlight reference`, and three of their standard errors are
+part of its error. A sixteenth of the pixels has a reference there, chosen by chance once for all: quantiles of
 errors need no more.
 """
 
@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import reference_of_pixels, reference_result
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, stored
 from airlight.validation.arrays import Array
-from airlight.validation.estimates.quadrature import reference_of_pixels, reference_result
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene
@@ -40,7 +40,7 @@ class Reference:
     """The reference of all cells of one image."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
-    bound: Array  #: of its error, three standard errors of area lights among it [W/(m^2 sr)]
+    error: Array  #: its error, three standard errors of area lights among it [W/(m^2 sr)]
     surface: Array | None  #: (height, width, 3) [W/(m^2 sr)]; None where area lights leave it out
     mask: NDArray[np.bool_] | None  #: pixels that have a reference, (height, width); None for all
     crossings: int | None  #: of all camera rays with edges between light and shadow
@@ -55,15 +55,15 @@ class Reference:
     def own_error(self) -> ReferenceError:
         """The error that the reference states for itself."""
         mask = np.ones(self.airlight.shape[:2], dtype=bool) if self.mask is None else self.mask
-        airlight, bound = self.airlight[mask], self.bound[mask]
+        airlight, error = self.airlight[mask], self.error[mask]
         # A dark reference has no relative error.
         mean = float(airlight.mean())
         known = mean > 0
         return ReferenceError(
             "quadrature",
             mean,
-            float(bound.mean()) / mean if known else None,
-            float((bound / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
+            float(error.mean()) / mean if known else None,
+            float((error / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
             self.spent.seconds,
             self.spent.processor,
             self.crossings,
@@ -72,10 +72,10 @@ class Reference:
 
 def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
-    # The light samples of area lights add three standard errors to the bound.
+    # The light samples of area lights add three standard errors.
     by_chance = 0.0 if image.airlight_se is None else 3.0 * image.airlight_se
-    bound = image.airlight_bound + by_chance
-    return Reference(image.airlight, bound, image.surface, None, image.transitions, spent)
+    error = image.airlight_error + by_chance
+    return Reference(image.airlight, error, image.surface, None, image.transitions, spent)
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -91,7 +91,7 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     inputs = SampledInputs(scene_content(loaded.scene))
     result = stored(inputs, lambda: sampled_reference(loaded.scene), dict[str, NDArray[Any]])
     some = result.value
-    return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)
+    return Reference(some["airlight"], some["error"], None, some["mask"], None, result.spent)
 
 
 @dataclass(frozen=True)
@@ -103,18 +103,18 @@ class SampledInputs(Inputs):
 
 
 def sampled_reference(scene) -> dict[str, NDArray[Any]]:
-    """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
+    """Return airlight, its error and the mask of the pixels that have one, of an `mi.Scene`."""
     # One pixel of sixteen has a reference, but at least 64. The seed is fixed: all methods, and all
     # studies, are judged at the same pixels.
     width, height = scene.sensors()[0].film().size()
     count = int(width * height)
     pixels = np.sort(np.random.default_rng(20261123).permutation(count)[: max(64, count // 16)])
     some = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
-    airlight, bound, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
-    airlight[pixels], bound[pixels], mask[pixels] = some.airlight[0], some.bound[0], True
+    airlight, error, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
+    airlight[pixels], error[pixels], mask[pixels] = some.airlight[0], some.error[0], True
     shape = int(height), int(width)
     return {
         "airlight": airlight.reshape(*shape, 3),
-        "bound": bound.reshape(*shape, 3),
+        "error": error.reshape(*shape, 3),
         "mask": mask.reshape(shape),
     }

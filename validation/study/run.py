@@ -293,7 +293,7 @@ def _errors(
         # There is no mask here: scenes in which a method states a bound have no area lights, so
         # that every pixel has a reference.
         floor = FLOOR * reference.airlight.mean()
-        allowed = bound * np.maximum(reference.airlight, floor) + reference.bound
+        allowed = bound * np.maximum(reference.airlight, floor) + reference.error
         excess = np.abs(test - reference.airlight).reshape(-1, 3) - allowed.reshape(-1, 3)
         outside = np.flatnonzero(~(excess <= 0).all(axis=1))
         if len(outside):  # few pixels: the worth of ends takes a while

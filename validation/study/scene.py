@@ -23,7 +23,12 @@ from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
 from airlight.realtime.scene.read_scene import Scene, read_scene
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import (
+    ReferenceInputs,
+    reference_image,
+    reference_result,
+)
 from airlight.reference.storage.exr import TOTAL, Image
 from airlight.reference.storage.scene_digest import scene_content, scene_digest
 from airlight.reference.storage.store import Content, Inputs, Kept, is_kept, stored
@@ -32,12 +37,6 @@ from airlight.validation.columns import record_of
 from airlight.validation.estimates.agreement import agreements
 from airlight.validation.estimates.monte_carlo import ElsewhereFor
 from airlight.validation.estimates.multiple_scattering import multiple_scattering_fraction
-from airlight.validation.estimates.quadrature import (
-    ReferenceInputs,
-    reference_image,
-    reference_inputs,
-    reference_result,
-)
 from airlight.validation.metrics.flip import Flip, flip_hdr
 from airlight.validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from airlight.validation.statistics.records import Agreement, MultipleScattering
@@ -179,7 +178,7 @@ class SceneStudy:
     @cached_property
     def reference_inputs(self) -> ReferenceInputs:
         """The inputs of the reference, which are among those of all that is compared with it."""
-        return reference_inputs(self.loaded.scene, points=self.study.points)
+        return ReferenceInputs(scene_content(self.loaded.scene), points=self.study.points)
 
     def inputs(self, chosen: Configuration) -> "CellInputs":
         """Return the inputs of the row and the image of a configuration, without its times."""

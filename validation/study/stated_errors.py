@@ -38,7 +38,7 @@ from airlight.realtime.parameters import defaults
 from airlight.realtime.scene.phase import Tabulated
 from airlight.realtime.scene.read_scene import Scene
 from airlight.reference.quadrature.fields import field_of, optical_depth
-from airlight.reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
+from airlight.reference.quadrature.intervals import AMBIENT, camera_segments, scattering_range
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.convex_bounds import normals_at
 from airlight.reference.scene.directional_light import DirectionalLight

@@ -124,7 +124,7 @@ class Study(Settings):
     half: tuple[str, ...] = ()  #: scenes that are compared at half the width
     configurations: tuple[Configuration, ...] = ()
     media: tuple[tuple[str, ...], ...] = ((),)
-    #: of area lights in references, see `validation.estimates.quadrature.reference_image`
+    #: of area lights in references, see `reference.quadrature.reference.reference_image`
     points: int | None = None
     timed: int | None = None  #: scenes that are timed alone, the first; None for all
     limit: float = 600.0  #: seconds that a cell or a reference may take

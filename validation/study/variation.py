@@ -23,9 +23,9 @@ from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.arrays import Array, Counted
 from airlight.validation.clock import Piece, in_turns
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.motion.judge import motion_verdict
 from airlight.validation.motion.measures import Measures, mean_measures, measure
 from airlight.validation.motion.measures import Sequence as Frames

@@ -118,7 +118,7 @@ hear.error = ({failure, error, done, frames, mean}) => {
     const interval = error.known === error.pixels ? "" : ` ± ${percent(error.interval)}`;
     words.textContent = `Error of the airlight against the reference: RMSE ${percent(error.relative_rmse)}${interval}, ` +
       `bias ${percent(error.relative_bias)} of the mean; 99 % of pixels within ${percent(error.p99)}; ${part}; ` +
-      `the reference's own bound ${small(error.bound)}.` +
+      `the reference's own error ${small(error.own_error)}.` +
       (frames ? ` Mean of ${frames} frames at rest: RMSE ${percent(mean)}.` : "");
     document.documentElement.dataset.rmse = error.relative_rmse;
   }

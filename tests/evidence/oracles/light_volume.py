@@ -38,7 +38,7 @@ is one sum of cos(theta) and sin(theta). From f1 and f2 at theta1 and theta1 + d
 which changes sign once at most, where tan(e) = f1 sin(delta) / (f1 cos(delta) - f2).
 
 The lit parts of a ray, clipped to faces and cones of spots, are integrated like the lit intervals
-of the reference (`reference.quadrature.stretches`): the oracle differs from the reference only by
+of the reference (`reference.quadrature.intervals`): the oracle differs from the reference only by
 the errors of the shadow map.
 """
 

@@ -13,7 +13,7 @@ from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.samples import render_samples
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.scene.read_scene import read_scene
-from airlight.validation.estimates.quadrature import reference_image
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames

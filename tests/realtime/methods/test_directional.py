@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
-from airlight.validation.estimates.quadrature import reference_image
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.scenes.meshes import box, placed
 from airlight.validation.scenes.parts import mitsuba_mesh
 from tests.helpers import airlight_sum

@@ -9,8 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.ray_values import ray_values
+from airlight.reference.quadrature.image import quadrature_image, ray_values
 from airlight.reference.scene.read import read_reference
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.suns import BRICK, CHORDS, brick, pearl, plain_airlight, sun, sunny
@@ -123,7 +122,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
         else 1e-8
     )
     reference, image = reference_and_image(CASES[case]())
-    airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
+    airlight, bound = image.airlight.reshape(-1, 3), image.airlight_error.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
     assert len(lit) >= 3
     for pixel in lit[:: max(1, len(lit) // 3)]:
@@ -251,7 +250,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     )
     # the closed form, except for rounding
     assert values.airlight[0] == pytest.approx(expected, rel=1e-12)
-    assert np.all(values.bound < 1e-6 * values.airlight)
+    assert np.all(values.airlight_error < 1e-6 * values.airlight)
 
 
 def test_shadow_of_a_sphere_in_fog(variant):

@@ -97,8 +97,8 @@ def test_optical_depths_are_those_of_scipy(reference):
 def test_airlight_by_look_ups_alone(reference, light):
     scene = reference(light, shapes="")
     image = quadrature_image(scene, checks=0)
-    assert image.bound_kind == "estimated"  # by two rules, which kinks deceive
-    radiance, bound = (part.reshape(-1, 3) for part in (image.airlight, image.airlight_bound))
+    assert image.airlight_kind == "estimated"  # by two rules, which kinks deceive
+    radiance, bound = (part.reshape(-1, 3) for part in (image.airlight, image.airlight_error))
     for row in (86, 106, 121):
         assert radiance[row, 0] > 0
         way = scene.direction[row]
@@ -241,11 +241,11 @@ FAULTS = {
         lambda function, self, point: function(self, point) + 0.5,
     ),
     "no attenuation on the way from the light": Wrap(
-        "airlight.reference.quadrature.cell_walk:CellWalk.leave",
+        "airlight.reference.quadrature.density_grid:CellWalk.leave",
         lambda function, *others: 0 * function(*others),
     ),
     "cells as thick as their first place": Wrap(
-        "airlight.reference.quadrature.cell_walk:CellWalk.within",
+        "airlight.reference.quadrature.density_grid:CellWalk.within",
         lambda function, self, origin, way, x0, x1: (
             (x1 - x0) * self.density(origin + way * (x0 + 1e-6))
         ),

@@ -83,7 +83,7 @@ def _running_sum(values, x):
 
 def test_bounds_are_below_a_millionth_of_the_mean(scene):
     image = quadrature_image(read_reference(scene(LAMP, SPOT, SUN)))
-    assert image.airlight_bound.max() < 1e-6 * image.airlight.mean()
+    assert image.airlight_error.max() < 1e-6 * image.airlight.mean()
     assert image.left == 0
 
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.ray_values import ray_values
+from airlight.reference.quadrature.image import quadrature_image, ray_values
 from airlight.reference.quadrature.replicates import PointPlan, standard_error
 from airlight.reference.scene.camera import film_directions
 from airlight.reference.scene.read import read_reference
@@ -161,7 +160,7 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     image = quadrature_image(reference, pixel="area", tolerance=1e-4, checks=1)
     error = np.abs(image.airlight - expected)
     # Student's value with seven degrees of freedom that one value in 10 000 exceeds, for 36 values.
-    assert np.all(error <= 7.1 * image.airlight_se + image.airlight_bound)
+    assert np.all(error <= 7.1 * image.airlight_se + image.airlight_error)
     # A pilot foresees the error from a few positions: 1e-4 in the mean, and not twice
     # and a half of it anywhere.
     stated = image.airlight_se / image.airlight
@@ -223,7 +222,7 @@ def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     middle = reference.origin + 2.7 * reference.direction[4]
     reference = replace(reference, lights=(replace(light, position=middle),))
     centre, area = quadrature_image(reference), quadrature_image(reference, pixel="area")
-    assert (centre.bound_kind, area.bound_kind) == ("proven", "estimated")
+    assert (centre.airlight_kind, area.airlight_kind) == ("proven", "estimated")
     assert not np.isfinite(centre.airlight[1, 1]).all() or centre.airlight[1, 1].max() > 1e6
     assert np.isfinite(area.airlight).all()
     expected, *_ = brute_force(reference, 32)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from airlight.reference.quadrature.reference import ReferenceInputs
 from airlight.reference.storage import code as module
 from airlight.reference.storage.code import code_digest, source_digest
 from airlight.reports.machine.driver_check import DriverInputs
 from airlight.validation.estimates.monte_carlo import VolpathInputs
-from airlight.validation.estimates.quadrature import ReferenceInputs
 from airlight.validation.kernels.rays import RayInputs
 from airlight.validation.study.scene import CheckInputs
 
@@ -128,7 +128,7 @@ def test_the_data_that_code_reads_count_with_it(monkeypatch, name, file):
 
 #: Modules that compute by the kind of their results, and one on whose numbers each depends.
 COMPUTED = {
-    "quadrature": (ReferenceInputs.__module__, "airlight.reference.quadrature.segments"),
+    "quadrature": (ReferenceInputs.__module__, "airlight.reference.quadrature.intervals"),
     "volpath": (VolpathInputs.modules[0], "airlight.reference.scene.read"),
     "kernel-rays": (RayInputs.__module__, "airlight.analytic.panels"),
     "row": ("airlight.validation.study.run", "airlight.realtime.methods.ray_march"),

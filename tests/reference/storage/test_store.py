@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
+from airlight.reference.quadrature.reference import ReferenceInputs
 from airlight.reference.storage import store as module
 from airlight.reference.storage.cache import cache_folder
 from airlight.reference.storage.scene_digest import scene_content
@@ -42,7 +43,6 @@ from airlight.validation.estimates.monte_carlo import (
     SingleScatterInputs,
     VolpathInputs,
 )
-from airlight.validation.estimates.quadrature import ReferenceInputs
 from airlight.validation.kernels.rays import RayInputs, table
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.keys import CellReference, RowInputs

@@ -10,8 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from airlight.reference.quadrature import image as quadrature
 from airlight.reference.quadrature import light_airlight
-from airlight.reference.quadrature import ray_values as quadrature
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import ReferenceLight, read_reference
 from airlight.reference.scene.shapes import Disks, Shapes
@@ -221,7 +221,9 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
     monkeypatch.setattr(light_airlight, "lit_intervals", doubtful)
     doubted = quadrature.ray_values(reference)
     assert np.array_equal(doubted.airlight, plain.airlight)
-    assert np.flatnonzero((doubted.bound > plain.bound).any(axis=1)).tolist() == [5]
+    assert np.flatnonzero((doubted.airlight_error > plain.airlight_error).any(axis=1)).tolist() == [
+        5
+    ]
     # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian, if it were lit, is
     # worth no more than this.
     most = (
@@ -232,7 +234,7 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
         * 1e-3
         / rays.height[5]
     )
-    assert doubted.bound[5] - plain.bound[5] == pytest.approx(most, rel=1e-9)
+    assert doubted.airlight_error[5] - plain.airlight_error[5] == pytest.approx(most, rel=1e-9)
 
 
 def test_surfaces_are_reached_as_rays_are(variant):
@@ -254,7 +256,7 @@ def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     and nothing contradicted.
     """
     image = quadrature_image(read_reference(load_scene("colonnade", size=(32, 24)).scene))
-    reached = image.airlight_bound < 1e-5 * image.airlight
+    reached = image.airlight_error < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999
     assert (image.disagreements, image.left) == (0, 0)
     assert image.checked == 32 * 32 * 24

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import airlight
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reports.studies.registry import STUDIES
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.registry import SCENES
 from tests.helpers.api import TINY, brighter, third
 

@@ -135,12 +135,16 @@ def test_a_run_fails_where_the_error_that_was_asked_for_was_not_reached(reached,
 
 def test_a_reference_by_samples_has_its_standard_errors_and_no_bound():
     run = traced()
-    assert run.bound is None
+    assert run.bound is run.error is run.surface_error is None
     assert (float(run.standard_error[0, 0, 0]), float(run.surface_standard_error[0, 0, 0])) == (
         1e-3,
         2e-3,
     )
-    assert reference(airlight_bound=np.full((4, 6, 3), 1e-9)).bound.shape == (4, 6, 3)
+    values = np.full((4, 6, 3), 1e-9)
+    proven, grid = reference(airlight_bound=values), reference(airlight_error=values)
+    assert proven.error is proven.bound
+    assert proven.bound.shape == grid.error.shape == (4, 6, 3)
+    assert grid.bound is None
 
 
 def test_an_animation_says_what_a_frame_costs_and_which_files_there_are():

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import airlight
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.storage.build import build
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.reports.commands.main import run
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
 
 SHAPE = (16, 20, 3)

@@ -63,7 +63,7 @@ def report(tmp_path_factory):
         "airlight": "reference-airlight.png",
     }
     studied = scene(
-        "a_scene", methods, size=[32, 24], reference=reference_of(relative_bound=4e-11), files=files
+        "a_scene", methods, size=[32, 24], reference=reference_of(relative_error=4e-11), files=files
     )
     data = report_of(
         [studied],

@@ -178,7 +178,7 @@ def test_names_and_notes_are_words_and_never_html(data, folder):
 
 def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
     scene = data["scenes"][0]
-    scene["reference"] |= {"mean": None, "relative_bound": None, "missed": None}
+    scene["reference"] |= {"mean": None, "relative_error": None, "missed": None}
     scene["methods"][0]["error"] |= dict.fromkeys(("relative_rmse", "relative_bias", "p50", "p99"))
     scene["methods"] += [refused("bad", "no series"), engine_image()]
     scene["agreement"]["airlight"]["statistics"] |= {

@@ -222,7 +222,7 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
     # Half the time: what `fresh` tells one estimator it tells both.
     checks = replace(TINY.checks, margins={"single-scatter": 0.2}, samples={"single-scatter": 4})
     monkeypatch.setattr(
-        "airlight.validation.estimates.quadrature.quadrature_image", counted(quadrature_image)
+        "airlight.reference.quadrature.reference.quadrature_image", counted(quadrature_image)
     )
     monkeypatch.setattr(
         "airlight.validation.estimates.monte_carlo.single_scatter_batch",
@@ -585,14 +585,14 @@ def test_the_remains_of_a_killed_run_go_after_a_day(tmp_path):
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
 def test_reference_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
-    from airlight.reference.quadrature.ray_values import ReferenceImage
+    from airlight.reference.quadrature.image import ReferenceImage
 
     black = np.zeros_like(airlight)
     found = reference_record(
         ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan"))
     )
     json.dumps(asdict(found), allow_nan=False)
-    assert found.relative_bound is None
+    assert found.relative_error is None
     assert found.missed is None
 
 

@@ -152,13 +152,13 @@ def test_error_of_a_part_covers_that_of_the_whole():
     error = view_error(known, test)
     assert error.interval == 0
     assert error.relative_rmse == pytest.approx(whole.relative_rmse, rel=1e-12)
-    assert error.bound == pytest.approx(3e-9 / reference.mean(), rel=1e-12)
+    assert error.own_error == pytest.approx(3e-9 / reference.mean(), rel=1e-12)
     np.testing.assert_array_equal(known.filled(known.airlight), reference)
 
 
 def test_a_pixel_that_is_not_finite_leaves_the_interval_of_the_error_as_wide_as_it_is():
     known = KnownReference.of_size(WIDTH, HEIGHT)
-    for layer in (known.airlight, known.surface, known.bound):
+    for layer in (known.airlight, known.surface, known.error):
         layer[: HEIGHT // 2] = 1.0
     test = np.where(np.random.default_rng(3).random((HEIGHT, WIDTH, 1)) < 0.5, 1.1, 1.4) * np.ones(
         3

@@ -36,7 +36,7 @@ class ReferenceAtOnce:
         self.known, self.done = KnownReference.of_size(*size), False
         for answer in answers(Task(1, scene, size, dict(changes), most)):
             if answer.pixels is not None:
-                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.bound)
+                self.known.add(answer.pixels, answer.airlight, answer.surface, answer.error)
             self.done = answer.done
         self.told()
 

@@ -69,6 +69,7 @@ def test_failures_name_what_is_wrong(pair):
 
 
 def bounded(values, bound, kind="proven", **layers):
+    """Return an image as airlight 1.0 wrote it, with estimates in `airlight_bound` too."""
     return Image(
         {"airlight": values, "airlight_bound": bound, **layers}, attributes={"airlight:bound": kind}
     )
@@ -107,6 +108,17 @@ def test_stated_errors_of_both_files_count_in_the_verdict_on_a_margin():
         ).stated
         is None
     )
+
+
+def test_an_estimated_error_has_a_layer_of_its_own():
+    """The name says the kind, whatever the header says of another layer."""
+    values, error = np.full(SHAPE, 2.0), np.full(SHAPE, 0.02)
+    new = Image({"airlight": values, "airlight_error": error})
+    old = bounded(values, error, "estimated")
+    assert compare_images(new, old).stated == compare_images(old, new).stated
+    assert compare_images(new, new).stated.kind == "estimated"
+    both = bounded(values, 0 * error, airlight_error=error)
+    assert compare_images(both, new).stated == compare_images(new, new).stated
 
 
 @pytest.mark.parametrize("odd", [np.nan, np.inf, -1.0, 3.0])

@@ -39,8 +39,11 @@ def reference_of(pixel):
     """The means over pixels are a tenth brighter here, where a pixel is bright."""
     brighter = 1 + 0.1 * (pixel == "area") * (AIRLIGHT > 1)
     layers = {"airlight": brighter * AIRLIGHT, "surface": brighter * SURFACE, "emitted": None}
-    bounds = {"airlight_bound": 0 * AIRLIGHT, "airlight_se": None, "surface_se": None}
-    return SimpleNamespace(**layers, **bounds, light_angle=np.ones(SHAPE[:2]), bound_kind="proven")
+    errors = {"airlight_error": 0 * AIRLIGHT, "airlight_se": None}
+    errors |= {"surface_error": 0 * AIRLIGHT, "surface_se": None}
+    return SimpleNamespace(
+        **layers, **errors, light_angle=np.ones(SHAPE[:2]), airlight_kind="proven"
+    )
 
 
 def written(folder, name, **layers):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.validation.comparison.images import compare_images
 from airlight.validation.engine.error_place import error_place
@@ -25,7 +26,6 @@ from airlight.validation.engine.judge import (
 from airlight.validation.engine.seen import expected_layer, judged_layer, seen_image
 from airlight.validation.estimates.quadrature import (
     reference_error,
-    reference_image,
     reference_layer,
     relative_error,
 )

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import mitsuba as mi
 import pytest
 
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates import agreement as agreement_module
 from airlight.validation.estimates.agreement import MASK_PIXELS, agreement, layer_masks, pixel_angle
 from airlight.validation.estimates.monte_carlo import monte_carlo_batches
-from airlight.validation.estimates.quadrature import reference_image
 from tests.helpers.scenes import tiny_scene
 
 pytestmark = pytest.mark.statistical

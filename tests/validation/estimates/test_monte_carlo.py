@@ -17,6 +17,7 @@ import airlight.validation.estimates.monte_carlo
 from airlight.analytic.clock import Spent
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, single_batch
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.cache import cache_folder
@@ -33,7 +34,6 @@ from airlight.validation.estimates.images import (
 )
 from airlight.validation.estimates.merge import merged_references
 from airlight.validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 from tests.helpers.scenes import tiny_scene
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import Image
 from airlight.validation.engine.fault import Number
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
 from airlight.validation.engine.seen import Seen
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.fit.fit import fit_image
 from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
 from airlight.validation.fit.unknowns import Unknown, read_unknowns

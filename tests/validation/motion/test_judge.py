@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.columns import plain
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.motion import judge
 from airlight.validation.motion.judge import compare_frames
 from airlight.validation.scenes.loading import load_scene

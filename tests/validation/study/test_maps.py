@@ -45,7 +45,7 @@ import pytest
 from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
-from airlight.validation.estimates.quadrature import reference_image
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.registry import Animation

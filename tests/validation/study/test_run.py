@@ -18,9 +18,9 @@ from airlight.realtime.memory import Memory
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.methods.unshadowed import unshadowed
 from airlight.realtime.scene.read_scene import SceneFeatures, read_scene
-from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.reference import reference_of_pixels
 from airlight.reports.commands.main import run as run_command
-from airlight.validation.estimates.quadrature import reference_of_pixels
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.study import cost as expected_work
 from airlight.validation.study import reference as sampled

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.parts import camera, fog, point_light, tabulated_phase
 from airlight.validation.study import stated_errors as bounds

@@ -22,8 +22,8 @@ from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer

@@ -14,7 +14,7 @@ from airlight.realtime.image_filters import Raster, depth_guide
 from airlight.realtime.methods.soft_shafts.sources import AUTO_WIDTH, few_pixels, penumbra_width
 from airlight.realtime.numerics.array_types import two_numbers
 from airlight.realtime.scene.read_scene import read_scene
-from airlight.validation.estimates.quadrature import reference_image
+from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.study.configuration import SHARED_POINTS, configuration, prepared
 from tests.helpers.frames import frame, relative_rmse

@@ -12,8 +12,8 @@ import pytest
 from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
-from airlight.validation.estimates.quadrature import reference_image
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.meshes import box, gem, icosphere, placed, prism, rotation
 from airlight.validation.scenes.parts import medium_boundary

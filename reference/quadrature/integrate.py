@@ -1,34 +1,108 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sum of smooth pieces of rays for any medium: panels are halved until
-each ray meets a tolerance.
+"""Integrals over lit stretches for any medium: pieces between corners, in panels that are halved
+until each ray meets a tolerance.
 
-Panels, their rules, and the variable near a place are as in `analytic.panels`; under a direction
-the variable is the distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and
-albedo sigma_t int exp(-tau) dx [1] of a directional light. A medium states its integrand
-(`Integrand`); lights, tolerances and uncertain edges are known here.
+A medium gives a function from stretches to its `Integrand`: the pieces that these stretches have
+between its corners (`reference.quadrature.intervals`), and the light that it scatters along them.
+Lights, tolerances and uncertain edges are known here. Panels, their rules, and the variable near a
+place are as in `analytic.panels`; under a direction the variable is the distance. The integrals are
+albedo sigma_t J [1/m^2] of a point light, and albedo sigma_t int exp(-tau) dx [1] of a directional
+light.
+
+**The error of a ray** adds three parts: by how much both rules of its panels differ, rounding, and
+the integrand at every edge between light and shadow times the uncertainty of its place.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.kronrod import Pair
 from airlight.analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
-from airlight.reference.quadrature.pieces import Pieces
-from airlight.reference.quadrature.stretches import Profile, Terms, sums_of
-from airlight.reference.visibility.planes import Rays
+from airlight.reference.quadrature.intervals import Pieces, Stretches
+from airlight.reference.scene.read import ReferenceLight, ReferenceMedium
+from airlight.reference.scene.varying import VaryingMedium
+from airlight.reference.visibility.planes import Rays, falloff
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+# distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
+Profile = Callable[[Array, Index], Array]
+#: An error that is a derived upper bound, or an estimate from two values of the same
+#: quantity: by two rules, or two steps.
+ErrorKind = Literal["proven", "estimated"]
 
 AT_LIGHT = 1e-290  #: height [m] below which a ray meets the light
 _EPS = float(np.finfo(float).eps)
 
 
+@dataclass(frozen=True)
+class Terms:
+    """How lights of strength 1 shine on the lit stretches that are summed, and
+    how well these are known.
+    """
+
+    profile: Profile | None = None  #: of lights at places; None: they are isotropic
+    #: fraction of the way to a place that attenuates, from the scattering point on
+    shadow_scale: float = 1.0
+    #: uncertainty of ends: relative to their distance from a place, or by ray a length [m]
+    edge: float | Array = 0.0
+    rounding: Array | None = None  #: uncertainty of the places of kinks, by ray [m]
+    rtol: float | None = None  #: relative tolerance of a sum; the field's own by default
+
+
+TERMS = Terms()
+
+
+def strongest(medium: ReferenceMedium | VaryingMedium) -> Array:
+    """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
+    return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
+
+
+def sums_of(owner: Index, values: Array, count: int) -> Array:
+    """Add up the rows that belong to each owner.
+
+    `owner`: of each row, from 0 on, (n,); `values`: (n, columns), in any unit, such as [1/m];
+    `count`: number of owners. Returns (count, columns), in the unit of the values.
+    """
+    return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
+
+
+def profile_of(light: ReferenceLight, rays: Rays) -> Profile | None:
+    """Return the profile of a light along rays; None for one that is isotropic in its cone."""
+    if not light.is_soft:
+        return None
+    return lambda x, ray: falloff(
+        np.arctan2(x - rays.foot[ray, None], rays.height[ray, None]), rays[ray], light
+    )
+
+
+def cosine_profile(rays: Rays, normal: Array) -> Profile:
+    """Return the cosine at samples of a light with unit normals, (rays, 3), along rays in
+    their planes with these.
+    """
+    # n . (o + x w - y) of the derivation is linear in x.
+    start = np.sum(normal * (rays.origin - rays.position), axis=1)
+    rise = np.sum(normal * rays.direction, axis=1)
+
+    def cosine(x: Array, ray: Index) -> Array:
+        r = np.hypot(rays.height[ray, None], x - rays.foot[ray, None])
+        return np.maximum(start[ray, None] + rise[ray, None] * x, 0.0) / np.maximum(
+            r, np.finfo(float).tiny
+        )
+
+    return cosine
+
+
 class Integrand(Protocol):
     """The integrand of a medium along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
+
+    @property
+    def pieces(self) -> Pieces:
+        """Between the corners of the medium."""
 
     @property
     def factor(self) -> Array:
@@ -55,27 +129,45 @@ class Integrand(Protocol):
         """
 
 
-def sum_pieces(
-    rays: Rays,
-    pieces: Pieces,
-    integrand: Integrand,
-    block: slice,
-    terms: Terms,
-) -> tuple[Array, Array]:
-    """Integrate smooth pieces of a block of rays and add up those of each ray,
-    for lights of strength 1.
+#: lit stretches -> the integrand along their pieces; None where nothing scatters
+Source = Callable[[Stretches], Integrand | None]
 
-    `rays`, `pieces`: all rays, in their planes with the lights, and the pieces of those of the
-    block; `integrand`: what the medium scatters along the pieces; `block`: of rays; `terms`: with a
-    tolerance of 1e-10 by default. Returns the value and a bound of its error, (rays of the block,
-    3) each; infinite where a ray meets a light in a medium that scatters.
+
+def sum_stretches(
+    rays: Rays, stretches: Stretches, source: Source, terms: Terms, *, rtol: float, step: int
+) -> tuple[Array, Array]:
+    """Integrate what a medium scatters on lit stretches, for lights of strength 1.
+
+    `rays`, `stretches`, `terms`: see `reference.quadrature.fields.Field.sums`; `source`: of the
+    medium; `rtol`: relative tolerance of the sum of a ray and a light where `terms` has none;
+    `step`: rays at once. Returns the airlight of each ray, and its error, (rays, 3) each.
     """
-    work = _Sum(rays, pieces, integrand, terms.profile)
+    ray, x0, x1 = stretches
+    count, rtol = len(rays.foot), terms.rtol or rtol
+    value, error = np.zeros((2, count, 3))
+    for first in range(0, count, step):
+        block = slice(first, min(first + step, count))
+        # Cutting needs intervals of a positive length.
+        chosen = (ray >= block.start) & (ray < block.stop) & (x1 > x0)
+        integrand = source((ray[chosen], x0[chosen], x1[chosen])) if chosen.any() else None
+        if integrand is not None:
+            value[block], error[block] = _sum_block(rays, integrand, block, terms, rtol)
+    # Phase functions have the mean 1; 1/(4 pi) makes densities over the sphere of them.
+    return value / (4 * np.pi), error / (4 * np.pi)
+
+
+def _sum_block(
+    rays: Rays, integrand: Integrand, block: slice, terms: Terms, rtol: float
+) -> tuple[Array, Array]:
+    """Return the sums of the rays of a block, and their errors: infinite where a ray meets a light
+    in a medium that scatters.
+    """
+    work, pieces = _Sum(rays, integrand, terms.profile), integrand.pieces
     edge = np.broadcast_to(terms.edge, len(rays.foot))
     rounding = np.zeros(len(rays.foot)) if terms.rounding is None else terms.rounding
     owner, count = pieces.ray - block.start, len(rays.foot[block])
     # The tolerance is relative to the sum of a ray and a light.
-    value, error = adapted(work.first_panels(), work.evaluate, owner, count, terms.rtol or 1e-10)
+    value, error = adapted(work.first_panels(), work.evaluate, owner, count, rtol)
     error = error + sums_of(owner, work.edge_error(edge, rounding), count)
     # A ray through the light: the integral of 1/r^2 diverges, unless nothing scatters there.
     meets = sums_of(owner, work.meets_light()[:, None] * integrand.factor, count) > 0
@@ -89,7 +181,6 @@ class _Sum:
     """
 
     rays: Rays
-    pieces: Pieces
     integrand: Integrand
     profile: Profile | None
     own: Rays = field(init=False)  # the ray of each piece
@@ -98,7 +189,7 @@ class _Sum:
     width: Array = field(init=False)
 
     def __post_init__(self):
-        pieces = self.pieces
+        pieces = self.integrand.pieces
         self.own = self.rays[pieces.ray]
         if self.rays.w:
             s0, s1 = pieces.x0 - self.own.foot, pieces.x1 - self.own.foot
@@ -119,7 +210,11 @@ class _Sum:
 
     def meets_light(self) -> NDArray[np.bool_]:
         near = (self.own.height < AT_LIGHT) & bool(self.rays.w)
-        return near & (self.pieces.x0 <= self.own.foot) & (self.own.foot <= self.pieces.x1)
+        return (
+            near
+            & (self.integrand.pieces.x0 <= self.own.foot)
+            & (self.own.foot <= self.integrand.pieces.x1)
+        )
 
     def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
         """Integrate panels by both rules, a block at a time so that the
@@ -155,7 +250,7 @@ class _Sum:
         """Return the integrand, times dx/r^2 or dx by dv and the profile,
         and tau, at v, (m, nodes).
         """
-        own, begin = self.own, self.pieces.x0[rows, None]
+        own, begin = self.own, self.integrand.pieces.x0[rows, None]
         if self.rays.w:
             height, foot = self.height[rows, None], own.foot[rows, None]
             # With s = height sinh(v): cosine = 1/cosh(v), r = height cosh(v), the scattering angle
@@ -176,14 +271,14 @@ class _Sum:
             )
         f, depth = self.integrand(rows, x, inside, r, scatter)
         if self.profile is not None:
-            rate = rate * self.profile(x, self.pieces.ray[rows])
+            rate = rate * self.profile(x, self.integrand.pieces.ray[rows])
         return f * rate[:, :, None], depth
 
     def edge_error(self, edge: Array, rounding: Array) -> Array:
         """Return the effect of uncertain places of shadow edges and kinks:
         integrand times uncertainty.
         """
-        pieces, every = self.pieces, np.arange(len(self.width))
+        pieces, every = self.integrand.pieces, np.arange(len(self.width))
         ends = np.stack([self.start, self.start + self.width], axis=1)
         # The integrand at both ends of each piece, per unit of v (of x under directions). An
         # uncertain end moves the sum by integrand times uncertainty, where the piece begins or ends

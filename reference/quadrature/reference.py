@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The reference of a scene, from the cache where it was computed before.
+
+Refused are references that are infinite, of rays that meet a light, and what is not
+finite for any other reason.
+
+With q = (x - t) + r = h E, t the foot of the light and h its distance from
+the ray (DESIGN section 2),
+
+    h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
+
+Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all
+E > 0 and the exponential depends on t alone:
+
+    h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
+
+J and the radiance grow like 1/h, without a bound. A ray that ends at the light has E up to 1, one
+that begins there, at the camera, E from 1 on: parts of the same integral. A light at the camera is
+on every ray. That the samples of an estimator are finite makes no difference: their mean is
+infinite.
+
+The mean over the area of a pixel is finite, since int 2 pi h dh / h is: `pixel="area"` is refused
+only where the camera is at the light.
+
+How near is on the ray? Mitsuba holds positions as float32 numbers, the largest coordinate of camera
+and light known to 2^-24 of it. A smaller h is not known to be anything but 0.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.geometry import foot_and_height
+from airlight.errors import InputError
+from airlight.reference.quadrature.image import Progress, ReferenceImage, quadrature_image
+from airlight.reference.quadrature.replicates import Keep, PointPlan
+from airlight.reference.quadrature.replicates import Kept as Part
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.convex_bounds import holds
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from airlight.reference.storage.scene_digest import scene_content
+from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ReferenceInputs(Inputs):
+    """The inputs of the quadrature reference of a scene at its own size."""
+
+    kind = "quadrature"
+    scene: Content
+    checks: int = 32  #: see `reference.quadrature.image.quadrature_image`
+    shadow_scale: float = 1.0  #: the same
+    pixel: str = "centre"  #: the same
+    #: samples of area lights of each replicate; None for as many as their error needs
+    points: int | None = None
+
+
+def reference_result(
+    scene, inputs: ReferenceInputs | None = None, *, progress: Progress | None = None
+) -> Kept[ReferenceImage]:
+    """Return the quadrature reference of an `mi.Scene`, and what it took, from
+    the cache or computed now.
+
+    `inputs`: of this scene; by default with their defaults.
+
+    Raises InputError for radiance that is not finite.
+    """
+    asked = inputs or ReferenceInputs(scene_content(scene))
+    return stored(asked, lambda: _computed(scene, asked, progress), ReferenceImage)
+
+
+def reference_image(
+    scene,
+    *,
+    checks: int = 32,
+    shadow_scale: float = 1.0,
+    pixel: str = "centre",
+    points: int | None = None,
+    progress: Progress | None = None,
+) -> ReferenceImage:
+    """Return the quadrature reference of an `mi.Scene` at its own size,
+    (height, width, 3) [W/(m^2 sr)].
+
+    `checks`, `shadow_scale`, `pixel`, `points`: see `ReferenceInputs`.
+
+    Raises InputError for radiance that is not finite.
+    """
+    inputs = ReferenceInputs(scene_content(scene), checks, shadow_scale, pixel, points)
+    return reference_result(scene, inputs, progress=progress).value
+
+
+def _computed(scene, inputs: ReferenceInputs, progress: Progress | None) -> ReferenceImage:
+    reference, points = read_reference(scene), inputs.points
+    # A given number of points is taken as it is: first and most are the same, and no error is asked
+    # for.
+    return _checked_image(
+        reference,
+        PointPlan(error=0.0, first=points, most=points) if points else None,
+        checks=inputs.checks,
+        shadow_scale=inputs.shadow_scale,
+        pixel=inputs.pixel,
+        # Only area lights take so long that a run is worth going on with.
+        keep=_parts(inputs.key) if reference.area and inputs.pixel == "centre" else None,
+        progress=progress,
+    )
+
+
+def reference_of_pixels(
+    scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
+) -> ReferenceImage:
+    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row,
+    (1, count, 3); not kept.
+
+    `plan`: how many samples stand for area lights.
+    """
+    whole = read_reference(scene)
+    some = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
+    return _checked_image(some, plan)
+
+
+def _checked_image(
+    reference: ReferenceScene,
+    plan: PointPlan | None,
+    *,
+    checks: int = 32,
+    shadow_scale: float = 1.0,
+    pixel: str = "centre",
+    keep: Keep | None = None,
+    progress: Progress | None = None,
+) -> ReferenceImage:
+    """Return the reference of an image whose every value is finite."""
+    check_camera(reference)
+    hits = None
+    # The mean over a pixel is finite even where its centre ray meets a light.
+    if pixel == "centre":
+        hits = surface_hits(reference)
+        check_rays(reference, hits.distance)
+    image = quadrature_image(
+        reference,
+        checks=checks,
+        shadow_scale=shadow_scale,
+        pixel=pixel,
+        plan=plan,
+        keep=keep,
+        progress=progress,
+        hits=hits,
+    )
+    check_values(reference, image)
+    return image
+
+
+def _parts(key: str | None) -> Keep:
+    """Return a store for parts of a reference until it is done: a run that was
+    interrupted goes on from them.
+    """
+
+    def keep(name: str, work: Callable[[], Part]) -> Part:
+        part = None if key is None else f"{key}/{name}"
+        # Without a key nothing can be kept: the work is done each time.
+        found, spent = load(part), stopwatch()
+        return (found or store(part, work(), spent())).value
+
+    return keep
+
+
+def check_camera(reference: ReferenceScene) -> None:
+    """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
+    for number, light in enumerate(reference.lights, 1):
+        distance = float(np.linalg.norm(light.position - reference.origin))
+        if distance <= _uncertainty(reference, light) and _scatters(reference, light):
+            raise InputError(
+                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which "
+                "grows like "
+                "1/distance, is infinite in every pixel; move the light or the camera"
+            )
+
+
+def check_rays(reference: ReferenceScene, distance: Array) -> None:
+    """Refuse rays through pixel centres that meet a light before the visible surface,
+    so far away, (rays,) [m].
+    """
+    ends = np.ravel(distance)
+    for number, light in enumerate(reference.lights, 1):
+        origin = np.broadcast_to(reference.origin, reference.direction.shape)
+        foot, height = foot_and_height(origin, reference.direction, light.position)
+        # A light counts as on the ray where its distance from it is not known to be more than 0; it
+        # must be in front of the camera, before the surface, and shine along the ray.
+        known = _uncertainty(reference, light)
+        meets = (
+            (height <= known)
+            & (foot > 0)
+            & (foot <= ends + known)
+            & _looks_along(light, reference.direction)
+        )
+        if meets.any() and _scatters(reference, light):
+            pixel = int(np.argmax(meets))
+            row, column = divmod(pixel, reference.width)
+            raise InputError(
+                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre "
+                "of the pixel in "
+                f"column {column} of row {row}: the airlight there, which grows like 1/distance, "
+                "is infinite; move the "
+                "light or the camera, take another size, or the mean over pixels (--pixel area)"
+            )
+
+
+def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
+    """Refuse a reference that is not finite, by its first pixel."""
+    for what in ("airlight", "airlight_error", "surface"):
+        values: Array = getattr(image, what)
+        wrong = ~np.isfinite(values).all(axis=2)
+        if wrong.any():
+            # The first pixel in reading order.
+            row, column = np.argwhere(wrong)[0]
+            raise InputError(
+                f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not "
+                "finite, first in "
+                f"column {column} of row {row}; a light may lie on its ray, or a number of the "
+                "scene be too large: "
+                "move the light, or use other units"
+            )
+
+
+def _name(number: int, light: ReferenceLight) -> str:
+    return f"light {number} at ({', '.join(f'{coordinate:g}' for coordinate in light.position)})"
+
+
+def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
+    """Return how well the distance from the camera to a light is known [m]."""
+    # Positions are float32 numbers, known to 2^-24 of the largest coordinate.
+    return 2.0**-24 * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
+
+
+def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
+    """Return whether there is a medium where a light is: beside it the airlight is finite."""
+    # A light within a bounded medium is in that medium, else in the one around all.
+    inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
+    medium = inside[0] if inside else reference.medium
+    return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
+
+
+def _looks_along(light: ReferenceLight, direction: Array) -> NDArray[np.bool_]:
+    """Return which rays through a light pass its cone, before it or behind it."""
+    if light.axis is None:
+        return np.ones(len(direction), dtype=bool)
+    return np.abs(direction @ light.axis) >= np.cos(light.cutoff)
