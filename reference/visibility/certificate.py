@@ -6,7 +6,7 @@ Mitsuba casts the shadow rays in single precision. Within the rounding of an edg
 nothing. Elsewhere a third route judges a contradiction: a float64 test of that one shadow segment
 against every triangle (Moeller and Trumbore 1997, Fast, minimum storage ray-triangle intersection,
 J. Graphics Tools 2(1)), sphere and disk. Segments that remain undecided are in doubt, and their
-largest effect goes into the bound of the image.
+largest effect goes into the error of the image.
 """
 
 import hashlib

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimates of the reference, computed or taken from the cache, and held against each other.
+"""Estimates of the reference, and how well they are known, held against each other.
 
 Read in this order:
 
-- `quadrature.py`: the quadrature image of a scene, radiance that is refused as infinite, and what
-  the reference of another renderer's image holds;
+- `quadrature.py`: the layers of a quadrature image, each with its error: proven, estimated or
+  statistical;
 - `monte_carlo.py`: batches of a Monte Carlo estimator;
 - `images.py`: references as layered images, and when a Monte Carlo run ends;
 - `merge.py`: references of several machines as one;

@@ -103,6 +103,29 @@ def test_surface_is_mitsubas_direct_integrator(variant, kind):
     assert image.airlight.max() == 0
 
 
+@pytest.mark.claim("lit-surface", tolerance="the estimated error of the surface")
+@pytest.mark.parametrize(("height", "most"), [(1.9, 2e-5), (0.004, 1e-2)])
+def test_the_error_of_a_surface_covers_single_precision(variant, height, most):
+    """A diffuse floor in float64: rho/pi cos I exp(-sigma_t (x + r)) / r^2.
+
+    A lamp close above the floor lights it at grazing incidence, where the rounding of places counts
+    most.
+    """
+    lamp = tiny_scene()["lamp"] | {"position": [0.9, 0.7, height]}
+    reference, image = reference_of(ball=None, lamp=lamp)
+    light, sigma_t = reference.lights[0], reference.medium.sigma_t[0]
+    seen = np.isfinite(image.distance.ravel())
+    direction = reference.direction[seen]
+    x = -reference.origin[2] / direction[:, 2]
+    r = np.linalg.norm(light.position - reference.origin - x[:, None] * direction, axis=1)
+    arriving = light.position[2] / r**3 * np.exp(-sigma_t * (x + r))
+    expected = np.array([0.4, 0.4, 0.5]) / np.pi * light.intensity * arriving[:, None]
+    error = image.surface_error.reshape(-1, 3)[seen]
+    assert np.all(np.abs(image.surface.reshape(-1, 3)[seen] - expected) <= error)
+    assert 0 < (error / expected).max() < most
+    assert image.surface_error.reshape(-1, 3)[~seen].max(initial=0.0) == 0
+
+
 # Means over the area of pixels --------------------------------------------------------------------
 
 

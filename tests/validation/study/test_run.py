@@ -198,7 +198,7 @@ def test_pixels_that_have_a_reference_keep_their_places_and_others_are_none(monk
     expected = np.where(some["mask"], number, 0)[..., None] * np.array([1.0, 2.0, 3.0])
     np.testing.assert_array_equal(some["airlight"], expected)
     # three standard errors
-    np.testing.assert_allclose(some["bound"], 0.5 * expected + 3 * 0.1 * expected)
+    np.testing.assert_allclose(some["error"], 0.5 * expected + 3 * 0.1 * expected)
 
 
 @pytest.mark.slow
@@ -220,9 +220,9 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
         some = sampled.sampled_reference(loaded.scene)
         difference = np.abs(some["airlight"][reference.mask] - finer.airlight[0])
         beyond.append(
-            (difference > some["bound"][reference.mask] + 3 * finer.airlight_se[0]).mean()
+            (difference > some["error"][reference.mask] + 3 * finer.airlight_se[0]).mean()
         )
-    # The bound is three standard errors of eight replicates, beyond which 2.0 % of Student's law
+    # The error is three standard errors of eight replicates, beyond which 2.0 % of Student's law
     # lie. The pixels of a run share their points, the runs do not: four standard errors of the mean
     # over runs.
     assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(
