@@ -155,25 +155,49 @@ def quadrature_image(
 ) -> ReferenceImage:
     """Compute the reference of an image.
 
-    `reference`: the scene; `checks`: random shadow rays to each ray and light, which check the lit
-    intervals; `shadow_scale`: attenuate over this fraction [1] of each shadow segment: 1 is the
-    reference, 1 - epsilon what a renderer with a shadow-ray epsilon converges to (DESIGN section
-    6.1). Such a renderer also starts its shadow rays off the surface, and so do those for `surface`
-    then (`reference.visibility.certificate.reached_by_shadow_rays`). `pixel`: "centre": the
-    radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a
-    mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128
-    in each replicate. `airlight_se` and `surface_se` say what was reached. `progress`: called with
-    (done, total, what) as the work goes on; `plan`: how many samples stand for area lights, along
-    rays through pixel centres; `keep`: called with the name of each part of that work and a
-    function that does it: it may keep what it returns, and give it back when the same image is
-    computed again. Not for means over pixels. `hits`: of the rays through pixel centres, from
-    `surface_hits`, where the caller has cast them. Returns ReferenceImage: radiances, (height, width, 3)
-    [W/(m^2 sr)], and what is known of their errors. Raises InputError for another word in `pixel`.
+    Valid for homogeneous media, height fog, density grids and opaque surfaces under point, spot,
+    directional and area lights and a sky; for directional lights in homogeneous media where all of
+    these have bounds. Their shadow segments have no end, so `shadow_scale` leaves them as they are.
+    A pixel whose centre ray meets a point light has an infinite airlight; the mean over its area is
+    finite.
 
-    Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for
-    directional lights where all media have bounds. Their shadow segments have no end, so
-    `shadow_scale` leaves them as they are. A pixel whose centre ray meets a point light has an
-    infinite airlight; the mean over its area is finite.
+    Parameters
+    ----------
+    reference
+        The scene.
+    checks
+        Random shadow rays to each ray and light, which check the lit intervals.
+    shadow_scale
+        Attenuate over this fraction of each shadow segment [1]: 1 is the reference, 1 - epsilon
+        what a renderer with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer
+        also starts its shadow rays off the surface, and so do those for `surface` then
+        (`reference.visibility.certificate.reached_by_shadow_rays`).
+    pixel
+        "centre": the radiance along the ray through the centre. "area": the mean over the pixel.
+    tolerance
+        The standard error over value [1] of a mean over a pixel, for which positions are chosen, up
+        to 128 in each replicate. `airlight_se` and `surface_se` say what was reached.
+    progress
+        Called with (done, total, what) as the work goes on.
+    plan
+        How many samples stand for area lights, along rays through pixel centres.
+    keep
+        Called with the name of each part of that work and a function that does it: it may keep what
+        it returns, and give it back when the same image is computed again. Not for means over
+        pixels.
+    hits
+        What `surface_hits` returned for the rays through pixel centres, if that is known.
+
+    Returns
+    -------
+    ReferenceImage
+        Radiances, (height, width, 3) [W/(m^2 sr)], and what is known of their errors.
+
+    Raises
+    ------
+    InputError
+        For another word in `pixel`.
+
     """
     shapes = read_shapes(reference.occluders)
     if pixel == "area":
@@ -214,11 +238,23 @@ def ray_values(
 ) -> RayValues:
     """Compute airlight, lit surface and distances of every ray of `reference.direction`.
 
-    `reference`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
-    `quadrature_image`; `shapes`: what `reference.scene.shapes.read_shapes` returned for the
-    occluders, `hits`: what `surface_hits` returned for the rays, if these are known. Returns
-    RayValues: radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals
-    were checked.
+    Parameters
+    ----------
+    reference
+        The scene, with any rays.
+    checks, shadow_scale, progress, plan, keep
+        See `quadrature_image`.
+    shapes
+        What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
+    hits
+        What `surface_hits` returned for the rays, if that is known.
+
+    Returns
+    -------
+    RayValues
+        Radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals were
+        checked.
+
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     # The cast distance, in float32, is what the caller gets: all methods share that surface. The

@@ -138,9 +138,23 @@ def sum_stretches(
 ) -> tuple[Array, Array]:
     """Integrate what a medium scatters on lit stretches, for lights of strength 1.
 
-    `rays`, `stretches`, `terms`: see `reference.quadrature.fields.Field.sums`; `source`: of the
-    medium; `rtol`: relative tolerance of the sum of a ray and a light where `terms` has none;
-    `step`: rays at once. Returns the airlight of each ray, and its error, (rays, 3) each.
+    Parameters
+    ----------
+    rays, stretches, terms
+        See `reference.quadrature.fields.Field.sums`.
+    source
+        What the medium scatters along the pieces of some stretches.
+    rtol
+        Relative tolerance of the sum of a ray and a light [1], where `terms` has none.
+    step
+        Rays at once.
+
+    Returns
+    -------
+    tuple
+        The airlight of each ray, and its error, (rays, 3) each, [1/m^2] for places and [1] for
+        directions; infinite where a ray meets a light in a medium that scatters.
+
     """
     ray, x0, x1 = stretches
     count, rtol = len(rays.foot), terms.rtol or rtol

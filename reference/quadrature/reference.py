@@ -83,12 +83,27 @@ def reference_image(
     points: int | None = None,
     progress: Progress | None = None,
 ) -> ReferenceImage:
-    """Return the quadrature reference of an `mi.Scene` at its own size,
-    (height, width, 3) [W/(m^2 sr)].
+    """Return the quadrature reference of an `mi.Scene` at its own size, from the cache or computed.
 
-    `checks`, `shadow_scale`, `pixel`, `points`: see `ReferenceInputs`.
+    Parameters
+    ----------
+    scene
+        An `mi.Scene`.
+    checks, shadow_scale, pixel, points
+        See `ReferenceInputs`.
+    progress
+        Called with (done, total, what) as the work goes on.
 
-    Raises InputError for radiance that is not finite.
+    Returns
+    -------
+    ReferenceImage
+        Radiances, (height, width, 3) [W/(m^2 sr)], with their errors.
+
+    Raises
+    ------
+    InputError
+        For radiance that is not finite.
+
     """
     inputs = ReferenceInputs(scene_content(scene), checks, shadow_scale, pixel, points)
     return reference_result(scene, inputs, progress=progress).value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the camera sees through the medium: lit surfaces, area lights, and the background.
+"""Lit surfaces, area lights and the background, as the camera sees them through the medium.
 
 **Lit surfaces** have Mitsuba's own materials and lights, attenuated in float64:
 
@@ -138,7 +138,7 @@ def lit_surface(
         with np.errstate(invalid="ignore"):  # inf - inf where a light lies on a surface
             doubt = np.abs(as_rows(other * arriving) - radiance)
             doubt += (turn + 16 * 2.0**-24)[:, None] * np.abs(radiance)
-        # Of a radiance that a turn makes no number nothing is known.
+        # Where the turn gives no number, the radiance may be wrong altogether.
         doubt = np.where(np.isfinite(doubt), doubt, np.abs(radiance))
         # A directional light's segment goes to the end of all floats: only bounded media can be on
         # it.

@@ -160,7 +160,7 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(
     )
     error = page.last("error")["error"]
     assert error["known"] == error["pixels"] == SIZE[0] * SIZE[1]
-    assert 0 < error["bound"] < 1e-6
+    assert 0 < error["own_error"] < 1e-6
     commands = page.last("state")["commands"]
     method, reference = str(tmp_path / "method.exr"), str(tmp_path / "reference.exr")
     assert cli.run([*shlex.split(commands["render"])[1:], "-o", method]) == 0
