@@ -26,9 +26,12 @@ How near is on the ray? Mitsuba holds positions as float32 numbers, the largest 
 and light known to 2^-24 of it. A smaller h is not known to be anything but 0.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,12 +64,12 @@ class ReferenceInputs(Inputs):
 
 
 def reference_result(
-    scene, inputs: ReferenceInputs | None = None, *, progress: Progress | None = None
+    scene: mi.Scene, inputs: ReferenceInputs | None = None, *, progress: Progress | None = None
 ) -> Kept[ReferenceImage]:
-    """Return the quadrature reference of an `mi.Scene`, and what it took, from
-    the cache or computed now.
+    """Return the quadrature reference of a scene, and the time that it took, from the cache or
+    computed now.
 
-    `inputs`: of this scene; by default with their defaults.
+    `inputs`: of this scene; by default with the default settings.
 
     Raises InputError for radiance that is not finite.
     """
@@ -75,7 +78,7 @@ def reference_result(
 
 
 def reference_image(
-    scene,
+    scene: mi.Scene,
     *,
     checks: int = 32,
     shadow_scale: float = 1.0,
@@ -83,12 +86,12 @@ def reference_image(
     points: int | None = None,
     progress: Progress | None = None,
 ) -> ReferenceImage:
-    """Return the quadrature reference of an `mi.Scene` at its own size, from the cache or computed.
+    """Return the quadrature reference of a scene at its own size, from the cache or computed.
 
     Parameters
     ----------
     scene
-        An `mi.Scene`.
+        The scene.
     checks, shadow_scale, pixel, points
         See `ReferenceInputs`.
     progress
@@ -109,33 +112,34 @@ def reference_image(
     return reference_result(scene, inputs, progress=progress).value
 
 
-def _computed(scene, inputs: ReferenceInputs, progress: Progress | None) -> ReferenceImage:
+def _computed(
+    scene: mi.Scene, inputs: ReferenceInputs, progress: Progress | None
+) -> ReferenceImage:
     reference, points = read_reference(scene), inputs.points
-    # A given number of points is taken as it is: first and most are the same, and no error is asked
-    # for.
+    # A given number of points is fixed: first and most are the same, and no error is asked for.
     return _checked_image(
         reference,
         PointPlan(error=0.0, first=points, most=points) if points else None,
         checks=inputs.checks,
         shadow_scale=inputs.shadow_scale,
         pixel=inputs.pixel,
-        # Only area lights take so long that a run is worth going on with.
+        # Only area lights take so long that an interrupted run should go on from its parts.
         keep=_parts(inputs.key) if reference.area and inputs.pixel == "centre" else None,
         progress=progress,
     )
 
 
 def reference_of_pixels(
-    scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
+    scene: mi.Scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
 ) -> ReferenceImage:
-    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row,
-    (1, count, 3); not kept.
+    """Return the quadrature reference of pixels of a scene, (1, count, 3) [W/(m^2 sr)]; it is not
+    cached.
 
-    `plan`: how many samples stand for area lights.
+    `pixels`: their numbers, row by row, (count,); `plan`: how many samples stand for area lights.
     """
     whole = read_reference(scene)
-    some = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
-    return _checked_image(some, plan)
+    chosen = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
+    return _checked_image(chosen, plan)
 
 
 def _checked_image(
@@ -148,7 +152,7 @@ def _checked_image(
     keep: Keep | None = None,
     progress: Progress | None = None,
 ) -> ReferenceImage:
-    """Return the reference of an image whose every value is finite."""
+    """Return the image of a reference; refuse a scene, or an image, that is infinite somewhere."""
     check_camera(reference)
     hits = None
     # The mean over a pixel is finite even where its centre ray meets a light.
@@ -170,15 +174,15 @@ def _checked_image(
 
 
 def _parts(key: str | None) -> Keep:
-    """Return a store for parts of a reference until it is done: a run that was
+    """Return a cache for parts of a reference until it is done: a run that was
     interrupted goes on from them.
     """
 
     def keep(name: str, work: Callable[[], Part]) -> Part:
         part = None if key is None else f"{key}/{name}"
-        # Without a key nothing can be kept: the work is done each time.
-        found, spent = load(part), stopwatch()
-        return (found or store(part, work(), spent())).value
+        # Without a key nothing can be cached: the work is done each time.
+        cached, took = load(part), stopwatch()
+        return (cached or store(part, work(), took())).value
 
     return keep
 
@@ -203,13 +207,13 @@ def check_rays(reference: ReferenceScene, distance: Array) -> None:
     for number, light in enumerate(reference.lights, 1):
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
         foot, height = foot_and_height(origin, reference.direction, light.position)
-        # A light counts as on the ray where its distance from it is not known to be more than 0; it
-        # must be in front of the camera, before the surface, and shine along the ray.
-        known = _uncertainty(reference, light)
+        # A light counts as on the ray where its distance from the ray is 0 within rounding. It must
+        # be in front of the camera, before the surface, and shine along the ray.
+        uncertainty = _uncertainty(reference, light)
         meets = (
-            (height <= known)
+            (height <= uncertainty)
             & (foot > 0)
-            & (foot <= ends + known)
+            & (foot <= ends + uncertainty)
             & _looks_along(light, reference.direction)
         )
         if meets.any() and _scatters(reference, light):
@@ -246,13 +250,13 @@ def _name(number: int, light: ReferenceLight) -> str:
 
 
 def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
-    """Return how well the distance from the camera to a light is known [m]."""
+    """Return the error of the distance from the camera to a light [m]."""
     # Positions are float32 numbers, known to 2^-24 of the largest coordinate.
     return 2.0**-24 * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
 
 
 def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
-    """Return whether there is a medium where a light is: beside it the airlight is finite."""
+    """Return whether a light is in a medium; without one the airlight is finite there."""
     # A light within a bounded medium is in that medium, else in the one around all.
     inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else reference.medium

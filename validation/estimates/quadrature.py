@@ -29,8 +29,8 @@ def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without
     area lights, where it is 0.
 
-    Airlight and surface have their own draws, so that the variances of the total add up;
-    what lights emit is exact.
+    Airlight and surface are sampled independently: their variances add up to that of the total.
+    The emission of lights is exact.
     """
     if reference.airlight_se is None or reference.surface_se is None:
         return None
