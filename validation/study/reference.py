@@ -24,6 +24,7 @@ from airlight.validation.arrays import Array
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.statistics.estimate import Kind
 from airlight.validation.study.row import ReferenceError
 from airlight.validation.study.study import Cell
 
@@ -41,6 +42,7 @@ class Reference:
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     error: Array  #: its error, three standard errors of area lights among it [W/(m^2 sr)]
+    kind: Kind  #: of that error
     surface: Array | None  #: (height, width, 3) [W/(m^2 sr)]; None where area lights leave it out
     mask: NDArray[np.bool_] | None  #: pixels that have a reference, (height, width); None for all
     crossings: int | None  #: of all camera rays with edges between light and shadow
@@ -67,6 +69,7 @@ class Reference:
             self.spent.seconds,
             self.spent.processor,
             self.crossings,
+            self.kind,
         )
 
 
@@ -75,7 +78,8 @@ def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     # The light samples of area lights add three standard errors.
     by_chance = 0.0 if image.airlight_se is None else 3.0 * image.airlight_se
     error = image.airlight_error + by_chance
-    return Reference(image.airlight, error, image.surface, None, image.transitions, spent)
+    kind: Kind = image.airlight_kind if image.airlight_se is None else "statistical"
+    return Reference(image.airlight, error, kind, image.surface, None, image.transitions, spent)
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -91,7 +95,9 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     inputs = SampledInputs(scene_content(loaded.scene))
     result = stored(inputs, lambda: sampled_reference(loaded.scene), dict[str, NDArray[Any]])
     some = result.value
-    return Reference(some["airlight"], some["error"], None, some["mask"], None, result.spent)
+    return Reference(
+        some["airlight"], some["error"], "statistical", None, some["mask"], None, result.spent
+    )
 
 
 @dataclass(frozen=True)

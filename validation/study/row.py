@@ -57,6 +57,9 @@ class ReferenceError:
     crossings: int | None = column(
         "crossings", "1", "of all camera rays with edges between light and shadow"
     )
+    kind: str | None = column(
+        "its kind", "", "of its own error: proven, estimated or statistical", default=None
+    )
 
 
 @dataclass(frozen=True)
