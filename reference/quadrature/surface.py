@@ -129,9 +129,10 @@ def lit_surface(
         )
         radiance = as_rows(reflected * arriving)
         # The same from a direction that is turned towards the normal by its uncertainty: e of the
-        # derivation, at most a right angle or so, for a light on the surface.
+        # derivation, at most 45 degrees, for a light on the surface.
         turn = 2.0**-22 * (1 + size / np.maximum(r, 2.0**-22 * size + np.finfo(float).tiny))
-        turned = dr.normalize(towards.d + interaction.n * on_device(mi.Float, turn))
+        normal = mi.Vector3f(interaction.n)
+        turned = dr.normalize(towards.d + normal * on_device(mi.Float, turn))
         other = interaction.bsdf().eval(
             mi.BSDFContext(), interaction, interaction.to_local(turned), facing
         )
