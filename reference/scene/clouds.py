@@ -27,7 +27,6 @@ from airlight.reference.scene.directional_light import (
     read_directional,
 )
 from airlight.reference.scene.read import (
-    VACUUM,
     ReferenceMedium,
     read_medium,
     read_scattering,
@@ -107,11 +106,6 @@ class CloudScene:
     suns: tuple[DirectionalLight, ...]
     sky: Array  #: radiance of the sky, RGB, zero without one [W/(m^2 sr)]
     camera_cloud: int  #: number of the cloud that the camera is in, -1 in vacuum
-
-    @property
-    def around(self) -> ReferenceMedium:
-        """The medium around the clouds: vacuum."""
-        return VACUUM
 
 
 def read_clouds(scene: "mi.Scene") -> CloudScene:
