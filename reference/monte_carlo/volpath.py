@@ -34,9 +34,8 @@ differ, see `reference.monte_carlo.batches`. Sums, means and standard errors are
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -46,14 +45,24 @@ from numpy.typing import NDArray
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
 from airlight.reference.scene.clouds import CloudScene
-from airlight.reference.scene.read import ReferenceScene, whole_scene
-from airlight.reference.scene.varying import GridMedium, HeightMedium
+from airlight.reference.scene.read import VACUUM, ReferenceMedium, ReferenceScene, whole_scene
+from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
 
-# what decides the numbers among a medium's parameters
+# the parameters of a medium that are its extinction and its albedo
 _VALUES = ("sigma_t.value.value", "albedo.value.value")
+
+
+@dataclass(frozen=True)
+class _Traced:
+    """A scene, and the rays along which it is traced."""
+
+    scene: "mi.Scene"
+    media: tuple[ReferenceMedium | VaryingMedium, ...]  #: all of them, also that of the camera
+    origin: Array  #: where all rays start [m], (3,)
+    direction: Array  #: unit, one ray a pixel, (pixels, 3)
 
 
 def volpath_batch(
@@ -93,28 +102,33 @@ def volpath_batch(
         _check_far(reference)
     # Light seen directly belongs to neither layer.
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
-    reference = replace(reference, scene=whole_scene(reference))
+    traced = _Traced(
+        whole_scene(reference),
+        (reference.medium, *reference.media),
+        reference.origin,
+        reference.direction,
+    )
     integrator = mi.load_dict(
         {"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden
     )
     # With black surfaces all light was scattered by the medium alone.
     with black_surfaces(reference.occluders):
-        airlight = trace(reference, integrator, 2 * seed, in_air)
+        airlight = _trace(traced, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
     if reference.occluders.shapes() and max_depth == 2:
-        surface = trace(reference, integrator, 2 * seed + 1, on_surface, scattering=False)
+        surface = _trace(traced, integrator, 2 * seed + 1, on_surface, scattering=False)
     elif reference.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
-        surface = trace(reference, integrator, 2 * seed, in_air) - airlight
+        surface = _trace(traced, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
 def _check_far(reference: ReferenceScene) -> None:
-    """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the
-    radius of all shapes long.
+    """Refuse fog in which Mitsuba would cut light paths from infinity, whose length is twice the
+    radius of all shapes.
 
-    Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog,
-    and lower ones that are cut miss its thin upper part.
+    Light of a sky comes from all directions. Its paths must leave height fog down to 60 degrees from
+    the zenith; lower ones may be cut, and then miss the thin upper part of the fog.
     """
     if not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
         raise InputError(
@@ -135,15 +149,14 @@ def _check_far(reference: ReferenceScene) -> None:
     if radius < needed:
         raise InputError(
             "volpath: the light paths of a sun or a sky end within the fog, since the shapes of "
-            "the scene have a "
-            f"radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or lower the cap of "
-            "height fog"
+            f"the scene have a radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or "
+            "lower the cap of height fog"
         )
 
 
 @contextmanager
-def black_surfaces(scene) -> Iterator[None]:
-    """Make every surface black for a while."""
+def black_surfaces(scene: "mi.Scene") -> Iterator[None]:
+    """Make every surface black within the block."""
     black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
     materials = [(shape, shape.bsdf()) for shape in scene.shapes()]
     try:
@@ -155,27 +168,31 @@ def black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def trace(
-    reference: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True
+def _trace(
+    traced: _Traced,
+    integrator: "mi.Integrator",
+    seed: int,
+    counts: Counts,
+    *,
+    scattering: bool = True,
 ) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
 
-    `reference`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of
+    `traced`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of
     each pixel, (pixels,); `scattering`: whether media scatter.
     """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)
-    extinctions = np.stack(
-        [medium.largest for medium in (reference.medium, *reference.media)], axis=1
-    )
+    # Channels with the same extinction in all media are traced together.
+    extinctions = np.stack([medium.largest for medium in traced.media], axis=1)
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.all(extinctions == sigma_t, axis=1)
-        with _grey_media(reference, int(np.argmax(channels)), scattering) as medium:
+        with _grey_media(traced, int(np.argmax(channels)), scattering) as medium:
             for place, part in enumerate(parts):
                 # Streams differ by seed; the part and the channel get their own seeds.
                 stream = (seed * 3 + number) * len(parts) + place
                 image[part, channels] = _trace_pixels(
-                    reference, integrator, medium, part, stream, counts[part]
+                    traced, integrator, medium, part, stream, counts[part]
                 )[:, channels]
     return image
 
@@ -188,10 +205,16 @@ def _parts(counts: Counts) -> list[slice]:
 
 
 def _trace_pixels(
-    reference: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts
+    traced: _Traced,
+    integrator: "mi.Integrator",
+    medium: "mi.Medium | None",
+    pixels: slice,
+    seed: int,
+    counts: Counts,
 ) -> Array:
-    # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
-    direction = dr.normalize(mi.Vector3f(reference.direction[pixels].T))
+    """Return the mean radiance of some pixels, (pixels, 3); `medium`: where camera rays start."""
+    # A kernel is compiled for the alignment of the memory that it reads, and NumPy's varies.
+    direction = dr.normalize(mi.Vector3f(traced.direction[pixels].T))
     dr.eval(direction)
     # The pixel of each path, copied into memory of Dr.Jit.
     numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
@@ -200,9 +223,9 @@ def _trace_pixels(
     dr.eval(pixel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, dr.width(pixel))
-    start = mi.Point3f(*(float(c) for c in reference.origin))
+    start = mi.Point3f(*(float(c) for c in traced.origin))
     ray = mi.Ray3f(start, dr.gather(mi.Vector3f, direction, pixel))
-    radiance, _, _ = integrator.sample(reference.scene, sampler, mi.RayDifferential3f(ray), medium)
+    radiance, _, _ = integrator.sample(traced.scene, sampler, mi.RayDifferential3f(ray), medium)
     dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again
     # The paths of a pixel follow one another: one sum for each pixel, in float64.
     first = np.cumsum(counts, dtype=np.int64) - counts
@@ -211,13 +234,13 @@ def _trace_pixels(
 
 
 @contextmanager
-def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
-    """Give all media the extinction of one channel for a while; yield the medium in
-    which camera rays begin.
+def _grey_media(traced: _Traced, channel: int, scattering: bool) -> "Iterator[mi.Medium | None]":
+    """Give all media the extinction of one channel within the block; yield the medium in which
+    camera rays start.
     """
-    originals: list[tuple[Any, dict[str, Any]]] = []
+    originals: list[tuple[mi.Medium, dict[str, mi.Float | mi.Color3f]]] = []
     try:
-        for medium in (reference.medium, *reference.media):
+        for medium in traced.media:
             # Shapes may share a medium.
             if medium.plugin is not None and all(
                 medium.plugin != plugin for plugin, _ in originals
@@ -230,7 +253,7 @@ def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> It
                 )
                 sigma_t = float(medium.largest[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
-        yield reference.scene.sensors()[0].get_medium()
+        yield traced.scene.sensors()[0].get_medium()
     finally:
         for plugin, values in originals:
             parameters = mi.traverse(plugin)
@@ -239,7 +262,7 @@ def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> It
             parameters.update()
 
 
-def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
+def _set_values(plugin: "mi.Medium", sigma_t: float, albedo: Array) -> None:
     """Set the extinction, before the medium's scale, and the albedo."""
     parameters = mi.traverse(plugin)
     for key, value in zip(_VALUES, (np.full(3, sigma_t), albedo), strict=True):
@@ -256,30 +279,20 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
 def volpath_orders_batch(
     clouds: CloudScene, seed: int, samples: int, *, sets: Sequence[tuple[str, tuple[int, float]]]
 ) -> Batches:
-    """Trace one batch of the layers `airlight`, `surface` and the layers of sets of orders.
+    """Trace one batch of the layers `airlight` and `surface`, and of a layer for each set of orders.
 
     `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
     samples a pixel, at most 256; `sets`: names of sets of orders with their first and last order,
     the last `math.inf` for one without end.
     """
     check_samples(samples)
-    reference = ReferenceScene(
-        scene=clouds.scene,
-        occluders=clouds.occluders,
-        width=clouds.width,
-        height=clouds.height,
-        origin=clouds.origin,
-        direction=clouds.direction,
-        medium=clouds.around,
-        lights=(),
-        media=cast(Any, clouds.clouds),  # asked for what every medium has
-    )
+    traced = _Traced(clouds.scene, (VACUUM, *clouds.clouds), clouds.origin, clouds.direction)
     counts = np.full(len(clouds.direction), samples)
 
-    def up_to(order: float):
+    def up_to(order: float) -> Array:
         depth = -1 if math.isinf(order) else int(order) + 1
         integrator = mi.load_dict({"type": "volpath", "max_depth": depth, "rr_depth": 1 << 20})
-        return trace(reference, integrator, seed, counts)
+        return _trace(traced, integrator, seed, counts)
 
     # A set of orders is the difference of two runs: up to its last order, and up to the order
     # before its first.

@@ -6,10 +6,10 @@ follows from them along a ray.
 
 Read in this order:
 
-- `device.py`: numbers of NumPy for compiled kernels;
+- `device.py`: numbers of NumPy for compiled kernels, and how types of Mitsuba are written;
 - `transforms.py`: transforms as matrices, and what their scales do to lights and spheres;
 - `colours.py`: colours of lights and media, checked;
-- `camera.py`: directions of rays through positions on the film;
+- `camera.py`: the camera, and directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: area lights, read and checked;

@@ -9,7 +9,6 @@ more. The material is opaque (the shape is a surface like others, most often a b
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -38,11 +37,11 @@ class ReferenceAreaLight:
     radiance: Array  #: [W/(m^2 sr)], RGB
     #: whether the shape is a surface too; else it is `null`, and neither shadows nor ends rays
     opaque: bool
-    shape: Any  #: Mitsuba's shape
-    #: of a mesh, a hair before where they are, counter-clockwise from the side that
-    #: emits, (triangles, 3, 3) [m]
+    shape: "mi.Shape"
+    #: of a mesh, each moved a hair along its normal, counter-clockwise from the side that emits,
+    #: (triangles, 3, 3) [m]
     triangles: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
-    #: whether its shape is opaque, and parts of it can stand in the light of others
+    #: whether the shape is opaque, and parts of it can stand in the light of other parts
     shadows_itself: bool = False
 
     @property
@@ -82,8 +81,8 @@ class ReferenceAreaLight:
 
 
 def triangle_normals(triangles: Array) -> Array:
-    """Return vectors along the normals of triangles, twice as long as these are
-    large, (triangles, 3) [m^2].
+    """Return vectors along the normals of triangles, whose lengths are twice the areas,
+    (triangles, 3) [m^2].
     """
     return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
@@ -93,17 +92,18 @@ def triangle_areas(triangles: Array) -> Array:
     return 0.5 * np.linalg.norm(triangle_normals(triangles), axis=1)
 
 
-def is_area(emitter: Any) -> bool:
-    """Return whether an emitter of Mitsuba is an area light."""
+def is_area(emitter: "mi.Emitter") -> bool:
+    """Return whether an emitter is an area light."""
     return bool(emitter.class_name() == "AreaLight")
 
 
-def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
+def read_area_light(emitter: "mi.Emitter", camera: Array) -> ReferenceAreaLight:
     """Read an area light.
 
-    `emitter`: Mitsuba's; `camera`: position of the camera [m], (3,). Raises InputError by the name
-    of the shape: for other shapes, textures, shapes without area or with different scales, a sphere
-    that is inside out or holds the camera, and a light that bounds a medium.
+    `emitter`: an emitter of type `area`; `camera`: position of the camera [m], (3,). Raises
+    InputError by the name of the shape: for other shapes, textures, shapes without area or with
+    different scales, a sphere that is inside out or holds the camera, and a light that bounds a
+    medium.
     """
     shape = emitter.get_shape()
     kind = _KINDS.get(shape.class_name())
@@ -138,7 +138,7 @@ def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     return light
 
 
-def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
+def _mesh(shape: "mi.Shape", radiance: Array, opaque: bool) -> ReferenceAreaLight:
     parameters = mi.traverse(shape)
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
@@ -149,7 +149,7 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     # Triangles without area have no normal and emit nothing.
     faces, normal = faces[sound], normal[sound]
     # Corners are ordered counter-clockwise from the side that emits: the side of the normals at
-    # vertices, where there are any, and the other one if normals are flipped.
+    # vertices, where there are any, and the opposite side if normals are flipped.
     back = np.full(len(faces), shape.has_flipped_normals())
     smooth = np.array(parameters.get("vertex_normals", ()), dtype=np.float64)
     if smooth.size:
@@ -157,6 +157,7 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     faces = np.where(back[:, None], faces[:, ::-1], faces)
     normal = triangle_normals(corners[faces])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
+    # The ball around the mesh, about the middle of its bounding box.
     points = corners[np.unique(faces)]
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = float(np.linalg.norm(points - centre, axis=1).max())
@@ -174,7 +175,7 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
 
 
 def _neighbours(place: Array) -> NDArray[np.int64]:
-    """Return an order of points, (n, 3), where neighbours follow one another: by the bits of all
+    """Return an order of points, (n, 3), in which neighbours follow one another: by the bits of all
     coordinates in turn (Morton).
     """
     bits = 16  # of a coordinate, by which triangles are put in order
@@ -189,23 +190,23 @@ def _neighbours(place: Array) -> NDArray[np.int64]:
     return np.argsort(code, kind="stable")
 
 
-def _is_convex(corner: Array, normal: Array, known: Array, slack: float) -> bool:
-    """Return whether no point of a mesh is before one of its triangles; no
-    for one too large to look.
+def _is_convex(corner: Array, normal: Array, points: Array, slack: float) -> bool:
+    """Return whether no point of a mesh is before one of its triangles; False for a mesh that is
+    too large to test.
     """
-    # To look at more than 1e9 pairs of a triangle and a corner takes too long.
-    if float(len(corner)) * len(known) > 1e9:
+    # To look at more than 1e9 pairs of a triangle and a point takes too long.
+    if float(len(corner)) * len(points) > 1e9:
         return False
-    # All corners lie behind or in the plane of each triangle, a block of triangles at a time.
-    step = max(1, (1 << 22) // len(known))
+    # All points lie behind or in the plane of each triangle, a block of triangles at a time.
+    step = max(1, (1 << 22) // len(points))
     blocks = (slice(first, first + step) for first in range(0, len(corner), step))
     level = np.sum(corner * normal, axis=1)
     return all(
-        ((normal[block] @ known.T).max(axis=1) <= level[block] + slack).all() for block in blocks
+        ((normal[block] @ points.T).max(axis=1) <= level[block] + slack).all() for block in blocks
     )
 
 
-def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
+def _sides(shape: "mi.Shape", kind: str, matrix: Array) -> tuple[Array, Array]:
     """Return the frame and half the sides; refuse shapes without area and with different scales."""
     # The columns of the matrix are the images of the axes; half of both sides are their lengths.
     axes = matrix[:3, :3].T
@@ -234,5 +235,5 @@ def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
     return np.stack([unit[0], second, across * np.sign(across @ towards)]), half
 
 
-def _refusal(shape: Any, given: str, wanted: str) -> InputError:
-    return InputError(f"light '{shape.id()}' {given}; expected {wanted}")
+def _refusal(shape: "mi.Shape", given: str, expected: str) -> InputError:
+    return InputError(f"light '{shape.id()}' {given}; expected {expected}")

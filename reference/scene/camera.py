@@ -10,17 +10,32 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.reference.scene.transforms import matrix_of
 
 Array = NDArray[np.float64]
 
 
-def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
+def perspective_sensor(scene: "mi.Scene") -> "mi.Sensor":
+    """Return the camera of a scene, its first sensor.
+
+    Raises InputError for a scene without a sensor, or for a sensor of another type.
+    """
+    if not scene.sensors():
+        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
+    sensor = scene.sensors()[0]
+    if sensor.class_name() != "PerspectiveCamera":
+        raise InputError(
+            f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
+        )
+    return sensor
+
+
+def film_directions(sensor: "mi.Sensor", positions: Array, size: tuple[int, int]) -> Array:
     """Return the unit directions through positions on the film, (n, 3) [1].
 
-    `sensor`: a perspective sensor of Mitsuba; `positions`: columns and rows from the upper left
-    corner, (n, 2) [pixels]: pixel centres end in one half; `size`: width and height of the film
-    [pixels].
+    `sensor`: a perspective sensor; `positions`: columns and rows from the upper left corner, (n, 2)
+    [pixels]: pixel centres end in one half; `size`: width and height of the film [pixels].
 
     Valid for positions outside of the film too.
     """
@@ -31,9 +46,9 @@ def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
     return direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-def film_positions(sensor, directions: Array, size: tuple[int, int]) -> Array:
-    """Return the positions on the film that directions of any length pass, (n, 2) [pixels];
-    NaN for those behind it.
+def film_positions(sensor: "mi.Sensor", directions: Array, size: tuple[int, int]) -> Array:
+    """Return the positions on the film through which directions of any length go, (n, 2) [pixels];
+    NaN for directions that point behind the camera.
     """
     local = np.linalg.solve(camera_matrix(sensor)[:3, :3], directions.T).T
     focal, principal = _pinhole(sensor, size)
@@ -41,12 +56,11 @@ def film_positions(sensor, directions: Array, size: tuple[int, int]) -> Array:
     return principal - local[:, :2] * (focal / depth)[:, None]
 
 
-def _pinhole(sensor, size: tuple[int, int]) -> tuple[float, Array]:
-    """Return the distance of the film and the position on it that the camera's
-    axis passes, (2,) [pixels].
+def _pinhole(sensor: "mi.Sensor", size: tuple[int, int]) -> tuple[float, Array]:
+    """Return the distance of the film and the position on the film through which the camera's axis
+    goes, (2,) [pixels].
 
-    Mitsuba adds the offsets of the principal point, in parts of the film, to a position
-    before it looks through it.
+    Mitsuba adds the offsets of the principal point, fractions of the film, to each position.
     """
     parameters = mi.traverse(sensor)
     # The width of a pixel at a distance of 1: the field of view is across the width of the film.
@@ -63,6 +77,6 @@ def pixel_centres(size: tuple[int, int]) -> Array:
     return np.stack([column + 0.5, row + 0.5], axis=1)
 
 
-def camera_matrix(sensor) -> Array:
+def camera_matrix(sensor: "mi.Sensor") -> Array:
     """Return the transform from the camera's own frame to the world, (4, 4), both in [m]."""
     return matrix_of(sensor.world_transform())

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a scene of clouds for the reference: media of any order of scattering in
-closed meshes of any shape.
+"""Reading a scene of clouds for the reference: media in closed meshes of any shape, whose light may
+be scattered any number of times.
 
 Clouds lie in vacuum, apart from one another. Suns are directional emitters, the sky is at most one
 emitter of constant radiance. Other lights are refused by name. The density of a `heterogeneous`
@@ -8,7 +8,6 @@ cloud is Mitsuba's own volume, over its largest value.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -16,14 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.errors import InputError
-from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from airlight.reference.scene.camera import (
+    camera_matrix,
+    film_directions,
+    perspective_sensor,
+    pixel_centres,
+)
 from airlight.reference.scene.directional_light import (
     DirectionalLight,
     is_directional,
     read_directional,
 )
 from airlight.reference.scene.read import (
-    VACUUM,
     ReferenceMedium,
     read_medium,
     read_scattering,
@@ -40,11 +43,11 @@ Array = NDArray[np.float64]
 class CloudDensity:
     """The varying density of a cloud."""
 
-    medium: Any  #: Mitsuba's
+    medium: "mi.Medium"
     largest: float  #: extinction [1/m]
-    voxel: float  #: width of the grid's voxels along their shortest side, of one along the axes [m]
+    voxel: float  #: width of the grid's voxels along their shortest side, of a grid along axes [m]
 
-    def at(self, point, active: Any = True) -> Any:
+    def at(self, point: "mi.Point3f", active: "mi.Bool | bool" = True) -> "mi.Float":
         """Return the extinction at places [m] over the largest one, 0 to 1."""
         place = dr.zeros(mi.MediumInteraction3f, dr.width(point))
         place.p = point
@@ -79,7 +82,7 @@ class CloudDensity:
 class Cloud(ReferenceMedium):
     """A medium within a closed surface."""
 
-    shape: Any  #: Mitsuba's shape that bounds it
+    shape: "mi.Shape"  #: what bounds it
     #: over `sigma_t`, the largest extinction; None for a homogeneous medium
     density: CloudDensity | None = None
 
@@ -93,8 +96,8 @@ class Cloud(ReferenceMedium):
 class CloudScene:
     """A scene of clouds as the reference sees it."""
 
-    scene: Any  #: the `mi.Scene`, whole
-    occluders: Any  #: an `mi.Scene` of the opaque shapes alone
+    scene: "mi.Scene"  #: all shapes
+    occluders: "mi.Scene"  #: the opaque shapes alone
     width: int  #: [pixels]
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
@@ -104,25 +107,14 @@ class CloudScene:
     sky: Array  #: radiance of the sky, RGB, zero without one [W/(m^2 sr)]
     camera_cloud: int  #: number of the cloud that the camera is in, -1 in vacuum
 
-    @property
-    def around(self) -> ReferenceMedium:
-        """The medium around the clouds: vacuum."""
-        return VACUUM
 
-
-def read_clouds(scene) -> CloudScene:
+def read_clouds(scene: "mi.Scene") -> CloudScene:
     """Read a scene of clouds of the current RGB variant.
 
-    Raises InputError for a scene without clouds, sun or sky, or with what has no place
-    among them, by its name.
+    Raises InputError for a scene without a cloud, or without a sun and a sky, and, by its name, for
+    a light, a material or a medium that the walk cannot follow.
     """
-    if not scene.sensors():
-        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
-    sensor = scene.sensors()[0]
-    if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(
-            f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
-        )
+    sensor = perspective_sensor(scene)
     # The light, then the shapes: opaque ones, and the boundaries of clouds.
     suns, sky = _lights(scene)
     opaque, boundaries = sorted_shapes(scene)
@@ -136,10 +128,9 @@ def read_clouds(scene) -> CloudScene:
         if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta):
             raise InputError(
                 f"shape '{shape.id()}' has a {shape.bsdf().class_name()} material, a mirror: paths "
-                "cannot find the sun "
-                "in it; expected a rough one"
+                "cannot find the sun in it; expected a rough one"
             )
-    # The walk takes whatever is not in a cloud for vacuum.
+    # For the walk all space outside of clouds is vacuum.
     for shape in boundaries:
         if shape.exterior_medium() is not None:
             raise InputError(
@@ -163,7 +154,7 @@ def read_clouds(scene) -> CloudScene:
     )
 
 
-def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
+def _lights(scene: "mi.Scene") -> tuple[tuple[DirectionalLight, ...], Array]:
     suns, skies = [], []
     for emitter in scene.emitters():
         if is_directional(emitter):
@@ -175,8 +166,7 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
         else:
             raise InputError(
                 f"light '{emitter.id()}' is a {emitter.class_name()}; clouds are lit by emitters "
-                "of type 'directional' "
-                "and 'constant'"
+                "of type 'directional' and 'constant'"
             )
     if len(skies) > 1:
         raise InputError(
@@ -189,7 +179,7 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
     return tuple(suns), skies[0] if skies else np.zeros(3)
 
 
-def _read_cloud(shape) -> Cloud:
+def _read_cloud(shape: "mi.Shape") -> Cloud:
     medium, name = shape.interior_medium(), f"the medium of shape '{shape.id()}'"
     if not medium.is_homogeneous():
         # The largest extinction stands for the cloud, and the density is relative to it.
@@ -200,8 +190,10 @@ def _read_cloud(shape) -> Cloud:
     return Cloud(inside.sigma_t, inside.albedo, inside.phase, inside.plugin, shape=shape)
 
 
-def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
-    """Return in which cloud the camera is, and check that it says so itself."""
+def _camera_cloud(sensor: "mi.Sensor", boundaries: "list[mi.Shape]", origin: Array) -> int:
+    """Return the number of the cloud that the camera is in, -1 in vacuum, and check that the sensor
+    references the medium of that cloud.
+    """
     number = _enclosing(boundaries, origin)
     camera_medium = sensor.get_medium()
     if number < 0 and camera_medium is not None:
@@ -211,17 +203,16 @@ def _camera_cloud(sensor, boundaries: list[Any], origin: Array) -> int:
     if number >= 0 and camera_medium != boundaries[number].interior_medium():
         raise InputError(
             f"the camera is inside of shape '{boundaries[number].id()}', but references another "
-            "medium or none; "
-            "reference that shape's interior medium in the sensor"
+            "medium or none; reference that shape's interior medium in the sensor"
         )
     return number
 
 
-def _enclosing(shapes: list[Any], point: Array) -> int:
+def _enclosing(shapes: "list[mi.Shape]", point: Array) -> int:
     """Return the number of the closed surface around a point, (3,) [m], -1 if there is none.
 
-    A ray from the point meets the surfaces that enclose it an odd number of times; the one met
-    first from inside is it.
+    Surfaces lie apart from one another: a ray from a point that is enclosed first meets the surface
+    around the point, from inside.
     """
     # Only boundaries are in this scene: an opaque shape must not hide one from the rays.
     scene = scene_from(shapes)
@@ -241,21 +232,21 @@ def _enclosing(shapes: list[Any], point: Array) -> int:
     )
 
 
-def _read_density(shape: Any, name: str) -> CloudDensity:
+def _read_density(shape: "mi.Shape", name: str) -> CloudDensity:
     """Return the density within a shape; messages call its medium by `name`.
 
-    Raises InputError for an extinction that is no grid of one channel with finite values of 0 or
-    more, not all 0, around the shape.
+    Raises InputError unless the extinction is a grid that covers the shape, of one channel, whose
+    values are finite, 0 or more, and not all 0.
     """
     medium = shape.interior_medium()
     parameters = mi.traverse(medium)
-    for key, what in (
+    for key, value in (
         ("sigma_t.data", "a grid as its extinction"),
         ("albedo.value.value", "one albedo everywhere"),
     ):
         if key not in parameters:
             raise InputError(
-                f"{name} is heterogeneous without {what}; the reference of clouds wants one"
+                f"{name} is heterogeneous without {value}; the reference of clouds wants one"
             )
     values, low, high = grid_values(medium, name)
     box = shape.bbox()
@@ -266,8 +257,7 @@ def _read_density(shape: Any, name: str) -> CloudDensity:
     ):
         raise InputError(
             f"{name} has a grid that does not cover the shape: it reaches from {_words(low)} to "
-            f"{_words(high)}; "
-            "expected a to_world of the volume whose unit cube holds the shape"
+            f"{_words(high)}; expected a to_world of the volume whose unit cube holds the shape"
         )
     # The table has the order z, y, x, the box x, y, z.
     voxel = float(((high - low) / values.shape[2::-1]).min())

@@ -3,21 +3,19 @@
 one that an image can have.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 
 
-def colour(value: Any, name: str, *, largest: float = np.inf) -> Array:
-    """Return a number or a colour of Mitsuba as RGB, (3,).
+def colour(value: ArrayLike, name: str, *, largest: float = np.inf) -> Array:
+    """Return a number or a colour, of Mitsuba or of NumPy, as RGB, (3,).
 
-    Raises InputError, in which it is called `name`, for what is not finite, below 0, or
-    above the largest value.
+    Raises InputError for numbers that are not finite, below 0 or above `largest`; the message calls
+    the colour by `name`.
     """
     numbers = np.array(value, dtype=np.float64).reshape(-1)
     if not np.all(np.isfinite(numbers) & (numbers >= 0) & (numbers <= largest)):

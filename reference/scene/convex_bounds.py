@@ -8,11 +8,10 @@ lies further outside any facet's plane than
     size (1e-6 + 4 eps largest coordinate / altitude of the facet),        eps = 2^-24:
 
 the most by which rounding of its corners moves the plane of a facet. Slivers with an altitude below
-1e-6 of the size have no plane worth the name; their neighbours bound the body without them.
+1e-6 of the size have no plane that can be relied on; their neighbours bound the body without them.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -45,11 +44,11 @@ class Sphere:
 Bounds = Polyhedron | Sphere
 
 
-def read_bounds(shape: Any) -> Bounds:
+def read_bounds(shape: "mi.Shape") -> Bounds:
     """Read the bounds of a medium from a shape.
 
-    Raises InputError for a shape that is neither a sphere nor a closed convex mesh whose normals
-    point outwards, by its name.
+    Raises InputError, by the name of the shape, unless it is a sphere or a closed convex mesh whose
+    normals point outwards.
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
@@ -67,7 +66,7 @@ def read_bounds(shape: Any) -> Bounds:
     return _read_polyhedron(shape, vertices, faces)
 
 
-def _read_sphere(shape: Any, matrix: Array) -> Sphere:
+def _read_sphere(shape: "mi.Shape", matrix: Array) -> Sphere:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(lengths) > SAME * lengths.max():
         raise _refusal(
@@ -78,17 +77,18 @@ def _read_sphere(shape: Any, matrix: Array) -> Sphere:
     return Sphere(matrix[:3, 3], float(lengths.mean()))
 
 
-def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
+def _read_polyhedron(shape: "mi.Shape", vertices: Array, faces: Index) -> Polyhedron:
     # Merge vertices that the mesh doubles for the sake of normals or texture.
     vertices, same = np.unique(vertices, axis=0, return_inverse=True)
     faces = same.reshape(-1)[faces]
+    # Normals and altitudes of the facets.
     corner = vertices[faces]
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     twice_area = np.linalg.norm(area, axis=1)
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     altitude = twice_area / np.maximum(longest, np.finfo(float).tiny)
-    # Slivers, with an altitude below 1e-6 of the size, have no plane worth the name.
+    # Slivers, with an altitude below 1e-6 of the size, have no plane that can be relied on.
     flat = 1e-6
     sound = altitude > flat * size
     edges, sides = _edges(shape, faces)
@@ -119,16 +119,16 @@ def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
             )
     if not np.any(sound):
         raise _refusal(shape, "has no volume", "a closed convex mesh")
-    # Edges within a flat facet of several triangles are none of the body's; edges of slivers may
-    # be.
+    # An edge within a flat facet of several triangles is no edge of the body; one beside a sliver
+    # may be.
     bends = np.linalg.norm(normal[sides[:, 0]] - normal[sides[:, 1]], axis=1) > 10 * flat
     bends |= ~sound[sides].all(axis=1)
     return Polyhedron(normal[sound], offset[sound], vertices[edges[bends]])
 
 
-def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
-    """Return the ends of the edges and the two faces beside each; refuse a
-    surface that is not closed.
+def _edges(shape: "mi.Shape", faces: Index) -> tuple[Index, Index]:
+    """Return the ends of the edges and the two faces beside each edge; refuse a surface that is not
+    closed.
     """
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     face = np.tile(np.arange(len(faces)), 3)
@@ -146,8 +146,8 @@ def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
     return ends[::2], np.stack([face[::2], face[1::2]], axis=1)
 
 
-def _refusal(shape: Any, fault: str, wanted: str) -> InputError:
-    return InputError(f"shape '{shape.id()}' bounds a medium and {fault}; expected {wanted}")
+def _refusal(shape: "mi.Shape", fault: str, expected: str) -> InputError:
+    return InputError(f"shape '{shape.id()}' bounds a medium and {fault}; expected {expected}")
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
@@ -158,9 +158,7 @@ def holds(bounds: Bounds, point: Array) -> bool:
 
 
 def in_surface(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point, (3,) [m], lies in the surface of bounds, as
-    far as float32 can tell.
-    """
+    """Return whether a point, (3,) [m], lies in the surface of bounds to the rounding of float32."""
     margin = 1e-6 * float(np.abs(point).max())
     if isinstance(bounds, Sphere):
         return bool(
@@ -172,8 +170,8 @@ def in_surface(bounds: Bounds, point: Array) -> bool:
 
 
 def normals_at(bounds: Bounds, points: Array) -> Array:
-    """Return outward unit normals at points of a surface, (n, 3) each [m]; at edges
-    the normal of one of the facets.
+    """Return outward unit normals at points of a surface, (n, 3) [m]; at an edge the normal of one
+    of its facets.
     """
     if isinstance(bounds, Sphere):
         return (points - bounds.centre) / bounds.radius

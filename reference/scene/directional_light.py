@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Directional lights of the reference, such as the sun: direction and
-irradiance, read from Mitsuba.
-"""
+"""Directional lights of the reference, such as the sun: direction and irradiance."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -24,17 +21,17 @@ class DirectionalLight:
 
     direction: Array  #: unit vector in which its light travels
     irradiance: Array  #: on a surface that faces it [W/m^2], RGB
-    emitter: Any  #: Mitsuba's
+    emitter: "mi.Emitter"
 
 
-def is_directional(emitter) -> bool:
-    """Return whether an emitter of Mitsuba is a directional light."""
+def is_directional(emitter: "mi.Emitter") -> bool:
+    """Return whether an emitter is a directional light."""
     return bool(emitter.class_name() == "DirectionalEmitter")
 
 
-def read_directional(emitter) -> DirectionalLight:
-    """Read a directional emitter: its direction from the transform, its
-    irradiance by asking at a point.
+def read_directional(emitter: "mi.Emitter") -> DirectionalLight:
+    """Read a directional light: its direction from the transform, its irradiance from Mitsuba's
+    answer at a point.
 
     Raises InputError for a transform that scales the direction.
     """
@@ -44,9 +41,8 @@ def read_directional(emitter) -> DirectionalLight:
     if abs(length - 1) > SAME:
         raise InputError(
             f"light '{emitter.id()}' has a to_world that scales its direction by {length:g}, by "
-            "which Mitsuba "
-            "multiplies its light on surfaces; expected no scale: remove it, or give 'direction' "
-            "instead of 'to_world'"
+            "which Mitsuba multiplies its light on surfaces; expected no scale: remove it, or give "
+            "'direction' instead of 'to_world'"
         )
     _, arriving = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     irradiance = colour(arriving, f"light '{emitter.id()}': its irradiance")

@@ -7,7 +7,6 @@ medium, where the other does it the other way round.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -17,7 +16,12 @@ from numpy.typing import NDArray
 from airlight.analytic.phase import HenyeyGreenstein, Isotropic, PhaseFunction, Rayleigh, Tabulated
 from airlight.errors import InputError
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
-from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from airlight.reference.scene.camera import (
+    camera_matrix,
+    film_directions,
+    perspective_sensor,
+    pixel_centres,
+)
 from airlight.reference.scene.colours import colour
 from airlight.reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from airlight.reference.scene.directional_light import (
@@ -66,7 +70,7 @@ class ReferenceMedium:
     sigma_t: Array  #: extinction [1/m], RGB
     albedo: Array  #: RGB
     phase: PhaseFunction
-    plugin: Any  #: Mitsuba's medium, None for a vacuum
+    plugin: "mi.Medium | None"  #: None for a vacuum
 
     @property
     def largest(self) -> Array:
@@ -89,8 +93,8 @@ class BoundedMedium(ReferenceMedium):
 class ReferenceScene:
     """A scene as the reference sees it."""
 
-    scene: Any  #: the `mi.Scene`, whole
-    occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
+    scene: "mi.Scene"  #: all shapes
+    occluders: "mi.Scene"  #: the opaque shapes alone: cast rays here
     width: int  #: [pixels]
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
@@ -102,7 +106,8 @@ class ReferenceScene:
     #: directional lights; all media then have bounds, or a cap
     directional: tuple[DirectionalLight, ...] = ()
     area: tuple[ReferenceAreaLight, ...] = ()  #: area lights
-    background: Any = None  #: Mitsuba's emitter around the scene, seen behind it; not in `scene`
+    #: the emitter around the scene, visible behind it; not in `scene`
+    background: "mi.Emitter | None" = None
     #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None
     #: where none arrives: through an unbounded homogeneous medium
     sky: Array | None = None
@@ -113,19 +118,13 @@ class ReferenceScene:
         return bool(self.area) or self.sky is not None
 
 
-def read_reference(scene) -> ReferenceScene:
+def read_reference(scene: "mi.Scene") -> ReferenceScene:
     """Read a Mitsuba scene of the current RGB variant.
 
-    Raises InputError for a scene whose reference cannot be computed, with the
-    name of what is in the way.
+    Raises InputError for a scene whose reference cannot be computed; the message names the shape,
+    the light or the medium that is the reason.
     """
-    if not scene.sensors():
-        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
-    sensor = scene.sensors()[0]
-    if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(
-            f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'"
-        )
+    sensor = perspective_sensor(scene)
     width, height = (int(n) for n in sensor.film().size())
     # Emitters by how they shine: around the scene, from a direction, from an area, from a place.
     background = _background(scene)
@@ -135,7 +134,7 @@ def read_reference(scene) -> ReferenceScene:
     near = tuple(
         emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter)
     )
-    if not far + near + wide and background is None:
+    if not emitters and background is None:
         raise InputError(
             "the scene has no light; expected at least one emitter of type 'point', 'spot', "
             "'directional' or 'area'"
@@ -143,8 +142,9 @@ def read_reference(scene) -> ReferenceScene:
     lights = tuple(_read_light(emitter) for emitter in near)
     origin = camera_matrix(sensor)[:3, 3]
     area = tuple(read_area_light(emitter, origin) for emitter in wide)
-    # Shapes that stop light, and shapes that bound media. A density grid in a shape around its box
-    # counts as the medium around the camera, and the shape bounds nothing.
+    # Shapes that stop light, and shapes that bound media. The medium of a shape that holds the
+    # whole box of a density grid counts as the medium around the camera, and the shape bounds
+    # nothing.
     opaque, boundaries = sorted_shapes(scene)
     grid = _grid_in_a_shape(sensor, boundaries, origin)
     media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
@@ -156,23 +156,20 @@ def read_reference(scene) -> ReferenceScene:
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(
                 f"light '{emitter.id()}' is directional: nothing of it arrives through a medium "
-                "without bounds; give "
-                "the medium bounds, a closed convex shape of material 'null' with the medium as "
-                "its interior"
+                "without bounds; give the medium bounds, a closed convex shape of material 'null' "
+                "with the medium as its interior"
             )
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(
                 f"light '{emitter.id()}' is directional and shines from the horizon or below: each "
-                "of its light paths "
-                "through height fog, which has no sides, is infinitely deep; expected a light from "
-                "above the horizon"
+                "of its light paths through height fog, which has no sides, is infinitely deep; "
+                "expected a light from above the horizon"
             )
     sky = _sky(background, medium)
-    if not far + near + wide and sky is None:
+    if background is not None and sky is None and not emitters:
         raise InputError(
             f"light '{background.id()}' is a sky: nothing of it arrives through a medium without "
-            "bounds; give the "
-            "medium bounds, or add a light"
+            "bounds; give the medium bounds, or add a light"
         )
     return ReferenceScene(
         scene=scene if background is None else _rebuilt(scene, emitters),
@@ -192,7 +189,7 @@ def read_reference(scene) -> ReferenceScene:
 
 
 def homogeneous_around(reference: ReferenceScene) -> ReferenceMedium:
-    """Return the medium without bounds, where it has one extinction.
+    """Return the medium without bounds, if its extinction is the same everywhere.
 
     Raises InputError for height fog and grids.
     """
@@ -201,17 +198,15 @@ def homogeneous_around(reference: ReferenceScene) -> ReferenceMedium:
     return reference.medium
 
 
-def _background(scene):
-    """Return the emitter around a scene, a sky or the background of lights
-    in it; None without one.
-    """
-    # An environment map lights nothing here: it is only seen behind other lights.
+def _background(scene: "mi.Scene") -> "mi.Emitter | None":
+    """Return the emitter around a scene: a sky, or an image behind the lights of the scene."""
+    # An environment map lights nothing here: it is only visible, and only in a scene with lights.
     around = [emitter for emitter in scene.emitters() if emitter.class_name() in _AROUND]
     lights = {emitter.class_name() for emitter in scene.emitters()} - set(_AROUND)
     return around[0] if around and (lights or around[0].class_name() == _AROUND[0]) else None
 
 
-def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
+def _sky(background: "mi.Emitter | None", medium: ReferenceMedium | VaryingMedium) -> Array | None:
     """Return the radiance of a uniform sky whose light arrives in the media of a scene."""
     if background is None or background.class_name() != _AROUND[0]:
         return None
@@ -229,15 +224,15 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
     )
 
 
-def whole_scene(reference: ReferenceScene):
+def whole_scene(reference: ReferenceScene) -> "mi.Scene":
     """Return Mitsuba's scene with the sky, if it has one."""
     if reference.sky is None:
         return reference.scene
     return _rebuilt(reference.scene, [*reference.scene.emitters(), reference.background])
 
 
-def _rebuilt(scene, emitters: list[Any]):
-    """Return a scene with these emitters; all parts keep their names."""
+def _rebuilt(scene: "mi.Scene", emitters: "list[mi.Emitter]") -> "mi.Scene":
+    """Return a scene with other emitters; all parts keep their names."""
     parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
     names = [part.id() for part in parts]
     # Mitsuba names the parts of a dictionary by their keys: the old names are given back.
@@ -249,13 +244,13 @@ def _rebuilt(scene, emitters: list[Any]):
     return built
 
 
-def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
+def sorted_shapes(scene: "mi.Scene") -> "tuple[list[mi.Shape], list[mi.Shape]]":
     """Return the opaque shapes and the shapes that bound a medium; all others take no part."""
     opaque, boundaries = [], []
     for shape in scene.shapes():
         inside, outside = shape.interior_medium(), shape.exterior_medium()
         # A surface stops light; a shape of material `null` is the boundary of a medium or nothing.
-        # Between both there is nothing that the estimators know.
+        # The estimators have no third kind of shape.
         null = shape.bsdf().class_name() == "Null"
         if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
             raise InputError(
@@ -265,8 +260,7 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         if not null and (inside is not None or outside is not None):
             raise InputError(
                 f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} "
-                "material; expected the "
-                "material 'null' on it, and no media on other shapes"
+                "material; expected the material 'null' on it, and no media on other shapes"
             )
         if not null:
             opaque.append(shape)
@@ -280,29 +274,36 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
     return opaque, boundaries
 
 
-def scene_of(shapes: list[Any], whole):
-    """Return a scene of some of the shapes of `whole`, or `whole` itself if
-    they are all of its shapes.
+def scene_of(shapes: "list[mi.Shape]", whole: "mi.Scene") -> "mi.Scene":
+    """Return a scene of some of the shapes of `whole`, or `whole` itself if these are all of its
+    shapes.
     """
     return whole if len(shapes) == len(whole.shapes()) else scene_from(shapes)
 
 
-def scene_from(shapes: list[Any]):
-    """Return a scene of some shapes, which keep their names."""
-    # The keys become the names of the shapes, in the whole scene too: they keep those they
-    # have, if these are keys.
+def scene_from(shapes: "list[mi.Shape]") -> "mi.Scene":
+    """Return a scene of some shapes, which keep their names if these can be keys of a dictionary of
+    Mitsuba.
+    """
+    # The key of a shape becomes its name, in the whole scene too.
     names = {shape.id() for shape in shapes}
-    sound = len(names) == len(shapes) and not any("." in name or not name for name in names)
+    are_keys = len(names) == len(shapes) and not any("." in name or not name for name in names)
     return mi.load_dict(
         {"type": "scene"}
-        | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
+        | {
+            shape.id() if are_keys else f"shape{number}": shape
+            for number, shape in enumerate(shapes)
+        }
     )
 
 
 def _read_ambient(
-    sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]
+    sensor: "mi.Sensor",
+    origin: Array,
+    media: tuple[BoundedMedium, ...],
+    boundaries: "list[mi.Shape]",
 ) -> ReferenceMedium | VaryingMedium:
-    """Return the medium around the camera; refuse a camera or a boundary that says otherwise."""
+    """Return the medium around all bounds; refuse a camera or a shape that references another one."""
     camera_medium = sensor.get_medium()
     # The camera may be in one of the bounded media: the medium around is then the exterior of that
     # shape.
@@ -317,8 +318,7 @@ def _read_ambient(
             if camera_medium != medium.plugin:
                 raise InputError(
                     f"the camera is inside of shape '{medium.name}', but references another medium "
-                    "or none; "
-                    "reference that shape's interior medium in the sensor"
+                    "or none; reference that shape's interior medium in the sensor"
                 )
             ambient = shape.exterior_medium()
     # All bounded media lie in one and the same medium.
@@ -326,9 +326,8 @@ def _read_ambient(
         if shape.exterior_medium() != ambient:
             raise InputError(
                 f"the exterior medium of shape '{medium.name}' is not what surrounds the others or "
-                "the camera; "
-                "expected the medium that the camera references as exterior of all shapes, or none "
-                "at all"
+                "the camera; expected the medium that the camera references as exterior of all "
+                "shapes, or none at all"
             )
     if is_height_fog(ambient) or is_grid(ambient):
         kind = "height fog" if is_height_fog(ambient) else "a density grid"
@@ -336,12 +335,10 @@ def _read_ambient(
         if media:
             raise InputError(
                 f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove "
-                "the medium of the "
-                "shape, or take a medium of type 'homogeneous' around it"
+                "the medium of the shape, or take a medium of type 'homogeneous' around it"
             )
-        return (read_height_fog if is_height_fog(ambient) else read_grid)(
-            ambient, *read_scattering(ambient)
-        )
+        read_varying = read_height_fog if is_height_fog(ambient) else read_grid
+        return read_varying(ambient, *read_scattering(ambient))
     if ambient is not None:
         return read_medium(ambient, "the medium")
     if not media:
@@ -352,9 +349,11 @@ def _read_ambient(
     return VACUUM
 
 
-def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium | None:
-    """Return a density grid in vacuum whose only boundary holds its whole box,
-    which then bounds nothing.
+def _grid_in_a_shape(
+    sensor: "mi.Sensor", boundaries: "list[mi.Shape]", origin: Array
+) -> GridMedium | None:
+    """Return a density grid in vacuum if the scene's only boundary holds the whole box of the grid:
+    the grid ends at its box, and the boundary bounds nothing.
     """
     shape = boundaries[0] if len(boundaries) == 1 else None
     if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
@@ -365,8 +364,9 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
         np.array(corner, dtype=np.float64).ravel()
         for corner in (shape.bbox().min, shape.bbox().max)
     )
-    # The shape may be smaller than the box by 1e-5 of a side: its numbers are rounded. The box test
-    # is quick; the shape itself must then hold all eight corners, drawn in by twice as much.
+    # The shape may be smaller than the box by 1e-5 of a side: its numbers are rounded. The test of
+    # the bounding box is quick; the shape itself must then hold all eight corners of the grid,
+    # drawn in by 1e-5 on each side.
     fraction = 1e-5
     margin = fraction * (grid.high - grid.low)
     if np.any(low > grid.low + margin) or np.any(high < grid.high - margin):
@@ -377,18 +377,17 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
         holds(bounds, middle + (1 - 2 * fraction) * (corner - middle)) for corner in corners
     ):
         return None
-    # A camera in the shape must name the grid's medium. Outside of it the camera may: the grid is
-    # vacuum beyond its box.
+    # A camera in the shape must reference the grid's medium. A camera outside may reference it,
+    # since the grid is vacuum beyond its box.
     if camera_medium not in ((inside,) if holds(bounds, origin) else (None, inside)):
         raise InputError(
             f"the camera references another medium than that of shape '{shape.id()}', a density "
-            "grid, or is in the "
-            "shape and references none; expected that medium"
+            "grid, or is in the shape and references none; expected that medium"
         )
     return grid
 
 
-def _read_bounded(shape) -> BoundedMedium:
+def _read_bounded(shape: "mi.Shape") -> BoundedMedium:
     inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
     return BoundedMedium(
         inside.sigma_t,
@@ -400,7 +399,7 @@ def _read_bounded(shape) -> BoundedMedium:
     )
 
 
-def read_medium(medium, name: str) -> ReferenceMedium:
+def read_medium(medium: "mi.Medium", name: str) -> ReferenceMedium:
     """Read a homogeneous medium; messages call it by `name`."""
     if is_height_fog(medium):
         raise InputError(
@@ -410,8 +409,7 @@ def read_medium(medium, name: str) -> ReferenceMedium:
     if not medium.is_homogeneous():
         raise InputError(
             f"{name} is heterogeneous; expected a medium of type 'homogeneous', or a density grid "
-            "in the sensor, or "
-            "one in vacuum in a convex shape that holds its whole box"
+            "in the sensor, or one in vacuum in a convex shape that holds its whole box"
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
@@ -423,10 +421,8 @@ def read_medium(medium, name: str) -> ReferenceMedium:
     )
 
 
-def read_scattering(medium) -> tuple[Array, PhaseFunction]:
-    """Return the albedo of a medium, RGB, one number or colour
-    everywhere, and its phase function.
-    """
+def read_scattering(medium: "mi.Medium") -> tuple[Array, PhaseFunction]:
+    """Return the albedo of a medium, RGB, the same everywhere, and its phase function."""
     parameters = mi.traverse(medium)
     _require_constant(parameters, "albedo", f"medium '{medium.id()}'")
     albedo = colour(
@@ -437,7 +433,7 @@ def read_scattering(medium) -> tuple[Array, PhaseFunction]:
     return albedo, _read_phase(medium.phase_function())
 
 
-def _require_constant(parameters, coefficient: str, name: str) -> None:
+def _require_constant(parameters: "mi.SceneParameters", coefficient: str, name: str) -> None:
     if f"{coefficient}.value.value" not in parameters:
         raise InputError(
             f"{name}: its {coefficient} differs from place to place; expected one number or one "
@@ -445,7 +441,7 @@ def _require_constant(parameters, coefficient: str, name: str) -> None:
         )
 
 
-def _read_phase(phase) -> PhaseFunction:
+def _read_phase(phase: "mi.PhaseFunction") -> PhaseFunction:
     parameters = mi.traverse(phase)
     name = phase.class_name()
     if name == "IsotropicPhaseFunction":
@@ -461,7 +457,7 @@ def _read_phase(phase) -> PhaseFunction:
     )
 
 
-def _read_light(emitter) -> ReferenceLight:
+def _read_light(emitter: "mi.Emitter") -> ReferenceLight:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(
@@ -469,8 +465,7 @@ def _read_light(emitter) -> ReferenceLight:
         )
         raise InputError(
             f"light '{emitter.id()}' of type '{word}' is the scene's only light; expected lights "
-            "of type 'point', "
-            "'spot', 'directional', 'area' or 'constant'"
+            "of type 'point', 'spot', 'directional', 'area' or 'constant'"
         )
     parameters = mi.traverse(emitter)
     matrix = matrix_of(emitter.world_transform())
@@ -483,10 +478,9 @@ def _read_light(emitter) -> ReferenceLight:
     if spot and stretch(matrix) - 1 > SAME:
         raise InputError(
             f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} "
-            "to 1; expected one "
-            "scale for all axes and no shear, which a 'rotate' brings whose axis is not of unit "
-            "length: take the scale "
-            "away, in a modelling program before the export"
+            "to 1; expected one scale for all axes and no shear, which a 'rotate' brings whose "
+            "axis is not of unit length: take the scale away, in a modelling program before the "
+            "export"
         )
     # A spot stands at the origin of its frame and shines along its axis z; a point light has a
     # position of its own, and any axis will do.
@@ -511,8 +505,7 @@ def _read_light(emitter) -> ReferenceLight:
     if not 0 < degrees < 90:
         raise InputError(
             f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than "
-            "0 and less than "
-            "90: a wider light is a 'point' light"
+            "0 and less than 90: a wider light is a 'point' light"
         )
     cutoff = np.deg2rad(degrees)
     return ReferenceLight(
@@ -524,9 +517,9 @@ def _read_light(emitter) -> ReferenceLight:
     )
 
 
-def _as_given(emitter, measured: Array) -> Array:
-    """Return the intensity as the scene gives it, where that is what was measured:
-    measuring rounds it to float32.
+def _as_given(emitter: "mi.Emitter", measured: Array) -> Array:
+    """Return the intensity that the scene gives, if it agrees with the measured one, which is
+    rounded to float32.
     """
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters:

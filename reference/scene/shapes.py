@@ -8,7 +8,6 @@ Shadows do not depend on the side to which normals point.
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -40,8 +39,8 @@ class Shapes:
     centre: Array = field(default_factory=lambda: np.empty((0, 3)))
     radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]
     disks: Disks = field(default_factory=Disks)
-    #: all shapes one by one, each as numbers
-    single: tuple[tuple[Any, Array | Sphere | Disks], ...] = ()
+    #: all shapes one by one: Mitsuba's shape, and its numbers
+    single: "tuple[tuple[mi.Shape, Array | Sphere | Disks], ...]" = ()
 
     @property
     def count(self) -> int:
@@ -49,11 +48,11 @@ class Shapes:
         return len(self.triangles) + len(self.radius) + len(self.disks.radius)
 
 
-def read_shapes(scene) -> Shapes:
+def read_shapes(scene: "mi.Scene") -> Shapes:
     """Read the shapes of a Mitsuba scene, all of them opaque.
 
-    Raises InputError for a shape that is neither a mesh nor a rectangle, a sphere
-    or a disk, with its name.
+    Raises InputError, by the name of the shape, unless it is a mesh, a rectangle, a sphere or a
+    disk.
     """
     single = tuple((shape, _read(shape)) for shape in scene.shapes())
     triangles = [part for _, part in single if isinstance(part, np.ndarray)]
@@ -64,16 +63,15 @@ def read_shapes(scene) -> Shapes:
         np.array([sphere.centre for sphere in spheres]).reshape(-1, 3),
         np.array([sphere.radius for sphere in spheres]),
         Disks(
-            *(
-                np.concatenate(column)
-                for column in zip(*((d.centre, d.normal, d.radius) for d in (Disks(), *disks)))
-            )
+            np.concatenate([Disks().centre, *(disk.centre for disk in disks)]),
+            np.concatenate([Disks().normal, *(disk.normal for disk in disks)]),
+            np.concatenate([Disks().radius, *(disk.radius for disk in disks)]),
         ),
         single,
     )
 
 
-def _read(shape) -> Array | Sphere | Disks:
+def _read(shape: "mi.Shape") -> Array | Sphere | Disks:
     if is_polygonal(shape):
         return triangles_of(shape)
     matrix = _matrix(shape)
@@ -83,8 +81,7 @@ def _read(shape) -> Array | Sphere | Disks:
     if shape.class_name() != "Disk":
         raise InputError(
             f"shape '{shape.id()}' is a {shape.class_name().lower()}; expected meshes, rectangles, "
-            "spheres and disks, "
-            "whose shadows are exact: replace it by a mesh, as fine as you need"
+            "spheres and disks, whose shadows are exact: replace it by a mesh, as fine as you need"
         )
     if (
         abs(length[0] - length[1]) > SAME * length[0]
@@ -110,11 +107,9 @@ def distance_to(shapes: Shapes, point: Array) -> float:
 
 
 def distance_to_triangles(triangles: Array, point: Array) -> float:
-    """Return the distance from a point, (3,) [m], to triangles, (n, 3, 3) [m]: to their
-    planes, or to their sides.
-    """
-    # The foot of the point on a plane is in the triangle if it is on the inner side of all three
-    # sides: then the distance to the plane counts, else the nearest side.
+    """Return the distance from a point, (3,) [m], to the nearest of triangles, (n, 3, 3) [m]."""
+    # The foot of the point on the plane of a triangle is in the triangle if it is on the inner side
+    # of all three sides: then the distance to the plane counts, else that to the nearest side.
     corners = triangles - point
     sides = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(sides[:, 0], sides[:, 1])
@@ -128,17 +123,17 @@ def distance_to_triangles(triangles: Array, point: Array) -> float:
     return float(min(planes.min(initial=np.inf), edges.min(initial=np.inf)))
 
 
-def is_polygonal(shape) -> bool:
+def is_polygonal(shape: "mi.Shape") -> bool:
     """Return whether a shape consists of triangles."""
     return shape.is_mesh() or is_rectangle(shape)
 
 
-def is_rectangle(shape) -> bool:
+def is_rectangle(shape: "mi.Shape") -> bool:
     """Return whether a shape is Mitsuba's rectangle."""
     return shape.class_name() == "Rectangle"  # has no vertices to ask for
 
 
-def triangles_of(shape) -> Array:
+def triangles_of(shape: "mi.Shape") -> Array:
     """Return the triangles of a mesh or rectangle, (triangles, 3, 3) [m]."""
     if is_rectangle(shape):
         # Mitsuba's rectangle is [-1, 1]^2 in its own frame, here two triangles.
@@ -149,5 +144,5 @@ def triangles_of(shape) -> Array:
     return vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
 
 
-def _matrix(shape) -> Array:
+def _matrix(shape: "mi.Shape") -> Array:
     return matrix_of(mi.traverse(shape)["to_world"])

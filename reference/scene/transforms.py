@@ -7,8 +7,7 @@ directional light takes the image of the axis z for its direction and keeps its 
 Mitsuba then multiplies the light on surfaces. A sphere that is mirrored is inside out.
 """
 
-from typing import Any
-
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +16,7 @@ Array = NDArray[np.float64]
 SAME = 1e-5  #: scales and angles of a float32 transform that differ by less are meant to be equal
 
 
-def matrix_of(transform: Any) -> Array:
+def matrix_of(transform: "mi.Transform4f | mi.ScalarTransform4f") -> Array:
     """Return a transform of Mitsuba as a matrix, (4, 4)."""
     return np.array(transform.matrix, dtype=np.float64).reshape(4, 4)
 

@@ -18,7 +18,6 @@ other filter, wrap mode or transform is taken for this.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -32,23 +31,22 @@ Array = NDArray[np.float64]
 
 NO_EXTINCTION = (
     "the medium has an extinction that differs from place to place, and this asks for one number; "
-    "expected a medium of "
-    "type 'homogeneous'"
+    "expected a medium of type 'homogeneous'"
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class VaryingMedium:
-    """A medium of one albedo and one phase function, whose density is its class's own."""
+    """A medium of one albedo and one phase function; its subclass says its density."""
 
     albedo: Array  #: RGB
     phase: PhaseFunction
     largest: Array  #: a bound of the extinction, RGB [1/m]
-    plugin: Any  #: Mitsuba's medium
+    plugin: "mi.Medium"
 
     @property
     def sigma_t(self) -> Array:
-        """Refuse: code that asks for one extinction would take the medium for a homogeneous one."""
+        """Raise InputError: code that asks for one extinction is for homogeneous media."""
         raise InputError(NO_EXTINCTION)
 
 
@@ -65,16 +63,17 @@ class HeightMedium(VaryingMedium):
     up: Array  #: unit vector, (3,): heights are along it
 
 
-def is_height_fog(medium) -> bool:
-    """Return whether a medium of Mitsuba is height fog."""
+def is_height_fog(medium: "mi.Medium | None") -> bool:
+    """Return whether a medium is height fog."""
     return medium is not None and "sigma_t.H_1" in mi.traverse(medium)
 
 
-def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium:
-    """Read height fog; its albedo, RGB, and its phase function were read."""
+def read_height_fog(medium: "mi.Medium", albedo: Array, phase: PhaseFunction) -> HeightMedium:
+    """Read height fog with an albedo, RGB, and a phase function that were read before."""
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
-    # The numbers of the volume plugin by their last names. A layer without density is left out.
+    # The numbers of the volume plugin by the last words of their names. A layer without density is
+    # left out.
     number = {
         key.rpartition(".")[2]: np.array(value, dtype=np.float64).ravel()
         for key, value in parameters
@@ -143,20 +142,20 @@ class GridMedium(VaryingMedium):
         return np.array(self.values.shape[::-1]) / (self.high - self.low)
 
 
-def is_grid(medium) -> bool:
-    """Return whether a medium of Mitsuba has an extinction on a grid; one that is
-    called homogeneous has no box.
+def is_grid(medium: "mi.Medium | None") -> bool:
+    """Return whether a medium has an extinction on a grid; a medium of type `homogeneous` has no
+    box, whatever its extinction.
     """
     return (
         medium is not None and not medium.is_homogeneous() and "sigma_t.data" in mi.traverse(medium)
     )
 
 
-def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
-    """Read a grid around the camera; its albedo, RGB, and its phase function were read.
+def read_grid(medium: "mi.Medium", albedo: Array, phase: PhaseFunction) -> GridMedium:
+    """Read a grid around the camera with an albedo, RGB, and a phase function that were read before.
 
-    Raises InputError for what `grid_values` refuses, and for a grid that Mitsuba reads
-    otherwise than `GridMedium`.
+    Raises InputError for a grid that `grid_values` refuses, or whose extinctions in Mitsuba differ
+    from those of `GridMedium`.
     """
     name = f"medium '{medium.id()}'"
     values, low, high = grid_values(medium, name)
@@ -170,9 +169,9 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
         largest=largest,
         plugin=medium,
     )
-    # Mitsuba's extinctions at random places in the box: 512 even ones, and, since a grid may be
-    # empty nearly everywhere, 64 in voxels that are drawn by their values, wherever a way puts
-    # these.
+    # Random places in the box: 512 even ones, and, since a grid may be empty nearly everywhere, 64
+    # in voxels that are drawn by their values. These 64 are repeated for each way in which the grid
+    # can lie in the box.
     random = np.random.default_rng(1)
     even = random.random((512, 3))
     voxel = random.choice(values.size, 64, p=values.ravel() / values.sum())
@@ -181,43 +180,42 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     ends = product((0.0, 1.0), repeat=3)
     ways = [np.abs(end - dense[:, order]) for end, order in product(ends, permutations(range(3)))]
     fraction = np.concatenate([even, *ways])
+    # Mitsuba's extinctions there.
     interaction = dr.zeros(mi.MediumInteraction3f, len(fraction))
     interaction.p = mi.Point3f((low + fraction * (high - low)).T)
-    theirs = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]
+    expected = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]
     # The grid as it lies in the box: the first way that agrees, since all ways that agree give the
     # same extinctions. 2e-3 of the largest value is for Mitsuba's places, rounded in float32.
-    worst = np.inf
+    least = np.inf
     for turned in _turned(values):
         difference = (
-            np.abs(theirs - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max()
+            np.abs(expected - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max()
             / values.max()
         )
         if difference <= 2e-3:
             return replace(grid, values=turned)
-        worst = min(worst, float(difference))
+        least = min(least, float(difference))
     raise InputError(
-        f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest "
-        "value; expected a "
-        "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales, "
-        "moves, mirrors and "
-        "turns by right angles"
+        f"{name} has a grid that is not read as Mitsuba reads it, by {least:.2g} of its largest "
+        "value; expected a 'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a "
+        "to_world that scales, moves, mirrors and turns by right angles"
     )
 
 
 def _turned(values: Array) -> Iterator[Array]:
-    """Yield a grid with its axes in every order, each forwards or backwards; as it is first."""
+    """Yield a grid with its axes in every order, each forwards or backwards; unchanged first."""
     ways = (slice(None), slice(None, None, -1))
     for order in permutations(range(3)):
         for way in product(ways, repeat=3):
             yield values.transpose(order)[way]
 
 
-def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
-    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and the
-    corners of its box, (3,) [m].
+def grid_values(medium: "mi.Medium", name: str) -> tuple[Array, Array, Array]:
+    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and two opposite corners of
+    its box, (3,) [m].
 
-    Messages call it by `name`. Raises InputError for a grid of several channels, and for values
-    that are not finite, below 0, or 0 alone.
+    Raises InputError, in which the medium is called `name`, for a grid of several channels, for
+    values that are not finite or below 0, and for a grid that is 0 everywhere.
     """
     parameters = mi.traverse(medium)
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)

@@ -22,12 +22,15 @@ from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from airlight.errors import InputError
 from airlight.reference.storage.files import NO_SPACE, sweep_hidden, write_bytes
+
+Arrays: TypeAlias = dict[str, np.ndarray]  #: arrays of any shape and type, by name
 
 DEFAULT_LIMIT = 4 * 2**30  #: bytes
 
@@ -75,12 +78,12 @@ def cache_limit() -> int:
     return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " "))
 
 
-def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] | None:
+def load_arrays(key: str, names: Sequence[str] | None = None) -> Arrays | None:
     """Return the arrays under a key, or None if the file is missing or damaged, or the
     limit of the cache is 0.
 
-    With `names` it returns these arrays alone, without a check of the digest: to look at a
-    small part of a large file.
+    With `names` it returns these arrays alone, without a check of the digest: they may be a small
+    part of a large file.
     """
     if cache_limit() == 0:
         return None
@@ -95,7 +98,7 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
         EOFError,
         AttributeError,
         TypeError,
-        RuntimeError,  # of an archive that seems encrypted, or compressed in an unknown way
+        RuntimeError,  # from an archive that seems encrypted, or compressed in an unknown way
         zipfile.BadZipFile,
         zlib.error,
     ):
@@ -110,21 +113,23 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
     return arrays
 
 
-def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
-    """Write arrays under a key, replacing what is there; a key may name a folder, as
-    in 'volpath-0a1b/000017'.
+def store_arrays(key: str, arrays: Mapping[str, ArrayLike]) -> None:
+    """Write arrays under a key in place of the file that is there; a key may name a folder, as in
+    'volpath-0a1b/000017'.
 
     Then the files that were used longest ago are removed until the cache is no larger than its
     limit. The size of the cache is looked at by chance, the more often the larger the file is. With
-    a limit of 0 nothing is written. Where the folder cannot be written a note on the error stream
-    says so: the arrays are there all the same. Raises OSError where the disk is full.
+    a limit of 0 nothing is written. If the folder cannot be written, a note on the error stream says
+    so, and the program goes on. Raises OSError if the disk is full.
     """
     limit = cache_limit()
     if limit == 0:
         return
-    content: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
+    content: Arrays = {name: np.asarray(value) for name, value in arrays.items()}
+    # NumPy takes the arrays as keywords, beside a keyword of another type.
+    named: dict[str, Any] = {**content, _DIGEST: np.asarray(_content_digest(key, content))}
     buffer = BytesIO()
-    np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
+    np.savez(buffer, **named)
     try:
         _write(_path(key), buffer.getvalue())
     except (InputError, OSError) as error:
@@ -151,8 +156,7 @@ def _write(path: Path, data: bytes) -> None:
 def _note_unwritable(folder: Path) -> None:
     logging.getLogger("airlight").warning(
         "airlight: note: the cache folder %s cannot be written, so nothing is cached: name one "
-        "that can be written by "
-        "AIRLIGHT_CACHE_DIR, or set AIRLIGHT_CACHE_SIZE=0",
+        "that can be written by AIRLIGHT_CACHE_DIR, or set AIRLIGHT_CACHE_SIZE=0",
         folder,
     )
 
@@ -233,11 +237,11 @@ def _path(key: str) -> Path:
     return cache_folder() / f"{key}.npz"
 
 
-def _content_digest(key: str, arrays: Mapping[str, Any]) -> str:
+def _content_digest(key: str, arrays: Arrays) -> str:
     """Return a digest of the key and of every array: its name, type, shape and bytes."""
     digest = hashlib.blake2b(key.encode(), digest_size=16)
     for name in sorted(arrays):
         value = np.ascontiguousarray(arrays[name])
-        digest.update(f"|{name} {value.dtype.str} {np.shape(arrays[name])}|".encode())
+        digest.update(f"|{name} {value.dtype.str} {arrays[name].shape}|".encode())
         digest.update(value.data if value.size and value.dtype.kind in "biufc" else value.tobytes())
     return digest.hexdigest()

@@ -15,10 +15,10 @@ import contextlib
 import difflib
 import os
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import OpenEXR
@@ -35,6 +35,9 @@ BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the
 BOUND = "airlight:bound"
 
 Attribute = str | int | float
+Window = tuple[int, int, int, int]  #: first column and row, and those after the last
+#: the values of one channel, (rows, columns)
+Pixels: TypeAlias = NDArray[np.float16 | np.float32 | np.uint32]
 
 # Attributes that the format itself puts into a header.
 # fmt: off
@@ -156,7 +159,7 @@ def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True
     if finite:
         _check_finite(image)
     # The binding changes the header that it is given: a new one for each file.
-    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
         header[key] = _attribute(key, value)
     with atomic_path(path) as temporary, _system_errors():
@@ -190,9 +193,7 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
             )
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             # The binding empties its own headers when the file is closed.
-            parts = [
-                _Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts
-            ]
+            parts = [_read_part(part) for part in file.parts]
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
         raise InputError(
             f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again"
@@ -212,46 +213,62 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     channels, window, notes = _channels_of(parts, path)
     # x and y of red, green, blue and white: the default of the format.
     srgb = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.329)
-    if not np.allclose(parts[0].header.get("chromaticities", srgb), srgb, atol=0.002):
+    chromaticities = np.asarray(parts[0].header.get("chromaticities", srgb))
+    if not np.allclose(chromaticities, srgb, atol=0.002):
         notes.append("colours of other primaries than sRGB's, read as they are")
     return _image(channels, parts[0].header, window, notes)
 
 
+class _Plane(NamedTuple):
+    """A channel of a part."""
+
+    pixels: Pixels
+    across: int  #: how many columns share a pixel
+    down: int  #: how many rows share one
+
+
 @dataclass(frozen=True)
 class _Part:
-    """A part of a file; of each channel the pixels, and how many columns and rows share one."""
+    """A part of a file."""
 
     name: str
-    header: dict[str, Any]
-    planes: dict[str, tuple[NDArray[Any], int, int]]
+    header: Mapping[str, object]
+    frame: Window  #: of the display
+    data: Window  #: that holds pixels
+    planes: Mapping[str, _Plane]  #: by the name of the channel
 
 
-def _planes(channels: Mapping[str, Any]) -> dict[str, tuple[NDArray[Any], int, int]]:
-    return {
-        key: (channel.pixels, channel.xSampling, channel.ySampling)
-        for key, channel in channels.items()
-    }
-
-
-Window = tuple[int, int, int, int]  # first column and row, and those after the last
+def _read_part(part: "OpenEXR.Part") -> _Part:
+    return _Part(
+        part.name(),
+        dict(part.header),
+        _window(part.header["displayWindow"]),
+        _window(part.header["dataWindow"]),
+        {
+            key: _Plane(channel.pixels, channel.xSampling, channel.ySampling)
+            for key, channel in part.channels.items()
+        },
+    )
 
 
 def _channels_of(
     parts: list[_Part], path: str | os.PathLike[str]
-) -> tuple[dict[str, NDArray[Any]], Window | None, list[str]]:
-    """Return the channels of all parts by name, in the frame of the first; which pixels
-    have data; what was changed.
+) -> tuple[dict[str, Pixels], Window | None, list[str]]:
+    """Return the channels of all parts by name, in the frame of the first part; which pixels have
+    data, None for all; and notes of what was changed.
     """
-    channels: dict[str, NDArray[Any]] = {}
+    channels: dict[str, Pixels] = {}
+    windows: list[Window] = []
+    notes: list[str] = []
     # The display window of the first part is the frame: channels of all parts are brought into it.
-    frame, windows, notes = _window(parts[0].header["displayWindow"]), list[Window](), list[str]()
+    frame = parts[0].frame
     for part in parts:
         if any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
             raise InputError(
                 f"{path} is stored as luminance and chroma (Y, RY, BY); convert it to R, G, B "
                 "channels"
             )
-        data = _window(part.header["dataWindow"])
+        data = part.data
         # The data that lie in the frame.
         inside = (
             max(data[0], frame[0]),
@@ -302,13 +319,16 @@ def _channels_of(
 _CUT = "pixels beyond the frame cut off"
 
 
-def _window(box: Any) -> Window:
+def _window(box: Iterable[Iterable[int]]) -> Window:
+    """Return a window from its first and its last pixel."""
     (left, top), (right, bottom) = ([int(value) for value in corner] for corner in box)
     return left, top, right + 1, bottom + 1
 
 
-def _framed(pixels: NDArray[Any], data: Window, inside: Window, frame: Window) -> NDArray[Any]:
-    """Return the pixels of a frame from those of a data window, 0 where it has none."""
+def _framed(pixels: Pixels, data: Window, inside: Window, frame: Window) -> Pixels:
+    """Return the pixels of a frame from those of a data window, 0 where it has none; `inside`: the
+    part of the data window in the frame.
+    """
     if data == frame:
         return pixels
     # Rows and columns of the overlap, in the frame and in the data window.
@@ -372,7 +392,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     return channels
 
 
-def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
+def _float32(values: NDArray[np.floating], name: str) -> NDArray[np.float32]:
     """Round to float32; refuse finite numbers that would become infinite."""
     with np.errstate(over="ignore", under="ignore"):
         rounded = values.astype(np.float32)
@@ -385,27 +405,24 @@ def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
 
 
 def _check_finite(image: Image) -> None:
-    """Refuse layers with NaN or infinity; of depths only NaN, where there is
-    nothing they are infinite.
+    """Refuse layers with NaN or infinity, and depths with NaN: where a ray hits nothing the depth is
+    infinite.
     """
-    depth = (
-        {}
-        if image.depth is None
-        else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
-    )
-    # Depths are infinite where a ray hits nothing; only NaN is wrong there.
-    for name, values in (dict(image.layers) | depth).items():
+    layers = dict(image.layers)
+    if image.depth is not None:
+        layers["depth"] = np.where(np.isinf(image.depth), 0, image.depth)[..., None]
+    for name, values in layers.items():
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             raise InputError(
                 f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first "
-                "in column "
-                f"{column} of row {row}; an image is written whole, or with finite=False as it is"
+                f"in column {column} of row {row}; an image is written whole, or with finite=False "
+                "as it is"
             )
 
 
-def _attribute(key: str, value: Any) -> Attribute:
+def _attribute(key: str, value: object) -> Attribute:
     """Turn an attribute into one of the three types that the format keeps."""
     if key in _STANDARD or not 0 < len(key.encode()) <= 255:
         raise InputError(
@@ -431,8 +448,8 @@ def _attribute(key: str, value: Any) -> Attribute:
 
 
 def _check_kind(path: str | os.PathLike[str]) -> None:
-    """Read the first two words: the library prints to the terminal, and names no
-    reason, where these are wrong.
+    """Refuse a file whose first two words are not those of a flat EXR file: for such a file the
+    library prints to the terminal and gives no reason.
     """
     try:
         with open(path, "rb") as stream:
@@ -441,8 +458,8 @@ def _check_kind(path: str | os.PathLike[str]) -> None:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot read {path}: {reason}; give an EXR file that exists") from error
     if len(start) < 8 or struct.unpack("<I", start[:4])[0] != 20000630:  # OpenEXR's magic number
-        what, way = next((what, way) for first, what, way in _OTHERS if start.startswith(first))
-        raise InputError(f"{Path(path)} is not an EXR file{what}; {way}")
+        kind, way = next((kind, way) for first, kind, way in _OTHERS if start.startswith(first))
+        raise InputError(f"{Path(path)} is not an EXR file{kind}; {way}")
     flags = struct.unpack("<I", start[4:])[0]
     if flags & 0x800:  # the bit of deep data
         raise InputError(f"{path} is a deep EXR file; save it flat")
@@ -462,8 +479,8 @@ def _system_errors() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep what OpenEXR's C code prints about a broken file off the terminal;
-    the exception says it once.
+    """Suppress the messages that OpenEXR's C code prints about a broken file: the exception says it
+    once.
     """
     with (
         open(os.devnull, "w") as sink,
@@ -481,12 +498,12 @@ def _quiet() -> Iterator[None]:
 
 
 def _image(
-    channels: dict[str, NDArray[Any]],
-    header: dict[str, Any],
+    channels: dict[str, Pixels],
+    header: Mapping[str, object],
     window: Window | None,
     notes: list[str],
 ) -> Image:
-    """Group channels into layers; note what is changed or left out."""
+    """Group channels into layers; note the channels that are changed or left out."""
     floats = {
         k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"
     }

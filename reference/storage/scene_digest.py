@@ -14,7 +14,6 @@ import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -24,9 +23,8 @@ from airlight.reference.storage.store import Content
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
-# Classes that `_beside` and their parameters describe in full. How a film filters and stores
-# pixels, and
-#: samplers, count for nothing: no estimator and no method uses them.
+#: Classes that `_beside` and their parameters describe in full. How a film filters and stores
+#: pixels, and samplers, count for nothing: no estimator and no method uses them.
 _WHOLE = {
     *("Scene", "PerspectiveCamera", "HDRFilm", "IndependentSampler", "BoxFilter", "GaussianFilter"),
     *("PointLight", "SpotLight", "DirectionalEmitter", "AreaLight", "ConstantBackgroundEmitter"),
@@ -47,9 +45,9 @@ class _UnknownError(Exception):
     """Raised for a value without bytes that stay the same in the next run."""
 
 
-def scene_digest(scene) -> str | None:
-    """Return a digest of a Mitsuba scene; None if it has properties that neither Mitsuba
-    nor its description tells.
+def scene_digest(scene: "mi.Scene") -> str | None:
+    """Return a digest of a scene; None if it has properties that neither Mitsuba nor a description
+    tells.
     """
     described = scene.id() if scene.id().startswith(_DESCRIPTION) else ""
     try:
@@ -61,15 +59,13 @@ def scene_digest(scene) -> str | None:
     return hashlib.sha256(f"{digest} {described}".encode()).hexdigest()
 
 
-def scene_content(scene) -> Content:
-    """Return a Mitsuba scene as an input of what is cached."""
+def scene_content(scene: "mi.Scene") -> Content:
+    """Return a scene as an input of results that are cached."""
     return Content(scene_digest(scene))
 
 
-def build_scene(description: Mapping[str, Any]) -> Any:
-    """Return the Mitsuba scene of a dictionary, as `mi.load_dict`, with the
-    digest of its description.
-    """
+def build_scene(description: Mapping[str, object]) -> "mi.Scene":
+    """Return the scene of a dictionary, as `mi.load_dict`, with the digest of its description."""
     scene = mi.load_dict(dict(description))
     if isinstance(scene, mi.Scene) and not is_whole(scene):
         config = mi.parser.ParserConfig(mi.variant())
@@ -77,14 +73,14 @@ def build_scene(description: Mapping[str, Any]) -> Any:
     return scene
 
 
-def give_description(scene, digest: str | None) -> None:
+def give_description(scene: "mi.Scene", digest: str | None) -> None:
     """Let a scene carry a digest of its description; None where it has none."""
     scene.set_id("" if digest is None else _DESCRIPTION + digest)
 
 
-def description_digest(state: Any) -> str | None:
-    """Return a digest of the nodes of a parsed scene and of the files that they name;
-    None if a value has none.
+def description_digest(state: "mi.parser.ParserState") -> str | None:
+    """Return a digest of the nodes of a parsed scene and of the files that they name; None if a
+    value has none.
 
     Call it before `mi.parser.instantiate`, which takes the nodes apart, with the
     file resolver of the scene.
@@ -95,8 +91,8 @@ def description_digest(state: Any) -> str | None:
             props = node.props
             digest.update(f"|{props.plugin_name()} {_ADDRESS.sub('', props.id())}".encode())
             for key in list(props.keys()):
-                # To read a property marks it as used, and Mitsuba warns of unused ones: the mark is
-                # put back.
+                # Mitsuba marks a property that is read as used, and warns of unused ones: the mark
+                # is set back.
                 queried = props.was_queried(key)
                 digest.update(f"|{key} {props.type(key)} ".encode() + _property_bytes(props[key]))
                 props.mark_queried(key, queried)
@@ -105,14 +101,12 @@ def description_digest(state: Any) -> str | None:
     return digest.hexdigest()
 
 
-def is_whole(scene) -> bool:
-    """Return whether Mitsuba tells every property of a scene, or of
-    another object, that is built.
-    """
+def is_whole(scene: "mi.Object") -> bool:
+    """Return whether Mitsuba tells every property of a scene, or of another object, that is built."""
     return {part.class_name() for part in mi.traverse(scene).hierarchy} <= _WHOLE
 
 
-def _built_digest(scene) -> str:
+def _built_digest(scene: "mi.Object") -> str:
     """Return a digest of all that Mitsuba tells of a scene, or of another object, that is built."""
     digest = hashlib.sha256()
     parameters = mi.traverse(scene)
@@ -126,8 +120,8 @@ def _built_digest(scene) -> str:
     return digest.hexdigest()
 
 
-def _beside(scene) -> Iterator[str]:
-    """Yield what decides the numbers but is no parameter: which way surfaces face,
+def _beside(scene: "mi.Scene") -> Iterator[str]:
+    """Yield the properties that decide the numbers and are no parameters: which way surfaces face,
     and which media are where.
     """
     for sensor in scene.sensors():
@@ -136,17 +130,18 @@ def _beside(scene) -> Iterator[str]:
         yield _medium_words(emitter.get_medium())
     for shape in scene.shapes():
         yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
-        yield f"inside {_medium_words(shape.interior_medium())}, outside {_medium_words(shape.exterior_medium())}"
+        inside, outside = shape.interior_medium(), shape.exterior_medium()
+        yield f"inside {_medium_words(inside)}, outside {_medium_words(outside)}"
 
 
-def _medium_words(medium: Any) -> str:
+def _medium_words(medium: "mi.Medium | None") -> str:
     if medium is None:
         return "no medium"
     sampling = f"{medium.has_spectral_extinction()} {medium.use_emitter_sampling()}"
     return f"{medium.id()} {sampling} {medium} {medium.phase_function()}"
 
 
-def _property_bytes(value: Any) -> bytes:
+def _property_bytes(value: object) -> bytes:
     """Return the bytes of a property of a node."""
     if isinstance(value, mi.Properties.ResolvedReference):
         return str(value.index()).encode()
@@ -160,7 +155,10 @@ def _property_bytes(value: Any) -> bytes:
         path = Path(str(mi.file_resolver().resolve(value)))
         return hashlib.sha256(path.read_bytes()).digest() if path.is_file() else value.encode()
     if isinstance(value, mi.Bitmap):
-        words = f"{value.pixel_format()} {value.component_format()} {value.srgb_gamma()} {value.premultiplied_alpha()}"
+        words = (
+            f"{value.pixel_format()} {value.component_format()} {value.srgb_gamma()} "
+            f"{value.premultiplied_alpha()}"
+        )
         return words.encode() + _value_bytes(np.array(value))
     if isinstance(value, mi.VolumeGrid):
         return _value_bytes(np.array(value))
@@ -172,15 +170,16 @@ def _property_bytes(value: Any) -> bytes:
     return _value_bytes(value)
 
 
-def _value_bytes(value: Any) -> bytes:
+def _value_bytes(value: object) -> bytes:
     """Return the bytes of a number, a word, an array, or a transform."""
     if isinstance(value, str):
         return value.encode()
-    # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its
-    # first channel six times.
-    matrix = value.matrix if "Transform" in type(value).__name__ else value
+    # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its first
+    # channel six times.
+    if "Transform" in type(value).__name__ and hasattr(value, "matrix"):
+        value = value.matrix
     try:
-        array = np.array(matrix, dtype=np.float64)
+        array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise _UnknownError from error
     return f"{array.shape} ".encode() + array.tobytes()

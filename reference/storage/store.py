@@ -5,8 +5,8 @@ A frozen record of inputs is the only key of a result: a digest of each of its f
 code that computes (`reference.storage.code`). No field can be left out, and a field without content
 that is the same in every process, such as a set, a function or an object of a library, is a
 TypeError. A record may hold another one: the key of a row holds that of its reference. Arguments
-that say how and not what (a progress, other processes, patience) go to the function that computes
-and are no fields.
+that change no value (a progress, other processes, patience) go to the function that computes and
+are no fields.
 
 The time of a result is the time to compute it from nothing: when a result is loaded, its original
 time is added to the time of the result that is being computed from it.
@@ -23,20 +23,22 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from airlight.analytic.clock import Spent, stopwatch
 from airlight.reference.storage.cache import (
+    Arrays,
     drop_arrays,
     drop_parts,
     is_stored,
@@ -52,6 +54,8 @@ _ABOUT = ("seconds", "processor", "made")  # what is stored beside the arrays of
 _DATA, _ARRAY = "data", "array number"
 
 T = TypeVar("T")
+#: what JSON can hold
+Json: TypeAlias = "bool | int | float | str | Sequence[Json] | Mapping[str, Json] | None"
 
 
 # --- keys -----------------------------------------------------------------------------------------
@@ -59,19 +63,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Content:
-    """A digest of something that is no number, word or array: a scene, a
-    file, code of the user's.
-    """
+    """A digest of an input that is no number, word or array: a scene, a file, the user's code."""
 
-    #: None where nobody can tell it from another: what depends on it is not cached
+    #: None if the input has none: then results that depend on it are not cached
     digest: str | None
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs of a result: a subclass has a field for each, and the result
-    is cached for these alone.
-    """
+    """The inputs of a result: a subclass has a field for each, and they alone are its key."""
 
     kind: ClassVar[str]  #: one or more words with dashes: names of files begin with it
     modules: ClassVar[tuple[str, ...]] = ()  #: that compute it, by default the module of the class
@@ -93,8 +93,8 @@ class _NoDigestError(Exception):
     """Raised for a `Content` without a digest."""
 
 
-def _encoded(value: Any) -> Any:
-    """Return an input as what JSON can hold, one text for one content."""
+def _encoded(value: object) -> Json:
+    """Return an input as JSON: equal inputs, and these alone, have equal texts."""
     if isinstance(value, Enum):
         return [type(value).__qualname__, value.name]
     if value is None or isinstance(value, bool | int | float | str):
@@ -104,11 +104,9 @@ def _encoded(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         # `Inputs` count with the code that computes their result, other records with their fields
         # alone.
-        code = (
-            [source_digest(*(value.modules or (type(value).__module__,)))]
-            if isinstance(value, Inputs)
-            else []
-        )
+        code: list[Json] = []
+        if isinstance(value, Inputs):
+            code = [source_digest(*(value.modules or (type(value).__module__,)))]
         return [
             type(value).__qualname__,
             *code,
@@ -157,7 +155,7 @@ class Kept(Generic[T]):
 def stored(
     inputs: Inputs,
     compute: Callable[[], T],
-    kind: Any,
+    kind: type[T],
     worth: Callable[[T], bool] = lambda value: True,
 ) -> Kept[T]:
     """Return the result of some inputs, from the cache or computed now and cached.
@@ -187,12 +185,10 @@ def keep(
     inputs: Inputs,
     value: T,
     spent: Spent,
-    kind: Any,
+    kind: type[T],
     worth: Callable[[T], bool] = lambda value: True,
 ) -> Kept[T]:
-    """Cache the result of some inputs that was computed, here or elsewhere, and return
-    it as it will be loaded.
-    """
+    """Cache a result that was computed, here or elsewhere, and return it as it will be loaded."""
     result = store(inputs.key if worth(value) else None, _packed(value), spent)
     # The whole is cached: parts of the work are not needed any more.
     if inputs.key is not None:
@@ -200,15 +196,15 @@ def keep(
     return _result(result, kind)
 
 
-def _result(kept: Kept[dict[str, Any]], kind: Any) -> Kept[Any]:
-    return Kept(_unpacked(kept.value, kind), kept.spent, kept.made, kept.loaded)
+def _result(packed: Kept[Arrays], kind: type[T]) -> Kept[T]:
+    return Kept(_unpacked(packed.value, kind), packed.spent, packed.made, packed.loaded)
 
 
-def _packed(value: Any) -> dict[str, Any]:
+def _packed(value: object) -> Arrays:
     """Return a value as arrays, one of them JSON."""
-    arrays: dict[str, Any] = {}
+    arrays: Arrays = {}
 
-    def plain(each: Any) -> Any:
+    def plain(each: object) -> Json:
         if isinstance(each, np.generic):
             return each.item()
         if not isinstance(each, np.ndarray):
@@ -221,7 +217,7 @@ def _packed(value: Any) -> dict[str, Any]:
     return {**arrays, _DATA: np.frombuffer(text.encode(), dtype=np.uint8)}
 
 
-def _unpacked(arrays: Mapping[str, Any], kind: Any) -> Any:
+def _unpacked(arrays: Arrays, kind: type[T]) -> T:
     """Return the value of a type that was packed."""
     text = np.asarray(arrays[_DATA]).tobytes()
     tree = json.loads(
@@ -233,15 +229,15 @@ def _unpacked(arrays: Mapping[str, Any], kind: Any) -> Any:
 # --- arrays under a key, None for none ------------------------------------------------------------
 
 
-def load(key: str | None) -> Kept[dict[str, Any]] | None:
-    """Return the arrays of a key; None if it is missing, damaged or, in a fresh
-    run, older than the run.
+def load(key: str | None) -> Kept[Arrays] | None:
+    """Return the arrays of a key; None if they are missing, damaged or, in a fresh run, older than
+    the run.
     """
     loading = stopwatch()
     arrays = load_arrays(key) if key is not None and is_kept(key) else None
     if arrays is None:
         return None
-    # Loading takes time itself, which counts already where time is measured: only the rest of the
+    # The time that loading takes counts already in the running measurement: only the rest of the
     # original time is added.
     seconds, processor, made = (float(arrays.pop(name)) for name in _ABOUT)
     spent = Spent(seconds, processor)
@@ -249,29 +245,23 @@ def load(key: str | None) -> Kept[dict[str, Any]] | None:
     return Kept(arrays, spent, made, True)
 
 
-def store(key: str | None, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict[str, Any]]:
-    """Cache arrays, and what they took; without a key they are returned alone."""
+def store(key: str | None, arrays: Mapping[str, ArrayLike], spent: Spent) -> Kept[Arrays]:
+    """Cache arrays, and the time that they took; without a key nothing is cached."""
     made = time.time()
     if key is not None:
-        store_arrays(
-            key,
-            {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made), strict=True))},
-        )
-    return Kept(dict(arrays), spent, made, False)
+        about = dict(zip(_ABOUT, (spent.seconds, spent.processor, made), strict=True))
+        store_arrays(key, {**arrays, **about})
+    return Kept({name: np.asarray(each) for name, each in arrays.items()}, spent, made, False)
 
 
 def is_kept(key: str | None) -> bool:
-    """Return whether there is a result under a key that `load` may return;
-    damage is not looked for.
-    """
+    """Return whether there is a result under a key that is not too old; it may be damaged."""
     about = None if key is None else load_arrays(key, ("made",))
     return about is not None and float(about["made"]) >= float(os.environ.get(_FRESH, 0))
 
 
 def is_damaged(key: str | None) -> bool:
-    """Return whether there is a file under a key that cannot be read, or
-    is not what was written.
-    """
+    """Return whether there is a file under a key that cannot be read, or was changed."""
     return key is not None and is_stored(key) and load_arrays(key) is None
 
 
@@ -303,7 +293,7 @@ _LEDGER: ContextVar[Ledger | None] = ContextVar("ledger", default=None)
 
 @contextmanager
 def counted() -> Iterator[Ledger]:
-    """Count, in a ledger, what the results take that are computed and loaded in the block."""
+    """Count in a ledger the times of the results that are computed or loaded in the block."""
     outer, ledger = _LEDGER.get(), Ledger()
     token = _LEDGER.set(ledger)
     try:
@@ -316,9 +306,7 @@ def counted() -> Iterator[Ledger]:
 
 
 def add_spent(spent: Spent) -> None:
-    """Count what another process spent, or what it once took to compute
-    a result that was loaded.
-    """
+    """Count the time that another process spent, or the original time of a loaded result."""
     ledger = _LEDGER.get()
     if ledger is not None:
         ledger.loaded += spent
@@ -326,10 +314,8 @@ def add_spent(spent: Spent) -> None:
 
 @contextmanager
 def fresh_results(since: float | None) -> Iterator[None]:
-    """Within the block, results older than `since` [s since 1970] count as
-    missing; None changes nothing.
-
-    Processes that start in the block do the same.
+    """Let results older than `since` [s since 1970] count as missing within the block, also in
+    processes that start there; None changes nothing.
     """
     before = os.environ.get(_FRESH)
     if since is not None:

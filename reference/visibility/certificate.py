@@ -11,7 +11,6 @@ largest effect goes into the error of the image.
 
 import hashlib
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -34,10 +33,10 @@ class RandomChecks:
     """How often fresh random shadow rays contradicted lit intervals."""
 
     checked: int = 0  #: shadow rays cast
-    #: of these, how many contradicted the intervals further from an edge than rounding
+    #: shadow rays that contradicted the intervals further from an edge than rounding
     disagreements: int = 0
     refined: int = 0  #: disagreements that were settled by testing every shape in float64
-    left: int = 0  #: disagreements that were not
+    left: int = 0  #: disagreements that remain undecided
     missed: float = 0.0  #: fraction of the shadow rays that contradicted the intervals
 
     @staticmethod
@@ -63,8 +62,8 @@ class LitIntervals:
     #: relative uncertainty of the distance of an edge from its light, or of coordinates
     edge: float = EXACT_EDGE
     random_checks: RandomChecks = field(default_factory=RandomChecks)
-    #: what was left in doubt: rays, and what part of each, an angle at the
-    #: light [rad] or a length [m]
+    #: undecided parts of rays: numbers of the rays, and sizes of the parts, angles at the light [rad]
+    #: or lengths [m]
     doubt: tuple[Index, Array] = field(default_factory=lambda: (np.empty(0, np.int64), np.empty(0)))
 
 
@@ -73,7 +72,7 @@ def certified(
     rays: Rays,
     ends: tuple[Array, Array],
     *,
-    occluders: Any,
+    occluders: "mi.Scene",
     shapes: Shapes,
     checks: int,
     every: int = 1,
@@ -81,12 +80,14 @@ def certified(
 ) -> LitIntervals:
     """Check lit intervals at random places.
 
-    `lit`, `rays`: the intervals, and the rays in their planes with the light; `ends`: between which
-    distances the rays were looked at, (rays,) each [m]; `occluders`, `shapes`: what stands in the
-    light: as an `mi.Scene`, and as numbers; `checks`, `every`: shadow rays to each of every so many
-    rays: an odd number steps through all samples of a light; `normal`: of the surface of the light
-    at each position, unit, (rays, 3); None for lights that are points.
+    `lit`, `rays`: the intervals, and the rays in their planes with the light; `ends`: distances
+    between which the intervals were searched, (rays,) each [m]; `occluders`, `shapes`: the shapes
+    that can stand in the light, for ray casts and as numbers; `checks`: shadow rays to each checked
+    ray; `every`: each so many rays one is checked: an odd number steps through all samples of a
+    light; `normal`: of the surface of the light at each position, unit, (rays, 3); None for lights
+    that are points.
     """
+    # The rays to check.
     ray = np.arange(0, len(rays.foot), every)
     ray = ray[ends[1][ray] > ends[0][ray]]
     if not len(ray) or not shapes.count:
@@ -100,15 +101,15 @@ def certified(
     ray, fraction = np.repeat(ray, checks), fraction.ravel()
     at = low[ray] + fraction * (high - low)[ray]
     x = at if rays.w == 0 else rays.distance(at, ray)
-    # A light on the line of a ray sees all of it under one angle, whose distance is infinite: such
-    # a ray is not checked.
+    # From a light on its line a ray has one angle at all its points, and the distance at this angle
+    # is infinite: such a ray is not checked.
     finite = np.isfinite(x)
     ray, fraction, x = ray[finite], fraction[finite], x[finite]
     if not len(ray):
         return lit
     # Ends and places as fractions of the checked range. The number 2 ray + fraction orders the
-    # places of all rays at once: the last interval that begins before a place, and the next one,
-    # are the only ones that can hold the place or have an edge beside it.
+    # places of all rays at once. Only the last interval that begins before a place, and the next
+    # interval, can hold the place or have the edge that is nearest to it.
     width = np.where(high > low, high - low, 1.0)
     begin, end = (
         np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1)
@@ -116,8 +117,8 @@ def certified(
     )
     number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + fraction, side="right")
     count = len(lit.ray)
-    # Whether the intervals say that the place is lit, and how far the nearest edge, or the end of
-    # the range, is from it.
+    # Whether the place is lit by the intervals, and the gap between the place and the nearest edge
+    # or end of the range.
     expected, gap = np.zeros(len(ray), bool), np.minimum(fraction, 1 - fraction)
     for offset in (-1, 0):
         k = np.clip(number + offset, 0, max(count - 1, 0))
@@ -131,8 +132,8 @@ def certified(
     # light or in coordinates, they decide nothing.
     rounding = 1e-5 * (1.0 if rays.w else coordinates(rays, shapes))
     start, target = _segments(rays, ray, x, shapes)
-    # A shadow ray starts off the surface of an area light by 1e-5 of the largest coordinate, clear
-    # of float32 shapes in its plane.
+    # A shadow ray starts 1e-5 of the largest coordinate before the surface of an area light, clear
+    # of float32 shapes in that surface.
     clear = (
         start
         if normal is None
@@ -158,16 +159,18 @@ def certified(
 
 
 def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
-    """Return in what random places are even: angles at a light at a place, or distances."""
+    """Return the measure in which random places are even: the angle at a light at a place, the
+    distance under a directional light.
+    """
     return rays.theta(x, ray) if rays.w else x
 
 
 def coordinates(rays: Rays, shapes: Shapes) -> Array:
-    """Return the effect of the relative uncertainty of coordinates on each ray, by edges
-    of shadows, (rays,) [m].
+    """Return how far a relative uncertainty of 1 of coordinates moves edges of shadows along each
+    ray under a directional light, (rays,) [m].
 
-    That is, under a directional light: the largest distance between the camera and what is on
-    shadow segments, over the sine.
+    It is the largest distance between the camera and a point of a shadow segment, over the sine of
+    the angle between ray and light.
     """
     return _reach(rays, shapes) / rays.height
 
@@ -188,8 +191,8 @@ def _box(centre: Array, radius: Array) -> Array:
 
 
 def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, Array]:
-    """Return both ends of shadow segments: at the light, or beyond all
-    shapes, and at points of rays.
+    """Return both ends of shadow segments: at the light, or beyond all shapes, and at points of
+    rays, (segments, 3) each [m].
     """
     target = rays.point(ray, x)
     if rays.w:
@@ -199,7 +202,7 @@ def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, 
     return target + reach[:, None] * rays.position[ray], target
 
 
-def _cast(occluders: Any, start: Array, target: Array) -> Bools:
+def _cast(occluders: "mi.Scene", start: Array, target: Array) -> Bools:
     """Return which segments nothing blocks, by Mitsuba."""
     parts = [np.empty(0, bool)]
     step = 1 << 22  # rays cast at once
@@ -216,10 +219,9 @@ def _cast(occluders: Any, start: Array, target: Array) -> Bools:
 
 
 def _generator(*drawn_for: Array) -> np.random.Generator:
-    """Return a generator whose seed is the digest of what numbers are drawn for.
+    """Return a generator whose seed is a digest of some arrays.
 
-    Rays, lights and scenes are then checked at places of their own, and at
-    the same ones in every run.
+    Other rays are then checked at other places, and the same rays at the same places in every run.
     """
     digest = hashlib.blake2b(digest_size=16)
     for array in drawn_for:
@@ -234,6 +236,7 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     """
     way = end - start
     blocked = np.zeros(len(start), dtype=bool)
+    # Triangles, one segment after the other.
     corner = shapes.triangles[:, 0]
     edges = shapes.triangles[:, 1] - corner, shapes.triangles[:, 2] - corner
     # Spheres about the first corners: a triangle whose sphere the line misses cannot be met.
@@ -254,8 +257,8 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     for centre, radius in zip(shapes.centre, shapes.radius, strict=True):
         blocked |= _meets_sphere(start - centre, way, radius)
     disks = shapes.disks
-    # Where the segment meets the plane of a disk; a segment in parallel to it gives s infinite or
-    # NaN, and meets nothing.
+    # Where the segment meets the plane of a disk. For a segment parallel to the plane s is infinite
+    # or NaN, and the segment meets nothing.
     for centre, normal, radius in zip(disks.centre, disks.normal, disks.radius, strict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             s = ((centre - start) @ normal) / (way @ normal)
@@ -294,22 +297,27 @@ def _meets_sphere(from_centre: Array, way: Array, radius: float) -> Bools:
 
 
 def reached_by_shadow_rays(
-    interaction: Any, light: Array, reached: Bools, *, scene: Any, shapes: Shapes
+    interaction: "mi.SurfaceInteraction3f",
+    light: Array,
+    reached: Bools,
+    *,
+    scene: "mi.Scene",
+    shapes: Shapes,
 ) -> Bools:
     """Return which surfaces a light reaches from where Mitsuba starts its shadow rays.
 
     A shadow ray must not hit the surface that it leaves, so `SurfaceInteraction.spawn_ray_to`
     starts it some way off the surface, along its normal: in single precision 1e-4 (1 + the largest
-    coordinate) (Mitsuba 3.9, `offset_p` in `include/mitsuba/render/interaction.h`). A point whose
-    own shadow ray just clears an edge may then lie in the shadow, and the other way round: shadow
-    edges move by about that length, and a renderer that starts its rays so converges to the moved
-    edges, as it does to the shortened segment of `reference.scene.shadow_epsilon`. Where Mitsuba's
-    ray and the exact lit intervals differ, the judge decides by the ray from Mitsuba's start: so a
-    fault of the lit intervals is still found by the comparison.
+    coordinate) (Mitsuba 3.9, `offset_p` in `include/mitsuba/render/interaction.h`). A point that an
+    edge just does not shadow may then be in the shadow, and the other way round: shadow edges move
+    by about that length. A renderer that starts its rays so converges to the moved edges, as it
+    does to the shortened segment of `reference.scene.shadow_epsilon`. Where Mitsuba's ray and the
+    exact lit intervals differ, the float64 test decides by the segment from Mitsuba's start.
+    Therefore the comparison still finds a fault of the lit intervals.
 
-    `interaction`: Mitsuba's surface interactions, one for each ray; `light`: position of the light
+    `interaction`: where rays meet surfaces, one entry for each ray; `light`: position of the light
     (3,) [m]; `reached`: whether it reaches the surface points themselves, by exact geometry,
-    (rays,); `scene`, `shapes`: the `mi.Scene` of the occluders, and the same as numbers.
+    (rays,); `scene`, `shapes`: the occluders, for ray casts and as numbers.
     """
     ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
     valid = np.array(interaction.is_valid(), dtype=bool)

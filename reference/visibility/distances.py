@@ -5,8 +5,6 @@ and to the visible surface.
 The visible surface is the triangle or sphere that a ray cast in float32 has met.
 """
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -40,8 +38,8 @@ def crossed_facets(
     """Return the facets at which rays enter and leave a polyhedron, and the
     distances, as `crossings` does.
 
-    `bounds`: the polyhedron; `origin`, `direction`: as in `crossings`. Returns `entered`, `left`:
-    numbers of the facets, (n,) each. Returns `enter`, `leave`: distances along the whole straight
+    `bounds`: the polyhedron; `origin`, `direction`: as in `crossings`. Returns the numbers of the
+    facets at which lines enter and leave, (n,) each, and the distances along the whole straight
     line, (n,) each [m]; leave <= enter where it misses the polyhedron.
     """
     origin = np.atleast_2d(origin)
@@ -68,8 +66,8 @@ def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
     """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power,
     +-inf where they miss it [m].
 
-    The smaller root in size is taken from the product of both, which is the power,
-    so that nothing cancels.
+    The product of both roots is the power: the root of smaller size is the power over the other
+    root, without cancellation.
 
     `along`: direction . (centre - origin), (n,) [m], for a unit direction. `power`: |centre -
     origin|^2 - radius^2, the power of the origin, (n,) or a scalar [m^2]. Returns `low`, `high`:
@@ -100,13 +98,16 @@ def half_chord(radius: Array | float, distance: Array) -> Array:
 
 
 def exact_distance(
-    reference: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None
+    reference: ReferenceScene,
+    interaction: "mi.SurfaceInteraction3f",
+    distance: Array,
+    shapes: Shapes | None = None,
 ) -> Array:
-    """Return the distances to the visible surface again in float64, where that is flat or a sphere.
+    """Return the distances to visible surfaces that are flat or spheres again, in float64.
 
-    `reference`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface
-    interactions: which triangle each ray met; `distance`: the distances that were found, (rays,),
-    infinite where nothing is hit [m]; `shapes`: what `read_shapes` returned, if known.
+    `reference`: the scene, whose rays were cast; `interaction`: where they meet surfaces, with the
+    triangle that each ray met; `distance`: the distances that were cast, (rays,), infinite where
+    nothing is hit [m]; `shapes`: the result of `read_shapes`, by default read here.
 
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on
     triangles seen edge-on, the distance stays what it was. It also stays on spheres that a ray
@@ -120,36 +121,27 @@ def exact_distance(
         # Mitsuba tells the shape of a hit by a pointer, whose bits are its number.
         number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
         # The rays that have met this shape.
-        mine = np.flatnonzero(hit & (shape_of_hit == number))
-        if not len(mine):
+        ray = np.flatnonzero(hit & (shape_of_hit == number))
+        if not len(ray):
             continue
+        direction, cast = reference.direction[ray], distance[ray]
         if isinstance(part, Sphere):
-            refined[mine] = _to_sphere(
-                part, reference.origin, reference.direction[mine], distance[mine]
-            )
-            continue
-        if isinstance(part, Disks):
-            refined[mine] = _along(
-                part.centre - reference.origin,
-                part.normal,
-                reference.direction[mine],
-                distance[mine],
-            )
-            continue
-        # A rectangle counts as one primitive; both its triangles lie in one plane.
-        number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
-        refined[mine] = to_plane(
-            part[number_in_shape] - reference.origin, reference.direction[mine], distance[mine]
-        )
+            refined[ray] = _to_sphere(part, reference.origin, direction, cast)
+        elif isinstance(part, Disks):
+            refined[ray] = _along(part.centre - reference.origin, part.normal, direction, cast)
+        else:
+            # A rectangle counts as one primitive; both its triangles lie in one plane.
+            triangle = part[0 * ray if is_rectangle(shape) else primitive[ray]]
+            refined[ray] = to_plane(triangle - reference.origin, direction, cast)
     return refined
 
 
 def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
-    """Return how far rays from the origin go to the planes of triangles, (rays, 3, 3) [m];
-    where they graze, as given.
+    """Return how far rays go to the planes of triangles, (rays,) [m]; for rays that graze them the
+    given distance.
 
-    `corner`: from where rays start; `direction`: unit vectors, (rays, 3); `distance`: as
-    it was cast, (rays,) [m].
+    `corner`: of the triangles, from the origin of the rays, (rays, 3, 3) [m]; `direction`: unit
+    vectors, (rays, 3); `distance`: as it was cast, (rays,) [m].
     """
     return _along(
         corner[:, 0],
@@ -162,8 +154,8 @@ def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
 def _along(place: Array, normal: Array, direction: Array, distance: Array) -> Array:
     """Return how far rays go to planes through places."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        # A grazing ray divides two small numbers: a result further than 1e-4 from the cast distance
-        # is not taken.
+        # For a grazing ray this is the quotient of two small numbers: a result further than 1e-4
+        # from the cast distance is not taken.
         exact = np.sum(normal * place, axis=1) / np.sum(normal * direction, axis=1)
     return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
 

@@ -4,8 +4,8 @@ checked by random shadow rays.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,10 +34,10 @@ _END = 1e-6
 class Obstacles:
     """The possible occluders of a light, and the rays that they are near."""
 
-    scene: Any  #: an `mi.Scene` of the shapes
-    shapes: Shapes
+    scene: "mi.Scene"  #: the shapes, for ray casts
+    shapes: Shapes  #: the same as numbers
     near: Near
-    light: Ball  #: what holds the light
+    light: Ball  #: the bounds of the light
 
 
 def obstacles(
@@ -45,9 +45,9 @@ def obstacles(
 ) -> Obstacles:
     """Return the possible occluders between a light and the rays of a scene.
 
-    `reference`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,),
-    may be infinite [m]; `shapes`: what `reference.scene.shapes.read_shapes` returned for its
-    occluders, if known.
+    `reference`: the scene; `light`: the bounds of the light; `distance`: how far the rays of the
+    scene go, (rays,), may be infinite [m]; `shapes`: the result of
+    `reference.scene.shapes.read_shapes` for its occluders, by default read here.
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     near = near_shapes(light, reference.origin, reference.direction, distance, shapes)
@@ -62,9 +62,10 @@ def before_light(
     `reference`, `light`: the scene and one of its area lights.
 
     A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides
-    itself: a light's own shape therefore never shadows it, nor do shapes in or behind the plane of
-    a rectangle or a disk. They are left out: in float64 a shape in the plane would be in front of
-    it or behind it by chance. Another mesh stays, a hair behind where its light starts.
+    itself: the shape of such a light never shadows its light, nor do shapes in or behind the plane
+    of a rectangle or a disk. They are left out: in float64 a shape in the plane would be before or
+    behind it by chance. The shape of a mesh that is not convex stays, a hair behind the triangles
+    that emit.
     """
     shapes = reference.occluders.shapes()
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
@@ -86,7 +87,7 @@ def before_light(
 def lit_intervals(
     rays: Rays,
     ends: tuple[Array, Array],
-    known: Obstacles,
+    occluders: Obstacles,
     *,
     of: Index | None = None,
     checks: int = 32,
@@ -96,43 +97,47 @@ def lit_intervals(
     """Find the lit intervals of rays between two distances, and have them checked.
 
     `rays`: the rays in their planes with the light, or with samples of it; `ends`: distances
-    between which a ray is looked at, (rays,) each [m]; the second may be infinite; `known`: what
-    can stand in the light; `of`: by ray its number in `known`, (rays,); by default its own;
-    `checks`, `every`, `normal`: see `reference.visibility.certificate.certified`; no checks if 0.
+    between which intervals are searched, (rays,) each [m]; the second may be infinite; `occluders`:
+    the shapes that can stand in the light; `of`: by ray its number in `occluders`, (rays,); by
+    default the number of the ray; `checks`, `every`, `normal`: see
+    `reference.visibility.certificate.certified`; no checks if `checks` is 0.
 
     Valid for opaque meshes, rectangles, spheres and disks, wherever they are.
     """
     of = np.arange(len(rays.foot)) if of is None else of
     # A sphere around the light shows only its inside; all other shapes cast shadows.
-    low, high = _inside(rays, ends, known)
-    ray, x0, x1 = lit_parts(rays, (low, high), known.near, known.shapes, of)
+    low, high = _inside(rays, ends, occluders)
+    ray, x0, x1 = lit_parts(rays, (low, high), occluders.near, occluders.shapes, of)
     # An end of a lit interval is an edge between light and shadow unless it is an end of the range.
     inner = x0 > ends[0][ray] + _END * (1 + np.abs(x0)), x1 * (1 + _END) + _END < ends[1][ray]
     transitions = int(inner[0].sum() + inner[1].sum())
     lit = LitIntervals(ray, x0, x1, transitions)
     # Without shapes no edge is uncertain.
-    if not known.shapes.count:
+    if not occluders.shapes.count:
         lit = replace(lit, edge=0.0)
     if not checks:
         return lit
-    how = {
-        "occluders": known.scene,
-        "shapes": known.shapes,
-        "checks": checks,
-        "every": every,
-        "normal": normal,
-    }
-    return certified(lit, rays, ends, **how)
+    return certified(
+        lit,
+        rays,
+        ends,
+        occluders=occluders.scene,
+        shapes=occluders.shapes,
+        checks=checks,
+        every=every,
+        normal=normal,
+    )
 
 
-def _inside(rays: Rays, ends: tuple[Array, Array], known: Obstacles) -> tuple[Array, Array]:
-    """Cut the ends to what spheres that hold the light leave: what lies inside of them."""
+def _inside(rays: Rays, ends: tuple[Array, Array], occluders: Obstacles) -> tuple[Array, Array]:
+    """Return the ends of the parts of rays that lie inside of all spheres that hold the light."""
     low, high = ends
     if not rays.w:
         return low, high
-    for centre, radius in zip(known.shapes.centre, known.shapes.radius, strict=True):
+    light = occluders.light
+    for centre, radius in zip(occluders.shapes.centre, occluders.shapes.radius, strict=True):
         # A sphere that holds no part of the light's ball holds none of its samples.
-        if np.linalg.norm(centre - known.light.centre) >= radius + known.light.radius:
+        if np.linalg.norm(centre - light.centre) >= radius + light.radius:
             continue
         within = np.linalg.norm(rays.position - centre, axis=1) < radius
         enter, leave = crossings(Sphere(centre, float(radius)), rays.origin, rays.direction)

@@ -27,7 +27,7 @@ b / m), nothing if m < cos b: no nappes, no cases. (`realtime.rays` solves a qua
 the distance instead.)
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,11 +52,15 @@ class Rays:
     height: Array  #: y_P: distance from the ray [m], or the sine, (n,)
     w: int = 1  #: 1: p is a place, 0: a direction
 
-    def __getitem__(self, rows) -> "Rays":
-        changed = {f.name: getattr(self, f.name) for f in fields(self)}
-        same = ("origin", "w") if self.origin.ndim == 1 else ("w",)
+    def __getitem__(self, rows: Index | NDArray[np.bool_] | slice) -> "Rays":
         return Rays(
-            **{name: part if name in same else part[rows] for name, part in changed.items()}
+            self.origin if self.origin.ndim == 1 else self.origin[rows],
+            self.direction[rows],
+            self.position[rows],
+            self.normal[rows],
+            self.foot[rows],
+            self.height[rows],
+            self.w,
         )
 
     def point(self, ray: Index, x: Array) -> Array:
@@ -107,9 +111,9 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
 def cone_interval(rays: Rays, light: ReferenceLight, angle: float) -> tuple[Array, Array]:
     """Return the interval of theta inside a cone about the light's axis.
 
-    `rays`, `light`: the rays in their planes with the light; for a point light the interval is that
-    of the whole line; `angle`: half angle of the cone [rad]. Returns `low`, `high`: (rays,) each
-    [rad]; low > high where the ray misses the cone.
+    `rays`, `light`: the rays in their planes with the light; for a light without an axis the
+    interval is the whole line; `angle`: half angle of the cone [rad]. Returns `low`, `high`:
+    (rays,) each [rad]; low > high where the ray misses the cone.
     """
     if light.axis is None:
         half_pi = np.full(len(rays.foot), 0.5 * np.pi)

@@ -329,8 +329,8 @@ def _clear_segment(function, *arguments, **named):
 #: round, whatever the light.
 _BRIGHT_CAMERA_SEGMENT = Rewrite(
     _ESTIMATOR,
-    "part.kept(sample.x, a_, b_, c_, d_, e_)",
-    "part.kept(part.start, a_, b_, c_, d_, e_)",
+    "part.transmittance(sample.x, a_, b_, c_, d_, e_)",
+    "part.transmittance(part.start, a_, b_, c_, d_, e_)",
 )
 _TRACED_BACKWARD = Rewrite(
     _ESTIMATOR,
@@ -568,8 +568,8 @@ _TRACED_FOG = _all(
         ),
         "traced-surface-bright-camera-segment": Rewrite(
             _ESTIMATOR,
-            "part.kept(x, hit, a_, b_, c_, d_)",
-            "part.kept(part.start, hit, a_, b_, c_, d_)",
+            "part.transmittance(x, hit, a_, b_, c_, d_)",
+            "part.transmittance(part.start, hit, a_, b_, c_, d_)",
         ),
     },
 )

@@ -63,7 +63,8 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         leaves = (np.array(si.n, dtype=np.float64).T[hit] * way).sum(axis=1) > 0
         opaque = np.ones(len(active), dtype=bool)
         # A face seen from inside ends a stretch in its cloud, one seen from outside a stretch in
-        # vacuum. Before an opaque surface the medium is the one that the last crossing named.
+        # vacuum. A stretch that ends at an opaque surface is in the medium that the last crossing
+        # named.
         within = inside[active]
         for number, cloud in enumerate(clouds.clouds):
             on = (shape == np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(cloud.shape))))[hit]

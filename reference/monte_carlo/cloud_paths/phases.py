@@ -6,7 +6,7 @@ Both work with down = sin^2(angle/2), which two unit vectors give without cancel
 Values have the mean 1 over the sphere, so down is distributed with the density p on [0, 1].
 """
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -22,10 +22,10 @@ Array = NDArray[np.float64]
 class WalkPhase(Protocol):
     """A phase function."""
 
-    def value(self, down, up) -> Any:
+    def value(self, down: "mi.Float", up: "mi.Float") -> "mi.Float":
         """Return p at sin^2 and cos^2 of half the scattering angle."""
 
-    def down(self, sampler, active) -> Any:
+    def down(self, sampler: "mi.Sampler", active: "mi.Bool") -> "mi.Float":
         """Return sin^2 of half a random scattering angle."""
 
 
@@ -39,14 +39,14 @@ class HenyeyGreenstein:
     def __init__(self, g: float):
         self._g = g
 
-    def value(self, down, up):
-        """Return p."""
+    def value(self, down: "mi.Float", up: "mi.Float") -> "mi.Float":
+        """Return p, as `WalkPhase` says."""
         g = self._g
         # 1 + g^2 - 2 g cos from sin^2 or cos^2 of half the angle: the sum has no negative term.
         base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
         return (1 - g * g) * dr.rsqrt(base) / base
 
-    def down(self, sampler, active):
+    def down(self, sampler: "mi.Sampler", active: "mi.Bool") -> "mi.Float":
         """Return sin^2 of half a random scattering angle."""
         g, u = self._g, sampler.next_1d(active)
         below = dr.rcp(1 - g + 2 * g * u)
@@ -56,11 +56,11 @@ class HenyeyGreenstein:
 class Rayleigh:
     """Rayleigh's function; its cosines by Cardano's formula."""
 
-    def value(self, down, up):
-        """Return p."""
+    def value(self, down: "mi.Float", up: "mi.Float") -> "mi.Float":
+        """Return p, as `WalkPhase` says."""
         return 0.75 + 0.75 * dr.square(up - down)
 
-    def down(self, sampler, active):
+    def down(self, sampler: "mi.Sampler", active: "mi.Bool") -> "mi.Float":
         """Return sin^2 of half a random scattering angle."""
         # The distribution of the cosine c is a cubic: c^3 + 3 c = 2 z for z uniform in [-2, 2].
         z = 4 * sampler.next_1d(active) - 2
@@ -83,8 +83,8 @@ class Tabulated:
         fraction, other = _aliases(0.5 * (values[1:] + values[:-1]))
         self._fraction, self._other = mi.Float(fraction), mi.UInt32(other)
 
-    def value(self, down, up):
-        """Return p."""
+    def value(self, down: "mi.Float", up: "mi.Float") -> "mi.Float":
+        """Return p, as `WalkPhase` says."""
         place = up * self._last
         cell = dr.clip(mi.Int32(place), 0, self._last - 1)
         low, high = (
@@ -93,10 +93,10 @@ class Tabulated:
         )
         return dr.lerp(low, high, place - cell)
 
-    def down(self, sampler, active):
+    def down(self, sampler: "mi.Sampler", active: "mi.Bool") -> "mi.Float":
         """Return sin^2 of half a random scattering angle."""
         number = dr.minimum(mi.UInt32(sampler.next_1d(active) * self._last), self._last - 1)
-        # The alias method: a cell keeps a fraction of its draws, the others go to its alias.
+        # The alias method: a fraction of the draws of a cell stays with it, the rest go to its alias.
         stays = sampler.next_1d(active) < dr.gather(mi.Float, self._fraction, number, active)
         cell = dr.select(stays, number, dr.gather(mi.UInt32, self._other, number, active))
         low = dr.gather(mi.Float, self._values, cell, active)
@@ -118,7 +118,7 @@ def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
     other = np.arange(count, dtype=np.uint32)
     small, large = list(np.flatnonzero(fraction < 1)), list(np.flatnonzero(fraction >= 1))
     while small and large:
-        # A cell below the mean is filled up by one above it, whose rest may then be below the mean.
+        # A cell below the mean is filled up from a cell above it, which may then be below the mean.
         low, high = small.pop(), large[-1]
         other[low] = high
         fraction[high] -= 1 - fraction[low]

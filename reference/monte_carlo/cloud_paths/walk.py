@@ -23,17 +23,17 @@ absorption or by dark surfaces, the path goes on with a probability in proportio
 unbiased). A shadow ray that leaves a cloud with less than 1/8 of its light likewise goes on with 8
 times that fraction as its probability.
 
-The end of a stretch tells its medium: before a face of a cloud seen from inside, the cloud; before
-a face seen from outside, or nothing, vacuum; before an opaque surface, the medium where the path
-was last. A crossing that rounding doubles or hides therefore does no harm beyond the next face.
-After a crossing a ray starts a little further on; this gap is added to the length of its next
-stretch.
+The end of a stretch names its medium. A stretch that ends at a face of a cloud seen from inside is
+in the cloud. One that ends at a face seen from outside, or has no end, is in vacuum. One that ends
+at an opaque surface is in the medium that the last crossing named. A crossing that rounding doubles
+or hides therefore does no harm beyond the next face. After a crossing a ray starts a little further
+on; this gap is added to the length of its next stretch.
 
 A cloud with a density has its largest extinction for `sigma_t`, and the fraction rho of it at each
-place. Flights go as if it had the largest everywhere, and where one ends it is scattered with the
-probability rho, otherwise it flies on (delta tracking, Woodcock 1965). A shadow ray has such
-flights too, and goes on with the factor 1 - rho where one ends (ratio tracking, Novak, Selle,
-Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
+place. Flights go as if the extinction was the largest everywhere; where a flight ends, the path is
+scattered with the probability rho, and otherwise flies on (delta tracking, Woodcock 1965). A shadow
+ray has such flights too, and goes on with the factor 1 - rho where one ends (ratio tracking, Novak,
+Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
 
 A lane of the loop follows the samples of one pixel one after another, so that lanes end
 at nearly the same time.
@@ -41,7 +41,6 @@ at nearly the same time.
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -61,8 +60,8 @@ class Targets:
     from there to the eye.
     """
 
-    #: layer of each order from 0 on, UInt32; the last entry stands for all further orders
-    by_order: Any
+    #: layer of each order from 0 on; the last entry stands for all further orders
+    by_order: "mi.UInt32"
     orders: int  #: how many layers of orders there are
 
     @property
@@ -70,9 +69,9 @@ class Targets:
         """How many layers there are."""
         return self.orders + 3
 
-    def layer(self, order, met, straight):
-        """Return the layer of light of an order, that `met` a surface or not, and
-        came straight from there.
+    def layer(self, order: "mi.UInt32", met: "mi.Bool", straight: "mi.Bool") -> "mi.UInt32":
+        """Return the layer of light of an order; `met`: whether it met a surface, `straight`:
+        whether it was not scattered either.
         """
         of_order = dr.gather(
             mi.UInt32, self.by_order, dr.minimum(order, dr.width(self.by_order) - 1)
@@ -85,33 +84,42 @@ class Targets:
 class Paths:
     """The state of a lane's path."""
 
-    mode: Any  #: what its ray is
-    o: Any  #: where the ray starts [m]
-    d: Any  #: its direction
-    gap: Any  #: how far past the last crossing it starts [m]
-    depth: Any  #: optical length that is left of a flight, or that a shadow ray has passed
-    medium: Any  #: where the ray starts, for stretches that end at an opaque surface
-    x: Any  #: the last place of scattering or reflection [m]
-    w: Any  #: direction in which the path came there, or leaves a surface
-    cloud: Any  #: medium of that place
-    weight: Any  #: of the path, a colour
-    order: Any  #: how many times it was scattered
-    bounces: Any  #: how many surfaces it met
-    fraction: Any  #: of the sun's light at the end of this flight that counts
-    value: Any  #: light at the start of a shadow ray
-    target: Any  #: its layer
-    left: Any  #: paths to follow, this one among them
-    casts: Any  #: rays cast
+    mode: "mi.UInt32"  #: what its ray is, `MAIN` to `SURFACE_SHADOW`
+    o: "mi.Point3f"  #: where the ray starts [m]
+    d: "mi.Vector3f"  #: its unit direction
+    gap: "mi.Float"  #: how far past the last crossing it starts [m]
+    #: optical length that remains of a flight, or that a shadow ray has passed
+    depth: "mi.Float"
+    #: number of the medium where the ray starts, for stretches that end at an opaque surface
+    medium: "mi.UInt32"
+    x: "mi.Point3f"  #: the last place of scattering or reflection [m]
+    w: "mi.Vector3f"  #: unit direction in which the path came there, or leaves a surface
+    cloud: "mi.UInt32"  #: number of the medium of that place
+    weight: "mi.Color3f"  #: of the path
+    order: "mi.UInt32"  #: how many times it was scattered
+    bounces: "mi.UInt32"  #: how many surfaces it met
+    fraction: "mi.Float"  #: of the sun's light that counts at the end of this flight
+    value: "mi.Color3f"  #: radiance at the start of a shadow ray [W/(m^2 sr)]
+    target: "mi.UInt32"  #: the layer to which this radiance goes
+    remaining: "mi.UInt32"  #: how many paths the lane has to follow, this one among them
+    casts: "mi.UInt32"  #: how many rays were cast
 
 
-def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, side: float):
-    """Return the sums over samples, (layers x lanes) for each channel, and how
-    many rays each lane cast.
+def walk(
+    scene: WalkScene,
+    targets: Targets,
+    sampler: "mi.Sampler",
+    rays: "mi.Ray3f",
+    *,
+    samples: int,
+    side: float,
+) -> "tuple[list[mi.Float], mi.UInt32]":
+    """Return the sums over samples, (layers x lanes) for each channel, and how many rays each lane
+    cast.
 
-    `scene`: what the walk reads; `targets`: where light goes; `sampler`: seeded, as wide as there
-    are lanes; `rays`: where paths start from the eye's side and their unit directions, one a lane,
-    as Mitsuba's rays; `samples`: how many paths each lane follows; `side`: probability of a side
-    flight, 0 to 1.
+    `scene`: the scene as tables; `targets`: the layer of each order; `sampler`: seeded, as wide as
+    there are lanes; `rays`: where paths start at the eye, and their unit directions, one a lane;
+    `samples`: how many paths each lane follows; `side`: probability of a side flight, 0 to 1.
     """
     lanes = dr.width(rays.d)
     sums = [dr.zeros(mi.Float, targets.count * lanes) for _ in range(3)]
@@ -131,7 +139,7 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
         fraction=mi.Float(1),
         value=mi.Color3f(0),
         target=mi.UInt32(0),
-        left=mi.UInt32(samples),
+        remaining=mi.UInt32(samples),
         casts=mi.UInt32(0),
     )
     # A lane starts with its first path: a flight of random length from the eye. The loop ends when
@@ -139,16 +147,27 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
     turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
     paths, _ = dr.while_loop(
         state=(paths, sampler),
-        cond=lambda paths, _: paths.left > 0,
+        cond=lambda paths, _: paths.remaining > 0,
         body=turn,
         label="paths through clouds",
     )
     return sums, paths.casts
 
 
-def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, rays, side: float):
-    """Cast the ray of every lane, and return what follows."""
-    active = paths.left > 0
+def _turn(
+    paths: Paths,
+    sampler: "mi.Sampler",
+    *,
+    scene: WalkScene,
+    targets: Targets,
+    sums: "list[mi.Float]",
+    rays: "mi.Ray3f",
+    side: float,
+) -> "tuple[Paths, mi.Sampler]":
+    """Cast the ray of every lane, add the light that arrives, and return the state of the paths with
+    their next rays.
+    """
+    active = paths.remaining > 0
     lanes = dr.width(rays.d)
     lane = dr.arange(mi.UInt32, lanes)
     flags = int(mi.RayFlags.All) if scene.has_surfaces else int(mi.RayFlags.Minimal)
@@ -183,8 +202,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     stays = thins = mi.Bool(False)
     if scene.densities:
         # Delta and ratio tracking in clouds with a density: a shadow ray takes a new free length on
-        # each stretch. Where a flight of either kind ends, rho is looked up; a flight goes on with
-        # the probability 1 - rho, a shadow ray with that factor.
+        # each stretch. Where a flight or a free length ends, rho is looked up: a flight goes on with
+        # the probability 1 - rho, a shadow ray with the factor 1 - rho.
         uneven, free = scene.uneven(within), -dr.log(1 - sampler.next_1d(active))
         thins = shadow & uneven & (free < optical)
         place = o + d * (free / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)
@@ -200,7 +219,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     # A shadow ray adds up its depth; a flight has the less length left.
     depth = dr.select(shadow, depth + optical, depth - optical)
 
-    # Shadow rays add their light, or end in the dark, or by roulette where they leave a cloud.
+    # Shadow rays add their light, or end at a surface, or by roulette where they leave a cloud.
     lit = dr.exp(-dr.select(shadow, depth, 0.0))
     arrives, dims = shadow & escapes, shadow & (leaves | thins)
     arriving = value * lit
@@ -254,8 +273,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         reflects = meets & is_main
         bounces = dr.select(reflects, bounces + 1, bounces)
         bsdf, context = si.bsdf(mi.RayDifferential3f(mi.Ray3f(o, d))), mi.BSDFContext()
-        seen_sun = bsdf.eval(context, si, si.to_local(to_sun), reflects) * irradiance
-        value = dr.select(reflects, weight * seen_sun, value)
+        reflected_sun = bsdf.eval(context, si, si.to_local(to_sun), reflects) * irradiance
+        value = dr.select(reflects, weight * reflected_sun, value)
         target = dr.select(
             reflects, targets.layer(order, mi.Bool(True), (order == 0) & (bounces == 1)), target
         )
@@ -263,9 +282,9 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             sampler.next_1d(active),
             mi.Point2f(sampler.next_1d(active), sampler.next_1d(active)),
         )
-        bsdf_sample, passed = bsdf.sample(context, si, first, second, reflects)
+        bsdf_sample, reflectance = bsdf.sample(context, si, first, second, reflects)
         onwards = si.to_world(bsdf_sample.wo)
-        weight = dr.select(reflects, weight * passed, weight)
+        weight = dr.select(reflects, weight * reflectance, weight)
         w, x = dr.select(reflects, onwards, w), dr.select(reflects, si.spawn_ray(onwards).o, x)
         cloud = dr.select(reflects, medium, cloud)
         shadow_from = dr.select(reflects, si.spawn_ray(to_sun).o, shadow_from)
@@ -343,7 +362,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         fraction,
         value,
         target,
-        left=dr.select(over, paths.left - 1, paths.left),
+        remaining=dr.select(over, paths.remaining - 1, paths.remaining),
         casts=paths.casts + dr.select(active, mi.UInt32(1), mi.UInt32(0)),
     )
     return following, sampler

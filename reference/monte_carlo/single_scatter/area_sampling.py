@@ -36,7 +36,7 @@ E. Veach 1997, Robust Monte Carlo methods for light transport simulation, chapte
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -50,40 +50,47 @@ _TOUCHING = 1e-12  # of a light's size: no direction is known over a shorter way
 _LEAST = 1e-30
 
 
+#: coordinates of points in a plane [m]
+Coordinates: TypeAlias = "tuple[mi.Float64, mi.Float64]"
+
+
 @dataclass(frozen=True)
 class LightSample:
-    """Points on a light, of double precision."""
+    """Points on a light."""
 
-    position: Any  #: [m]
-    normal: Any  #: unit vector
-    density: Any  #: of the points over the area [1/m^2]; 0 where a point does not count
+    position: "mi.Point3d"  #: [m]
+    normal: "mi.Vector3d"  #: unit vector
+    density: "mi.Float64"  #: of the points over the area [1/m^2]; 0 where a point does not count
 
 
 @dataclass(frozen=True)
 class Triangles:
-    """A rectangle or a mesh: nine, three and one number for each triangle, of double precision."""
+    """A mesh, as tables with nine, three and one number for each triangle."""
 
-    scene: Any  #: an `mi.Scene` of these triangles, in their order
-    corners: Any  #: a corner, and the ways from it to both others [m]
-    normals: Any  #: unit vectors to the side that emits
-    below: Any  #: the fraction of the area of all triangles up to each, itself included
-    count: int  #: how many there are
+    scene: "mi.Scene"  #: these triangles, in their order
+    corners: "mi.Float64"  #: nine numbers: a corner, and the ways from it to both others [m]
+    normals: "mi.Float64"  #: three numbers: a unit vector to the side that emits
+    #: one number: the area of the triangles up to this one, itself included, over the area of all
+    below: "mi.Float64"
+    count: int  #: how many triangles there are
     area: float  #: of all [m^2]
 
-    def facing(self, u, v, place) -> LightSample:
+    def facing(self, u: "mi.Float64", v: "mi.Float64", place: "mi.Point3d") -> LightSample:
         """Sample points evenly over the area."""
         number = dr.binary_search(
             0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u
         )
         return self._even(number, u, v)
 
-    def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly; of a ray that meets a triangle half of the points are about
-        the place where it does.
+    def towards(
+        self, u: "mi.Float64", v: "mi.Float64", origin: "mi.Point3d", direction: "mi.Vector3d"
+    ) -> LightSample:
+        """Sample points evenly over the area; for a ray that meets a triangle half of the points
+        about the place where it does.
         """
-        # Half of the points of a ray that meets a triangle are spread about the place where it
-        # does, v below `fraction`; the others are even over all triangles. Both halves use u and v
-        # once, stretched to 0 to 1.
+        # If the ray meets a triangle, points with v below `fraction` are spread about that place;
+        # all other points are even over all triangles. Either kind uses u, and v stretched to 0 to
+        # 1.
         hit = self.scene.ray_intersect_preliminary(
             mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
         )
@@ -115,8 +122,8 @@ class Triangles:
         position = dr.select(about, near, even)
         number = dr.select(about, met, number)
 
-        # The density of a point is the sum over both techniques, whichever drew it. An even point
-        # in the triangle that the ray meets could have been drawn about the place, too.
+        # The density of a point is the sum over both techniques, whichever of them drew it: an even
+        # point in the triangle that the ray meets could have been drawn about the place, too.
         in_met = meets & (number == met)
         rho = dr.norm(position - place)
         counts = ~in_met | (rho > _TOUCHING * dr.norm(first))
@@ -127,9 +134,9 @@ class Triangles:
             position, self._vector(self.normals, number * 3), dr.select(counts, density, 0)
         )
 
-    def _even(self, number, u, v) -> LightSample:
-        """Return points of triangles, given u, by which these were chosen
-        by area, and v in [0, 1).
+    def _even(self, number: "mi.UInt32", u: "mi.Float64", v: "mi.Float64") -> LightSample:
+        """Return points of triangles that were chosen by u, in proportion to their areas; v is in
+        [0, 1).
         """
         before = dr.select(
             number == 0, 0, dr.gather(mi.Float64, self.below, dr.maximum(number, 1) - 1)
@@ -145,18 +152,19 @@ class Triangles:
             position, self._vector(self.normals, number * 3), mi.Float64(1 / self.area)
         )
 
-    def _vector(self, numbers, base):
+    def _vector(self, numbers: "mi.Float64", base: "mi.UInt32") -> "mi.Vector3d":
+        """Return the vector in three numbers of a table, from the place `base` on."""
         return mi.Vector3d(*(dr.gather(mi.Float64, numbers, base + axis) for axis in range(3)))
 
 
 @dataclass(frozen=True)
 class Flat:
-    """A rectangle or a disk; vectors of double precision."""
+    """A rectangle or a disk."""
 
-    centre: Any  #: [m]
-    across: Any  #: unit vector in its plane
-    up: Any  #: another, at right angles
-    normal: Any  #: unit vector to the side that emits
+    centre: "mi.Vector3d"  #: [m]
+    across: "mi.Vector3d"  #: unit vector in its plane
+    up: "mi.Vector3d"  #: unit vector in its plane, at right angles to `across`
+    normal: "mi.Vector3d"  #: unit vector to the side that emits
     half: tuple[float, float]  #: half of the sides along `across` and `up`, or the radius twice [m]
     round: bool  #: whether it is a disk
 
@@ -165,17 +173,19 @@ class Flat:
         """Its area [m^2]."""
         return (math.pi if self.round else 4) * self.half[0] * self.half[1]
 
-    def facing(self, u, v, place) -> LightSample:
+    def facing(self, u: "mi.Float64", v: "mi.Float64", place: "mi.Point3d") -> LightSample:
         """Sample points evenly over the area."""
         x, y = self._even(u, v)
         return LightSample(self._at(x, y), self.normal, mi.Float64(1 / self.area))
 
-    def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points evenly and about the place where the ray meets the
-        plane, moved onto the light.
+    def towards(
+        self, u: "mi.Float64", v: "mi.Float64", origin: "mi.Point3d", direction: "mi.Vector3d"
+    ) -> LightSample:
+        """Sample points evenly, and about the place of the light that is nearest to where the ray
+        meets its plane.
         """
-        # The place where the ray meets the plane of the light, or the one beside the light's centre
-        # if they are parallel, moved to the nearest place of the light.
+        # Where the ray meets the plane of the light; where it is nearest to the centre of the light
+        # if both are parallel. Then the nearest place of the light.
         slope = dr.dot(direction, self.normal)
         offset = self.centre - origin
         parallel = dr.abs(slope) < _PARALLEL
@@ -201,25 +211,29 @@ class Flat:
             dr.select(about, y0 + distance * sine, y),
         )
         rho = dr.hypot(x - x0, y - y0)
-        # At a place on the edge the light has no extent outwards: the sample drawn
-        # there is the place itself.
+        # From a place on the edge the light has no extent outwards: a sample in such a direction is
+        # the place itself, and does not count.
         counts = rho > _TOUCHING * max(a, b)
         rho = dr.select(counts, rho, 1)
         edge = self._edge(x0, y0, (x - x0) / rho, (y - y0) / rho)
         density = (1 - fraction) / self.area + _about(fraction, edge, rho)
         return LightSample(self._at(x, y), self.normal, dr.select(counts, density, 0))
 
-    def _at(self, x, y):
+    def _at(self, x: "mi.Float64", y: "mi.Float64") -> "mi.Vector3d":
+        """Return points of the plane of the light [m]."""
         return self.centre + self.across * x + self.up * y
 
-    def _even(self, u, v) -> tuple[Any, Any]:
+    def _even(self, u: "mi.Float64", v: "mi.Float64") -> Coordinates:
+        """Return even points of the light."""
         a, b = self.half
         if not self.round:
             return a * (2 * u - 1), b * (2 * v - 1)
         sine, cosine = dr.sincos(2 * math.pi * u)
         return a * dr.sqrt(v) * cosine, b * dr.sqrt(v) * sine
 
-    def _edge(self, x0, y0, cosine, sine):
+    def _edge(
+        self, x0: "mi.Float64", y0: "mi.Float64", cosine: "mi.Float64", sine: "mi.Float64"
+    ) -> "mi.Float64":
         """Return how far the light reaches from a point of its plane in a direction [m]."""
         a, b = self.half
         if self.round:
@@ -236,7 +250,7 @@ class Flat:
 class Ball:
     """A sphere that emits outwards."""
 
-    centre: Any  #: of double precision [m]
+    centre: "mi.Vector3d"  #: [m]
     radius: float  #: [m]
 
     @property
@@ -244,14 +258,14 @@ class Ball:
         """Its area [m^2]."""
         return 4 * math.pi * self.radius**2
 
-    def facing(self, u, v, place) -> LightSample:
-        """Sample points of the cap that places outside see, evenly over its
-        projection towards them.
+    def facing(self, u: "mi.Float64", v: "mi.Float64", place: "mi.Point3d") -> LightSample:
+        """Sample points of the cap that is visible from a place outside, evenly over its projection
+        towards the place.
         """
         way = place - self.centre
         distance = dr.maximum(dr.norm(way), _LEAST)
-        # A place on the sphere or in it sees nothing, wherever the samples are. Closer than 1e-5 of
-        # the radius is on the sphere.
+        # From a place on the sphere or in it nothing is visible, wherever the samples are. Closer
+        # than 1e-5 of the radius is on the sphere.
         outside = distance > self.radius * (1 + 1e-5)
         edge = dr.select(outside, dr.square(self.radius / distance), 0)
         cosine = dr.sqrt(edge + v * (1 - edge))
@@ -259,9 +273,11 @@ class Ball:
         density = 4 * cosine / (self.area * (1 - edge))
         return LightSample(self.centre + self.radius * normal, normal, density)
 
-    def towards(self, u, v, origin, direction) -> LightSample:
-        """Sample points on the side turned to the ray, and about the two places where
-        the ray meets the sphere.
+    def towards(
+        self, u: "mi.Float64", v: "mi.Float64", origin: "mi.Point3d", direction: "mi.Vector3d"
+    ) -> LightSample:
+        """Sample points on the side turned to the ray, and about the two places where the ray meets
+        the sphere.
         """
         radius = self.radius
         offset = origin - self.centre
@@ -315,8 +331,8 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     if light.kind == "sphere":
         return Ball(centre, light.radius)
     corners = light.triangles
-    # A mesh of our own for the ray casts, with the triangles in the order of the tables: the number
-    # of a hit is the row of its triangle.
+    # A mesh for the ray casts, with the triangles in the order of the tables: the number of a hit is
+    # the row of its triangle.
     mesh = mi.Mesh("light", vertex_count=3 * len(corners), face_count=len(corners))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(corners.ravel())
@@ -328,32 +344,41 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     below[-1] = 1.0
     ways = corners.copy()
     ways[:, 1:] -= corners[:, :1]
-    one, two, three = (
-        on_device(mi.Float64, part.ravel())
-        for part in (ways, normals / np.linalg.norm(normals, axis=1)[:, None], below)
+    return Triangles(
+        scene=mi.load_dict({"type": "scene", "light": mesh}),
+        corners=on_device(mi.Float64, ways.ravel()),
+        normals=on_device(mi.Float64, (normals / np.linalg.norm(normals, axis=1)[:, None]).ravel()),
+        below=on_device(mi.Float64, below),
+        count=len(areas),
+        area=float(areas.sum()),
     )
-    scene = mi.load_dict({"type": "scene", "light": mesh})
-    return Triangles(scene, one, two, three, len(areas), float(areas.sum()))
 
 
-def _fraction(place, radius: float, origin, direction):
-    """Return the fraction of points about a place of a light: a half where the ray meets
-    it, few where it is far.
+def _fraction(
+    place: "mi.Vector3d", radius: float, origin: "mi.Point3d", direction: "mi.Vector3d"
+) -> "mi.Float64":
+    """Return the fraction of points that are about a place of a light: a half where the ray meets
+    the place, few where it passes far away.
     """
     offset = place - origin
     gap = dr.norm(offset - direction * dr.dot(offset, direction)) / radius
-    # The gap between ray and place over the size of the light: at a gap of 1/4 half of the points
-    # about the place are left.
+    # The gap between ray and place over the size of the light: a gap of 1/4 halves the fraction.
     return 0.5 / (1 + 16.0 * gap * gap)
 
 
-def _about(fraction, edge, rho):
-    """Return the density of points about a place; rounding puts some a little beyond the edge."""
+def _about(fraction: "mi.Float64", edge: "mi.Float64", rho: "mi.Float64") -> "mi.Float64":
+    """Return the density of points about a place [1/m^2]; rounding puts some points a little beyond
+    the edge.
+    """
     return fraction / (2 * math.pi * dr.maximum(edge, rho) * rho)
 
 
-def _edge_of_triangle(place, towards, ends, normal):
-    """Return how far a triangle reaches from a place in it in a unit direction of its plane [m]."""
+def _edge_of_triangle(
+    place: "mi.Point3d", towards: "mi.Vector3d", ends: "list[mi.Vector3d]", normal: "mi.Vector3d"
+) -> "mi.Float64":
+    """Return how far a triangle, given by its corners, reaches from a place in it in a unit
+    direction of its plane [m].
+    """
     reach = mi.Float64(dr.inf)
     for one, other in zip(ends, (*ends[1:], ends[0])):
         # A vector across the side, turned to the inside by the triangle's middle. The side is met
@@ -366,8 +391,10 @@ def _edge_of_triangle(place, towards, ends, normal):
     return reach
 
 
-def _towards(cosine, angle, axis):
-    """Return unit vectors at an angle, by its cosine, from an axis, and turned about it."""
+def _towards(cosine: "mi.Float64", angle: "mi.Float64", axis: "mi.Vector3d") -> "mi.Vector3d":
+    """Return unit vectors at an angle, given by its cosine, from an axis, and turned about the axis
+    by another angle [rad].
+    """
     sine = dr.sqrt(dr.maximum(1 - cosine * cosine, 0))
     turned_sine, turned_cosine = dr.sincos(angle)
     side = _across(axis)
@@ -375,7 +402,7 @@ def _towards(cosine, angle, axis):
     return dr.normalize(side * (sine * turned_cosine) + up * (sine * turned_sine) + axis * cosine)
 
 
-def _across(axis):
-    """Return unit vectors at right angles to others."""
+def _across(axis: "mi.Vector3d") -> "mi.Vector3d":
+    """Return unit vectors at right angles to an axis."""
     aside = dr.select(dr.abs(axis.x) > 0.6, mi.Vector3d(0, 1, 0), mi.Vector3d(1, 0, 0))
     return dr.normalize(dr.cross(aside, axis))

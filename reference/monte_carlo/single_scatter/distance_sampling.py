@@ -48,7 +48,6 @@ media. E. Veach 1997, Robust Monte Carlo methods for light transport simulation,
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -56,29 +55,31 @@ import mitsuba as mi
 
 @dataclass(frozen=True)
 class Approach:
-    """How rays pass a light; all of double precision."""
+    """How rays pass a light."""
 
-    foot: Any  #: distance along the ray of the foot of the perpendicular [m]
-    height: Any  #: distance of the light from the ray [m]
-    normal: Any  #: unit vector from the light to the foot
+    foot: "mi.Float64"  #: distance along the ray of the foot of the perpendicular [m]
+    height: "mi.Float64"  #: distance of the light from the ray [m]
+    normal: "mi.Vector3d"  #: unit vector from the light to the foot
 
 
 @dataclass(frozen=True)
 class Span:
-    """A part of a ray as a light sees it; of double precision, since a short part far
-    out is a small difference.
+    """A part of a ray as a light sees it; in double precision, since the length of a short part far
+    from the foot is a small difference.
     """
 
-    height: Any  #: distance of the light from the ray, above 0 [m]
-    start: Any  #: s0, from the foot [m]
-    length: Any  #: s1 - s0, may be infinite [m]
+    height: "mi.Float64"  #: distance of the light from the ray, above 0 [m]
+    start: "mi.Float64"  #: s0, from the foot [m]
+    length: "mi.Float64"  #: s1 - s0, may be infinite [m]
 
 
-def closest_approach(origin, direction, position) -> Approach:
-    """Return foot, height and normal of rays in double precision.
+def closest_approach(
+    origin: "mi.Point3d", direction: "mi.Vector3d", position: "mi.Point3d"
+) -> Approach:
+    """Return how rays pass a light.
 
-    `origin`, `direction`: rays, arrays of double precision; `direction` has unit length;
-    `position`: the light's position, of double precision.
+    `origin`, `direction`: where rays start [m], and their unit directions; `position`: of the light
+    [m].
 
     Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
     """
@@ -89,29 +90,30 @@ def closest_approach(origin, direction, position) -> Approach:
     return Approach(foot, height, perpendicular / height)
 
 
-def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[Any, Any]:
-    """Return the ends of the part of a line inside a spot's cone, as distances from the
-    foot; empty if they swap.
+def cone_ends(
+    approach: Approach, direction: "mi.Vector3d", *, axis: "mi.Vector3d", cutoff: float
+) -> "tuple[mi.Float64, mi.Float64]":
+    """Return the ends of the part of a line inside a spot's cone, as distances from the foot [m];
+    the part is empty if the first end is above the second.
 
     The direction from the light to the point s is w(theta) = sin(theta) direction + cos(theta)
     normal, with tan(theta) = s/h, so that axis . w = m cos(theta - middle), with (m, middle) the
     polar form of (axis . normal, axis . direction). It is above cos(cutoff) for |theta - middle| <
     acos(cos(cutoff)/m).
 
-    `approach`: how the rays pass the light; `direction`: the rays' directions, of double precision;
-    `axis`: the cone's axis, a unit vector of double precision; `cutoff`: the cone's half angle
-    [rad].
+    `approach`: how the rays pass the light; `direction`: the rays' unit directions; `axis`: the
+    cone's axis, a unit vector; `cutoff`: the cone's half angle [rad].
 
-    Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie
-    outside the cone by a hair: they bound where samples are drawn, and what the light sends there
-    is the emitter's own answer.
+    Valid for cones up to a half space; the part inside a wider cone is the whole line. The ends lie
+    outside the cone by a hair: samples are drawn between them, and Mitsuba's emitter says what it
+    sends to a sample.
     """
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
         return mi.Float64(-infinity), mi.Float64(infinity)
-    # By how much samples may fall beside the cone [rad]: above double precision's rounding, and so
-    # little that it does not matter that hardly any sample ever does. (A strip that 1 batch in 100
-    # feels is a bias in all the others.)
+    # By how much samples may fall beside the cone [rad]: above the rounding of double precision, and
+    # so little that hardly any sample does. (A wider strip with a sample in 1 of 100 batches would
+    # be a bias in the other 99.)
     margin = 1e-8
     height = approach.height
     along, across = dr.dot(axis, direction), dr.dot(axis, approach.normal)
@@ -126,7 +128,7 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
     return low_end, dr.select(outside, -infinity, high_end)
 
 
-def equi_angular_range(span: Span):
+def equi_angular_range(span: Span) -> "mi.Float64":
     """Return the angle that the light sees the span under [rad]."""
     finite = span.length < dr.inf
     return dr.select(
@@ -134,22 +136,22 @@ def equi_angular_range(span: Span):
     )
 
 
-def equi_angular(u, span: Span):
-    """Return distances y from the start of the span [m], uniform in the angle at
-    the light, for u in [0, 1).
+def equi_angular(u: "mi.Float64", span: Span) -> "mi.Float64":
+    """Return distances y from the start of the span [m], uniform in the angle at the light, for u in
+    [0, 1).
     """
     return _distance(u * equi_angular_range(span), span)
 
 
-def equi_angular_pdf(y, span: Span):
+def equi_angular_pdf(y: "mi.Float64", span: Span) -> "mi.Float64":
     """Return the density of `equi_angular` at y [1/m]."""
     h, s = span.height, span.start + y
     return h / (equi_angular_range(span) * (h * h + s * s))
 
 
-def _distance(angle, span: Span):
-    """Return how far from the start of the span the point is that the light sees
-    at an angle from it [m].
+def _distance(angle: "mi.Float64", span: Span) -> "mi.Float64":
+    """Return y, the distance from the start of the span to the point that the light sees at an angle
+    [rad] from the start [m].
     """
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
@@ -160,7 +162,7 @@ def _distance(angle, span: Span):
     return dr.minimum(dr.select(beyond > 0, y, 1e30), span.length)
 
 
-def _angle(y, span: Span):
+def _angle(y: "mi.Float64", span: Span) -> "mi.Float64":
     """Return the angle at the light between the start of the span and the point at y,
     the inverse of `_distance`.
     """
@@ -172,37 +174,38 @@ def _angle(y, span: Span):
 class FreeFlight:
     """The truncated exponential distribution of one channel's free flights."""
 
-    cut: Any  #: length of the span, or where hardly any flight is longer [m]
-    rate: Any  #: extinction [1/m]
-    tanh: Any  #: tanh(rate cut / 2)
+    cut: "mi.Float64"  #: length of the span, or a length that hardly any flight exceeds [m]
+    rate: "mi.Float64"  #: extinction [1/m]
+    tanh: "mi.Float64"  #: tanh(rate cut / 2)
 
 
-def free_flights(length, sigma_t) -> FreeFlight:
+def free_flights(length: "mi.Float64", sigma_t: "mi.Float64") -> FreeFlight:
     """Return the free flights in a span of some length [m] and extinction [1/m].
 
     Valid for sigma_t > 0, and for sigma_t = 0 where the length is finite.
     """
     # Free flights are cut at 60 mean free paths: 1e-26 of them are longer, and the other technique
-    # goes on. The exponential of a span thinner than 1e-12 is uniform to the last bit.
+    # covers what is beyond. The exponential of a span thinner than 1e-12 is uniform to the last
+    # bit.
     cut = dr.minimum(length, 60.0 / sigma_t)
     depth = dr.maximum(sigma_t * cut, 1e-12)
     return FreeFlight(cut, depth / cut, dr.tanh(0.5 * depth))
 
 
-def free_flight(u, flight: FreeFlight):
+def free_flight(u: "mi.Float64", flight: FreeFlight) -> "mi.Float64":
     """Return free-flight distances y from the start of the span [m], for u in [0, 1)."""
     t = flight.tanh
     return dr.minimum(2 * dr.atanh(u * t / (1 + t * (1 - u))) / flight.rate, flight.cut)
 
 
-def free_flight_pdf(y, flight: FreeFlight):
+def free_flight_pdf(y: "mi.Float64", flight: FreeFlight) -> "mi.Float64":
     """Return the density of `free_flight` at y [1/m]."""
     return _flight_cdf_and_pdf(y, flight)[1]
 
 
-def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
-    """Return the distribution function (whose absolute error is a rounding over
-    rate cut) and the density.
+def _flight_cdf_and_pdf(y: "mi.Float64", flight: FreeFlight) -> "tuple[mi.Float64, mi.Float64]":
+    """Return the distribution function (whose absolute error is a rounding over rate cut) and the
+    density [1/m].
     """
     inside = y <= flight.cut
     survival = dr.exp(-flight.rate * y)
@@ -215,31 +218,30 @@ def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Both techniques on one span, in double precision."""
+    """Both techniques on one span."""
 
     span: Span
-    range: Any  #: the angle that the light sees the span under [rad]
+    range: "mi.Float64"  #: the angle that the light sees the span under [rad]
     flights: tuple[FreeFlight, ...]  #: one for each channel
 
 
-def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
-    """Return the mixture of both techniques; one extinction for all
-    channels, or one for each [1/m].
-    """
+def mixture_of(span: Span, sigma_t: "Sequence[mi.Float]") -> Mixture:
+    """Return the mixture of both techniques; one extinction for all channels, or one for each [1/m]."""
     flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
     return Mixture(span, equi_angular_range(span), flights)
 
 
-def mixture_pdfs(y, mixture: Mixture) -> tuple[Any, Any]:
-    """Return the terms of either technique in the mixture density at y [1/m]; their
-    fractions are the MIS weights.
+def mixture_pdfs(y: "mi.Float64", mixture: Mixture) -> "tuple[mi.Float64, mi.Float64]":
+    """Return the terms of equi-angular sampling and of free flights in the mixture density at y
+    [1/m]; their fractions of the sum are the MIS weights.
     """
-    return tuple(pdf for _, pdf in _terms(y, mixture))
+    (_, equi), (_, free) = _terms(y, mixture)
+    return equi, free
 
 
-def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
-    """Return the terms of equi-angular sampling and free flights in the distribution
-    function and the density.
+def _terms(y: "mi.Float64", mixture: Mixture) -> "list[tuple[mi.Float64, mi.Float64]]":
+    """Return the terms of equi-angular sampling and of free flights in the distribution function and
+    the density [1/m].
     """
     h, s = mixture.span.height, mixture.span.start + y
     flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]
@@ -254,25 +256,26 @@ def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
     ]
 
 
-def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
-    """Sample a distance from the mixture of both techniques by inverting its
-    cumulative distribution.
+def sample_distance(
+    u: "mi.Float | mi.Float64", mixture: Mixture
+) -> "tuple[mi.Float64, mi.Float64]":
+    """Sample a distance from the mixture of both techniques by inverting its cumulative
+    distribution.
 
     `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the
     span [m] and the density [1/m].
 
-    The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were
-    u to choose the technique, a point light's peak would fall into few cells of the free flights:
-    50 times the variance at 64 samples.)
+    The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (If u
+    chose the technique, a point light's peak would fall into few cells of the free flights: 50
+    times the variance at 64 samples.)
 
-    The mean of several cumulative distributions takes the value u between the places where they
-    themselves do. Between those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h,
-    and a bisection where it leaves the bracket. All this is in double precision: in single, the
-    angle has no digits left for what lies far beyond a close light.
+    The mean of several distribution functions has the value u between the places where each of them
+    has it. These places are the bracket of Newton's method in the angle delta, with
+    d(y)/d(delta) = r^2/h; a step that leaves the bracket is replaced by a bisection. All this is in
+    double precision: in single, the angle cannot resolve distances far beyond a close light.
     """
     span, u = mixture.span, mi.Float64(u)
-    # The bracket: the angles at which the distribution functions of the techniques themselves are
-    # u.
+    # The bracket: the angles at which the distribution functions of the techniques are u.
     low = high = u * mixture.range
     for flight in mixture.flights:
         angle = _angle(free_flight(u, flight), span)
@@ -301,9 +304,11 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
     return y, sum(mixture_pdfs(y, mixture))
 
 
-def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
-    """Sample a distance for a light from infinity, by the mean of the uniform
-    density and of free flights.
+def sample_stretch(
+    u: "mi.Float | mi.Float64", length: "mi.Float64", sigma_t: "Sequence[mi.Float]"
+) -> "tuple[mi.Float64, mi.Float64]":
+    """Sample a distance for a light from infinity, by the mean of the uniform density and of free
+    flights.
 
     `u`: uniform in [0, 1); `length`: of the stretch, finite and above 0 [m]; `sigma_t`: one
     extinction for all channels, or one for each [1/m]. Returns distances from its start [m] and

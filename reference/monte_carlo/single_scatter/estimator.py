@@ -19,7 +19,7 @@ density of the mixture over the channels, so that no channel's variance can beco
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -42,25 +42,29 @@ from airlight.reference.monte_carlo.single_scatter.stretches import (
 from airlight.reference.monte_carlo.single_scatter.varying_media import varying_part
 from airlight.reference.scene.varying import VaryingMedium
 
+#: radiance that camera rays receive [W/(m^2 sr)], and the sampler after the numbers that it took
+Estimate: TypeAlias = "tuple[mi.Spectrum, mi.Sampler]"
+#: radiance from the air and from lit surfaces [W/(m^2 sr)]
+Light: TypeAlias = "tuple[mi.Spectrum, mi.Spectrum]"
+
 
 @dataclass(frozen=True)
 class Task:
     """The constants of a scene while it is traced."""
 
-    around: Surroundings  #: what rays can meet
+    around: Surroundings  #: the shapes that rays can meet
     sources: tuple[Source, ...]  #: the lights
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
-    start: Any  #: pointer to the medium in which camera rays start
-    #: the same, where its extinction differs from place to place
+    start: "mi.MediumPtr"  #: the medium in which camera rays start
+    #: the same as numbers, if its extinction differs from place to place
     varying: VaryingMedium | None = None
 
 
-def ray_light(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
-    """Return airlight and lit surface along camera rays [W/(m^2 sr)].
+def ray_light(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool") -> Light:
+    """Return airlight and lit surface along camera rays.
 
-    `task`: what is traced; `sampler`: Mitsuba's sampler, with one stream for each ray; `ray`:
-    the rays; `active`: mask.
+    `task`: the scene; `sampler`: with one stream for each ray; `ray`: the rays; `active`: mask.
     """
     if task.varying is None:
         return _through_media(task, sampler, ray, active)
@@ -71,8 +75,10 @@ def ray_light(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     return airlight, surface
 
 
-def _next_hit(task: Task, ray: Ray, done, active):
-    """Return the hits of rays from some distance on."""
+def _next_hit(
+    task: Task, ray: Ray, done: "mi.Float", active: "mi.Bool"
+) -> "mi.SurfaceInteraction3f":
+    """Return the hits of rays from some distance on [m]."""
     if not task.around.surfaces:
         return dr.zeros(mi.SurfaceInteraction3f, dr.width(active))
     return task.around.scene.ray_intersect(
@@ -80,12 +86,12 @@ def _next_hit(task: Task, ray: Ray, done, active):
     )
 
 
-def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
+def _through_media(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool") -> Light:
     """Follow camera rays from boundary to boundary, and add up what each stretch sends."""
 
     def walk(walking, sampler, done, start, depth, medium, airlight, surface):
-        """Add the stretch to the next thing on the way, `done` being where the ray goes
-        on, `start` the boundary.
+        """Add the stretch up to the next shape on the way: `done` is where the ray goes on, `start`
+        the last boundary.
         """
         hit = _next_hit(task, ray, done, walking)
         met = walking & hit.is_valid()
@@ -126,7 +132,7 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     # Without bounded media one stretch is the whole ray, and needs no loop.
     if not task.around.bounded:
         return walk(*state)[-2:]
-    # The medium at a light that stays is looked for once.
+    # The medium at a light with one position is looked for once.
     places = (
         replace(
             each,
@@ -142,8 +148,10 @@ def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     )[-2:]
 
 
-def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, Any]:
-    """Estimate what all lights send from a part of the rays: for each a loop over the
+def _airlight(
+    task: Task, sampler: "mi.Sampler", ray: Ray, part: Part, active: "mi.Bool"
+) -> Estimate:
+    """Estimate the airlight of all lights from a part of the rays: for each light a loop over the
     cells of the unit interval.
     """
     total = dr.zeros(mi.Spectrum, dr.width(active))
@@ -162,7 +170,9 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
             phase, _ = part.medium.phase_function().eval_pdf(
                 mi.PhaseFunctionContext(), point, sample.towards, used
             )
-            transmittance, sampler = part.kept(sample.x, point, sample.path, ray, sampler, used)
+            transmittance, sampler = part.transmittance(
+                sample.x, point, sample.path, ray, sampler, used
+            )
             # One sample stands for its cell of the unit interval: the integrand over the density of
             # x, times the width of the cell.
             value = sigma_s * phase * sample.value * transmittance * width
@@ -175,26 +185,32 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
     return total, sampler
 
 
-def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple[Any, Any]:
-    """Return the light that the surface at the end of a part of the rays, x [m]
-    from the camera, reflects.
+def _surface(
+    task: Task,
+    sampler: "mi.Sampler",
+    ray: Ray,
+    hit: "mi.SurfaceInteraction3f",
+    x: "mi.Float",
+    part: Part,
+    active: "mi.Bool",
+) -> Estimate:
+    """Estimate the light that surfaces reflect at the end of a part of the rays, x [m] from the
+    camera.
     """
     total = dr.zeros(mi.Spectrum, dr.width(active))
     if not task.around.surfaces:
         return total, sampler
-    # Rays that meet nothing have an infinite x: their transmittance is asked at the start, and not
-    # counted.
+    # Rays that meet nothing have an infinite x: they ask for the transmittance at the start, and it
+    # does not count.
     x = mi.Float64(dr.select(active, x, part.start))
     for source in task.sources:
-        start, count = (
-            sampler.next_2d(active),
-            task.samples if source.varies or part.estimated else 1,
-        )
+        start = sampler.next_2d(active)
+        count = task.samples if source.varies or part.estimated else 1
 
         def add_sample(index, total, sampler, source: Source = source, start=start, count=count):
             towards, path, irradiance = source.on_surface(place_of(index, start), hit, active)
             material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
-            transmittance, sampler = part.kept(x, hit, path, ray, sampler, active)
+            transmittance, sampler = part.transmittance(x, hit, path, ray, sampler, active)
             return (
                 index + 1,
                 total + dr.select(active, material * irradiance * transmittance / count, 0),

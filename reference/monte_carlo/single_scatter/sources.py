@@ -14,7 +14,7 @@ emission, except for area lights, whose points are drawn by
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -37,46 +37,55 @@ from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
 from airlight.reference.scene.read import ReferenceScene, whole_scene
 
+#: points of the unit square
+SquarePoints: TypeAlias = "tuple[mi.Float64, mi.Float64]"
+#: distances along a ray from the foot of the perpendicular from the light, may be infinite [m]
+Ends: TypeAlias = "tuple[mi.Float64, mi.Float64]"
+#: unit vectors from surfaces to the light, paths from it, irradiance across these [W/m^2]
+SurfaceLight: TypeAlias = "tuple[mi.Vector3f, Path, mi.Spectrum]"
+
 
 @dataclass(frozen=True)
 class Sample:
-    """A distance along camera rays, and what comes there from a light."""
+    """A distance along camera rays, and the light that arrives there."""
 
-    x: Any  #: [m], of double precision
-    point: Any  #: the point of the medium
-    towards: Any  #: unit vectors to the light
+    x: "mi.Float64"  #: [m]
+    point: "mi.MediumInteraction3f"  #: the point of the medium
+    towards: "mi.Vector3f"  #: unit vectors to the light
     path: Path
-    #: irradiance across the path, were nothing in its way, over the density of the sample
-    value: Any
-    counts: Any  #: mask
+    #: irradiance across the path with nothing in its way, over the density of the sample [W/m]
+    value: "mi.Spectrum"
+    counts: "mi.Bool"  #: whether the light can reach the sample
 
 
 class _Near(ABC):
-    """Lights at places: a subclass has points, says what these send, and what part
-    of a ray they could light.
+    """Lights at places: a subclass has points, says what these send, and what part of a ray they
+    could light.
     """
 
-    position: Any = None  # of all samples, where they have one
-    medium: Any = None  # pointer to what every path begins in, where that is known
+    position: "mi.Point3d | None" = None  # of all samples, if it is the same for all [m]
+    medium: "mi.MediumPtr | None" = None  # where every path begins, if it is known
 
     @abstractmethod
-    def point(self, numbers, to: Ray | Any) -> LightSample:
-        """Return the points of samples with these numbers, for rays or for
-        places of double precision.
+    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
+        """Return points of the light for rays or for places on surfaces [m]."""
+
+    @abstractmethod
+    def sent(
+        self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
+    ) -> "mi.Spectrum":
+        """Return the intensity towards places in unit directions, over the density of the points
+        [W/sr].
         """
 
     @abstractmethod
-    def sent(self, point: LightSample, at, from_light) -> Any:
-        """Return the intensity towards places in unit directions, over the
-        density of the points [W/sr].
-        """
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> Ends:
+        """Return the ends of the part of a line that the points could light."""
 
-    @abstractmethod
-    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
-        """Return the ends of the part of a line that the points could light, from the foot [m]."""
-
-    def on_ray(self, u, numbers, ray: Ray, part: Part, active) -> Sample:
-        """Return samples on rays, for `u` uniform in [0, 1) and `numbers` in the unit square."""
+    def on_ray(
+        self, u: "mi.Float", numbers: SquarePoints, ray: Ray, part: Part, active: "mi.Bool"
+    ) -> Sample:
+        """Return samples on rays, for `u` uniform in [0, 1)."""
         light = self.point(numbers, ray)
         approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
         # The part of the stretch that the light's point could light: in the cone of a spot, before
@@ -90,7 +99,7 @@ class _Near(ABC):
         y, density = part.distances(u, low, length, span)
         s = span.start + y
         square = approach.height * approach.height + s * s
-        # All from the light on: a place close to it keeps its digits.
+        # All places are relative to the light, so that those close to it keep their digits.
         way = mi.Vector3f(approach.normal * approach.height + ray.direction_double * s)
         from_light = way / mi.Float(dr.sqrt(square))
         point = point_on(ray, mi.Point3f(light.position) + way)
@@ -103,18 +112,20 @@ class _Near(ABC):
         )
         return Sample(low + y, point, -from_light, self._path(light, way), value, used)
 
-    def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
-        """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
+    def on_surface(
+        self, numbers: SquarePoints, hit: "mi.SurfaceInteraction3f", active: "mi.Bool"
+    ) -> SurfaceLight:
+        """Return the light that arrives at surfaces."""
         light = self.point(numbers, mi.Point3d(hit.p))
         way = hit.p - mi.Point3f(light.position)
         r = dr.norm(way)
         from_light = way / r
         return -from_light, self._path(light, way), self.sent(light, hit, from_light) / (r * r)
 
-    def _path(self, light: LightSample, way) -> Path:
-        """Return the paths from a hair before the light's own surface, if it has one."""
+    def _path(self, light: LightSample, way: "mi.Vector3f") -> Path:
+        """Return the paths along ways from the light [m]."""
         begin = mi.Point3f(light.position)
-        # A path that began on the light's own surface could meet it.
+        # They start a hair before the surface of the light, if it has one, so as not to meet it.
         hair = mi.Vector3f(light.normal) * step_beyond(begin)
         way = way - hair
         length = dr.norm(way)
@@ -125,23 +136,25 @@ class _Near(ABC):
 class PointSource(_Near):
     """A point or spot light."""
 
-    emitter: Any  #: Mitsuba's
-    position: Any  #: of double precision [m]
-    axis: Any = None  #: spot: unit vector of double precision
+    emitter: "mi.Emitter"
+    position: "mi.Point3d"  #: [m]
+    axis: "mi.Vector3d | None" = None  #: spot: unit vector
     cutoff: float = math.pi  #: spot: half angle of the cone [rad]
-    medium: Any = None  #: pointer to what it is in, where that is known
+    medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
     varies = False
 
-    def point(self, numbers, to: Ray | Any) -> LightSample:
+    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
         """Return its place, for every sample."""
         return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
 
-    def sent(self, point: LightSample, at, from_light) -> Any:
+    def sent(
+        self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
+    ) -> "mi.Spectrum":
         """Return the intensity: the emitter's irradiance times the squared distance."""
         sample, irradiance = self.emitter.sample_direction(at, mi.Point2f(0.5))
         return irradiance * sample.dist * sample.dist
 
-    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> Ends:
         """Return the ends of the part of a line in the cone."""
         if self.axis is None:
             return -dr.inf, dr.inf
@@ -153,23 +166,25 @@ class AreaSource(_Near):
     """An area light."""
 
     shape: Emitting
-    radiance: Any  #: RGB [W/(m^2 sr)]
+    radiance: "mi.Color3f"  #: [W/(m^2 sr)]
     varies = True
 
-    def point(self, numbers, to: Ray | Any) -> LightSample:
-        """Return points that are spread towards rays, or face places."""
+    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
+        """Return points that are spread towards rays, or face places on surfaces."""
         u, v = numbers
         if isinstance(to, Ray):
             return self.shape.towards(u, v, to.origin_double, to.direction_double)
         return self.shape.facing(u, v, to)
 
-    def sent(self, point: LightSample, at, from_light) -> Any:
+    def sent(
+        self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
+    ) -> "mi.Spectrum":
         """Return the intensity of points."""
         cosine = dr.maximum(dr.dot(mi.Vector3f(point.normal), from_light), 0)
         density = dr.select(point.density > 0, point.density, 1)
         return self.radiance * (cosine / mi.Float(density))
 
-    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> Ends:
         """Return the ends of the part of a line before the plane of each point."""
         slope = dr.dot(ray.direction_double, point.normal)
         level = dr.dot(ray.origin_double - point.position, point.normal)
@@ -186,10 +201,10 @@ class AreaSource(_Near):
 class FarSource:
     """A sun, or a uniform sky; each sample of a sky has its own direction, even over the sphere.
 
-    The emitter names a place beyond everything, in vacuum: there paths begin.
+    Its paths begin where the emitter puts its samples: beyond all shapes, in vacuum.
     """
 
-    emitter: Any  #: Mitsuba's
+    emitter: "mi.Emitter"
     position = None
 
     @property
@@ -197,7 +212,9 @@ class FarSource:
         """Whether samples differ on one surface."""
         return is_sky(self.emitter)
 
-    def on_ray(self, u, numbers, ray: Ray, part: Part, active) -> Sample:
+    def on_ray(
+        self, u: "mi.Float", numbers: SquarePoints, ray: Ray, part: Part, active: "mi.Bool"
+    ) -> Sample:
         """Return samples on rays; see `_Near`."""
         length = part.end - part.start
         used = active & (length > 0) & (length < dr.inf)
@@ -212,8 +229,10 @@ class FarSource:
             x, point, sample.d, path, irradiance * mi.Float(dr.select(used, 1 / density, 0)), used
         )
 
-    def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
-        """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
+    def on_surface(
+        self, numbers: SquarePoints, hit: "mi.SurfaceInteraction3f", active: "mi.Bool"
+    ) -> SurfaceLight:
+        """Return the light that arrives at surfaces."""
         sample, irradiance = self.emitter.sample_direction(hit, mi.Point2f(*numbers), active)
         return (
             sample.d,
@@ -225,8 +244,8 @@ class FarSource:
 Source = PointSource | AreaSource | FarSource
 
 
-def is_sky(emitter) -> bool:
-    """Return whether an emitter of Mitsuba is a uniform sky."""
+def is_sky(emitter: "mi.Emitter") -> bool:
+    """Return whether an emitter is a uniform sky."""
     return bool(emitter.class_name() == "ConstantBackgroundEmitter")
 
 
@@ -240,7 +259,7 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     return (*map(_source, emitters), *wide)
 
 
-def _source(emitter) -> Source:
+def _source(emitter: "mi.Emitter") -> Source:
     if is_sky(emitter) or is_directional(emitter):
         return FarSource(emitter)
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))

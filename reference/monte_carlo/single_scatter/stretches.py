@@ -8,7 +8,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar, TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -26,33 +26,37 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     sample_stretch,
 )
 
+#: distances from the beginning of a part of rays [m], and their density [1/m]
+Distances: TypeAlias = "tuple[mi.Float64, mi.Float64]"
+#: transmittances of lanes, 0 to 1, and the sampler after the numbers that they took
+Transmittance: TypeAlias = "tuple[mi.Spectrum, mi.Sampler]"
+
 
 @dataclass(frozen=True)
 class Ray:
     """Camera rays in both precisions."""
 
-    origin: Any
-    direction: Any
-    origin_double: Any
-    direction_double: Any
+    origin: "mi.Point3f"  #: [m]
+    direction: "mi.Vector3f"  #: unit
+    origin_double: "mi.Point3d"  #: [m]
+    direction_double: "mi.Vector3d"  #: unit
 
 
 @dataclass(frozen=True)
 class Path:
     """Straight ways from a light to points of camera rays or surfaces."""
 
-    begin: Any  #: on the light, or where it is infinitely far beyond all shapes [m]
-    away: Any  #: unit vectors from there
-    length: Any  #: [m]
-    end: Any = None  #: the points, where the light is infinitely far [m]
-    medium: Any = None  #: pointer to what they begin in; None: not known
+    begin: "mi.Point3f"  #: on the light, or beyond all shapes for a light infinitely far away [m]
+    away: "mi.Vector3f"  #: unit vectors from there
+    length: "mi.Float"  #: [m]
+    end: "mi.Point3f | None" = None  #: the points [m], for a light infinitely far away
+    medium: "mi.MediumPtr | None" = None  #: where the ways begin; None: not known
 
-    def shadow_ray(self) -> tuple[Any, Any, Any]:
-        """Return from where rays look for what stands in the way, in which unit
-        direction, and how far [m].
+    def shadow_ray(self) -> "tuple[mi.Point3f, mi.Vector3f, mi.Float]":
+        """Return the origins [m], unit directions and lengths [m] of shadow rays.
 
-        Rays from afar lose digits: a ball of 1 m, met from 200 m away, would
-        shadow a third of itself.
+        Those of a light infinitely far away start at the points, since rays from afar lose digits:
+        a ball of 1 m, met from 200 m away, would shadow a third of itself.
         """
         if self.end is None:
             return self.begin, self.away, self.length
@@ -64,26 +68,38 @@ class Part(ABC):
     """The part of camera rays in one medium."""
 
     around: Surroundings
-    start: Any  #: distance from the camera, of double precision [m]
-    end: Any  #: may be infinite [m]
-    medium: Any  #: pointer
-    scatters: Any  #: mask
-    estimated: ClassVar[bool] = False  #: whether `kept` is an estimate, from samples
+    start: "mi.Float64"  #: distance from the camera [m]
+    end: "mi.Float64"  #: may be infinite [m]
+    medium: "mi.MediumPtr"
+    scatters: "mi.Bool"
+    estimated: ClassVar[bool] = False  #: whether `transmittance` is an estimate, from samples
 
     @abstractmethod
-    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
-        """Sample distances from `low`, a distance along the rays, up to a length from there
-        [m], in double precision.
+    def distances(
+        self,
+        u: "mi.Float",
+        low: "mi.Float64",
+        length: "mi.Float64",
+        span: Span | None,
+    ) -> Distances:
+        """Sample distances from `low`, a distance along the rays, within a length [m].
 
-        `u` is uniform in [0, 1); `span`: the same part as a light at a place sees it, None for one
-        that is infinitely far. Returns distances [m] and their density [1/m].
+        `u` is uniform in [0, 1); `span`: the same part as a light at a place sees it, None for a
+        light infinitely far away.
         """
 
     @abstractmethod
-    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
-        """Return the transmittance of paths to points, and from there to the camera, x [m] away.
-
-        Nothing is where something stands in a path. Returns the sampler, too.
+    def transmittance(
+        self,
+        x: "mi.Float64",
+        point: "mi.Interaction3f",
+        path: Path,
+        ray: Ray,
+        sampler: "mi.Sampler",
+        active: "mi.Bool",
+    ) -> Transmittance:
+        """Return the transmittance from the light along the paths to points, and from there to the
+        camera, x [m] away; 0 where a surface stands in a path.
         """
 
 
@@ -91,24 +107,38 @@ class Part(ABC):
 class Stretch(Part):
     """The part of camera rays in one homogeneous medium."""
 
-    depth: Any  #: optical depth from the camera to its start
-    sigma_t: Any  #: [1/m]
-    rates: Sequence[Any]  #: the same, each once [1/m]
-    at_camera: Any  #: pointer to the medium in which the camera is
+    depth: "mi.Spectrum"  #: optical depth from the camera to its start
+    sigma_t: "mi.Spectrum"  #: [1/m]
+    rates: "Sequence[mi.Float]"  #: the values of `sigma_t`, a common one once [1/m]
+    at_camera: "mi.MediumPtr"  #: the medium in which the camera is
 
-    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+    def distances(
+        self,
+        u: "mi.Float",
+        low: "mi.Float64",
+        length: "mi.Float64",
+        span: Span | None,
+    ) -> Distances:
         """Sample distances by the mixture of techniques; see `Part`."""
         if span is None:
             return sample_stretch(u, length, self.rates)
         return sample_distance(u, mixture_of(span, self.rates))
 
-    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+    def transmittance(
+        self,
+        x: "mi.Float64",
+        point: "mi.Interaction3f",
+        path: Path,
+        ray: Ray,
+        sampler: "mi.Sampler",
+        active: "mi.Bool",
+    ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
-        # The walk from the light on must know the medium there: vacuum beyond all shapes, the
-        # medium of a light that stays, or the one that is looked for now.
+        # The walk begins in the medium at the light: vacuum beyond all shapes, the medium that the
+        # path names, or the one that is looked for now.
         at_light = path.medium
         if path.end is not None or not self.around.bounded:
-            at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is vacuum
+            at_light = dr.zeros(mi.MediumPtr)
         elif at_light is None:
             at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
         media = Segment(at_light, self.sigma_t)
@@ -118,19 +148,19 @@ class Stretch(Part):
         return segment * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
 
 
-def double_ray(origin, direction) -> Ray:
+def double_ray(origin: "mi.Point3d", direction: "mi.Vector3d") -> Ray:
     """Return rays given in double precision; their directions need not have unit length."""
     direction = dr.normalize(direction)
     return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
 
 
-def cell_of(number, shift, count: int) -> tuple[Any, Any]:
+def cell_of(number: "mi.UInt32", shift: "mi.Float", count: int) -> "tuple[mi.Float, mi.Float]":
     """Return where a cell of the unit interval begins, and its width.
 
     All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift`
-    in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch; in
-    cells that stay, an edge close to the end of one would be felt so rarely that no spread between
-    batches could tell.
+    in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch. In
+    cells that stay, few batches would have a sample beyond an edge close to the end of its cell, and
+    the spread between the others would not show it.
     """
     if count == 1:
         return mi.Float(0), mi.Float(1)
@@ -139,9 +169,9 @@ def cell_of(number, shift, count: int) -> tuple[Any, Any]:
     return low / (count - 1), (high - low) / (count - 1)
 
 
-def place_of(index, start) -> tuple[Any, Any]:
-    """Return a point of the unit square, given its number and where the
-    sequence, Kronecker's, starts.
+def place_of(index: "mi.UInt32", start: "mi.Point2f") -> "tuple[mi.Float64, mi.Float64]":
+    """Return a point of Kronecker's sequence in the unit square, given its number and the start of
+    the sequence.
     """
     number = mi.Float64(index)
     # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly.
@@ -150,8 +180,8 @@ def place_of(index, start) -> tuple[Any, Any]:
     return u - dr.floor(u), v - dr.floor(v)
 
 
-def point_on(ray: Ray, position):
-    """Return a point of a medium on camera rays."""
+def point_on(ray: Ray, position: "mi.Point3f") -> "mi.MediumInteraction3f":
+    """Return points of a medium on camera rays, given their positions [m]."""
     point = dr.zeros(mi.MediumInteraction3f)
     point.p = position
     point.wi = -ray.direction

@@ -9,22 +9,21 @@ For a layer
 
     G(z) = -sigma_i H_i exp(-(z - z_i)/H_i),     clamped below z_i:  sigma_i (z - z_i - H_i).
 
-Where the heights are as good as one, the depth is the density between them times l. (The quadrature
+If both heights are nearly equal, the depth is the density between them times l. (The quadrature
 takes the lower end and (1 - e^-u)/u.) A free flight has the density sigma exp(-tau)/(1 -
-exp(-tau_end)): tau is inverted by bisection. Under a sun every distance is one: the estimate is the
-transmittance of its path, and bounded. Under a light at a place one half of the samples are
+exp(-tau_end)): tau is inverted by bisection. Under a sun every sample is a free flight: the estimate
+is the transmittance of its path, and bounded. Under a light at a place one half of the samples are
 equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
 
 **Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own
 majorant m (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson
-process of the density m. No cell of the grid and no optical depth is known here. Distances are
+process of the density m. They use no cell of the grid and no optical depth. Distances are
 equi-angular about lights at places and even under suns and skies, between the ends of the box.
 Integrands are bounded: over the angle at a place sigma_t T_1 T_2 p height, under a sun sigma_t T_1
 T_2 p.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -35,11 +34,19 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     equi_angular,
     equi_angular_pdf,
 )
-from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
+from airlight.reference.monte_carlo.single_scatter.stretches import (
+    Distances,
+    Part,
+    Path,
+    Ray,
+    Transmittance,
+)
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 
 
-def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance) -> Part:
+def varying_part(
+    medium: VaryingMedium, around: Surroundings, ray: Ray, distance: "mi.Float"
+) -> Part:
     """Return the part of camera rays in a medium, up to the surface at a distance [m]."""
     plugin = mi.MediumPtr(medium.plugin)
     if isinstance(medium, HeightMedium):
@@ -47,7 +54,7 @@ def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance
         height, rise = dr.dot(ray.origin_double, up), dr.dot(ray.direction_double, up)
         ends = [(z - height) / rise for z in (medium.floor, medium.cap)]
         # The ray is in the fog between its passages through floor and cap. A level ray is in the
-        # fog everywhere or nowhere; it counts up to `farthest` [m].
+        # fog everywhere or nowhere, and is followed up to `farthest` [m].
         farthest = 1e6
         level, inside = rise == 0, (height >= medium.floor) & (height <= medium.cap)
         first = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
@@ -67,29 +74,36 @@ class _FogPart(Part):
     """Camera rays in height fog."""
 
     fog: HeightMedium
-    up: Any
-    height: Any  # of the camera [m]
-    rise: Any  # vertical component of the directions
+    up: "mi.Vector3d"  #: unit: heights are along it
+    height: "mi.Float64"  #: of the camera [m]
+    rise: "mi.Float64"  #: vertical component of the directions
 
-    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
-        """Sample free flights, for a light at a place half of the distances by the
-        angle at it; see `Part`.
+    def distances(
+        self,
+        u: "mi.Float",
+        low: "mi.Float64",
+        length: "mi.Float64",
+        span: Span | None,
+    ) -> Distances:
+        """Sample free flights; for a light at a place one half of the distances by the angle at the
+        light; see `Part`.
         """
         u = mi.Float64(u)
         before = self._depth_to(low)
-        whole = 1 - dr.exp(before - self._depth_to(low + length))
+        # The probability that a flight ends in the stretch.
+        probability = 1 - dr.exp(before - self._depth_to(low + length))
         # Half of u draws free flights, half draws angles at the light; each half is stretched to 0
         # to 1.
         v = u if span is None else dr.select(u < 0.5, 2 * u, 2 * u - 1)
-        wanted = before - dr.log(1 - v * whole)
+        depth = before - dr.log(1 - v * probability)
 
         def halve(number, below, above):
             middle = 0.5 * (below + above)
-            short = self._depth_to(middle) < wanted
+            short = self._depth_to(middle) < depth
             return number + 1, dr.select(short, middle, below), dr.select(short, above, middle)
 
-        # The depth grows along the ray: 48 bisections find where it is the wanted one, to 2^-48 of
-        # the stretch.
+        # The depth grows along the ray: 48 bisections find where the flight ends, to 2^-48 of the
+        # stretch.
         state = (mi.UInt32(0), mi.Float64(low), mi.Float64(low + length))
         bracket = dr.while_loop(
             state, lambda number, *_: number < 48, halve, label="inverse of the depth"
@@ -97,14 +111,22 @@ class _FogPart(Part):
         y = 0.5 * (bracket[1] + bracket[2]) - low
         if span is not None:
             y = dr.select(u < 0.5, equi_angular(v, span), y)
+        # The density of free flights, and of both techniques together.
         x = low + y
         transmittance = dr.exp(before - self._depth_to(x))
-        flights = dr.select(
-            whole > 0, self._density(self.height + self.rise * x) * transmittance / whole, 0
-        )
+        density = self._density(self.height + self.rise * x) * transmittance / probability
+        flights = dr.select(probability > 0, density, 0)
         return y, flights if span is None else 0.5 * (flights + equi_angular_pdf(y, span))
 
-    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+    def transmittance(
+        self,
+        x: "mi.Float64",
+        point: "mi.Interaction3f",
+        path: Path,
+        ray: Ray,
+        sampler: "mi.Sampler",
+        active: "mi.Bool",
+    ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
         z = dr.dot(mi.Vector3d(point.p), self.up)
         if path.end is None:
@@ -118,15 +140,15 @@ class _FogPart(Part):
             unblocked(self.around, *path.shadow_ray(), active), transmittance, 0
         ), sampler
 
-    def _depth_to(self, x):
+    def _depth_to(self, x: "mi.Float64") -> "mi.Float64":
         """Return the optical depth from the camera to distances x [m]."""
         return self._depth(self.height, self.height + self.rise * x, x)
 
-    def _depth(self, z0, z1, length):
+    def _depth(self, z0: "mi.Float64", z1: "mi.Float64", length: "mi.Float64") -> "mi.Float64":
         """Return optical depths between two heights, a length apart [m]."""
         fog = self.fog
         least = min((scale for _, _, scale in fog.layers), default=1.0)
-        # Heights within 1e-5 of the least scale height are as good as one.
+        # Heights that differ by less than 1e-5 of the least scale height count as equal.
         level = dr.abs(z1 - z0) < 1e-5 * least
         rise = dr.select(level, 1, z1 - z0)
         middle = 0.5 * (z0 + z1)
@@ -136,9 +158,9 @@ class _FogPart(Part):
             level, on_level, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise
         )
 
-    def _depth_beyond(self, z, rise):
-        """Return the optical depth from heights [m] out of the fog; `rise`:
-        vertical, of unit directions.
+    def _depth_beyond(self, z: "mi.Float64", rise: "mi.Float64") -> "mi.Float64":
+        """Return the optical depth from heights [m] out of the fog; `rise`: the vertical component
+        of the directions.
         """
         at_height = self._antiderivative(z)
         above, below = (
@@ -148,7 +170,7 @@ class _FogPart(Part):
             dr.abs(rise), 1e-30
         )
 
-    def _antiderivative(self, z):
+    def _antiderivative(self, z: "mi.Float64") -> "mi.Float64":
         """Return G at heights [m]."""
         z = dr.clip(z, self.fog.floor, self.fog.cap)
         total = self.fog.constant * z
@@ -156,13 +178,13 @@ class _FogPart(Part):
             over = z - base
             # Below z_i a clamped layer has its full density: G is linear there, and continuous at
             # z_i.
-            fallen = -scale * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
+            decayed = -scale * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
             total += sigma_t * (
-                dr.select(over < 0, over - scale, fallen) if self.fog.clamped else fallen
+                dr.select(over < 0, over - scale, decayed) if self.fog.clamped else decayed
             )
         return total
 
-    def _density(self, z):
+    def _density(self, z: "mi.Float64") -> "mi.Float64":
         """Return the extinction at heights between floor and cap [1/m]."""
         total = mi.Float64(self.fog.constant)
         for sigma_t, base, scale in self.fog.layers:
@@ -175,10 +197,16 @@ class _FogPart(Part):
 class _GridPart(Part):
     """Camera rays in the box of a grid."""
 
-    majorant: float
+    majorant: float  #: Mitsuba's bound of the extinction [1/m]
     estimated = True
 
-    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+    def distances(
+        self,
+        u: "mi.Float",
+        low: "mi.Float64",
+        length: "mi.Float64",
+        span: Span | None,
+    ) -> Distances:
         """Sample distances by the angle at a light, or evenly; see `Part`."""
         u = mi.Float64(u)
         if span is None:
@@ -186,7 +214,15 @@ class _GridPart(Part):
         y = equi_angular(u, span)
         return y, equi_angular_pdf(y, span)
 
-    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+    def transmittance(
+        self,
+        x: "mi.Float64",
+        point: "mi.Interaction3f",
+        path: Path,
+        ray: Ray,
+        sampler: "mi.Sampler",
+        active: "mi.Bool",
+    ) -> Transmittance:
         """Return estimates of the transmittance of both ways; see `Part`."""
         camera, sampler = self._tracked((ray.origin, ray.direction, mi.Float(x)), sampler, active)
         light, sampler = self._tracked(path.shadow_ray(), sampler, active)
@@ -194,9 +230,14 @@ class _GridPart(Part):
             unblocked(self.around, *path.shadow_ray(), active), mi.Spectrum(camera * light), 0
         ), sampler
 
-    def _tracked(self, line: tuple[Any, Any, Any], sampler, active) -> tuple[Any, Any]:
-        """Return estimates of the transmittance along lines: origin, direction,
-        length [m]; and the sampler.
+    def _tracked(
+        self,
+        line: "tuple[mi.Point3f, mi.Vector3f, mi.Float]",
+        sampler: "mi.Sampler",
+        active: "mi.Bool",
+    ) -> "tuple[mi.Float, mi.Sampler]":
+        """Return estimates of the transmittance along lines, given by origin [m], unit direction and
+        length [m], and the sampler.
         """
         origin, direction, distance = line
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
