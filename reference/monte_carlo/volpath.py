@@ -189,12 +189,22 @@ def _trace(
         channels = np.all(extinctions == sigma_t, axis=1)
         with _grey_media(traced, int(np.argmax(channels)), scattering) as medium:
             for place, part in enumerate(parts):
-                # Streams differ by seed; the part and the channel get their own seeds.
-                stream = (seed * 3 + number) * len(parts) + place
+                stream = stream_of(seed, number, place)
                 image[part, channels] = _trace_pixels(
                     traced, integrator, medium, part, stream, counts[part]
                 )[:, channels]
     return image
+
+
+def stream_of(seed: int, extinction: int, part: int) -> int:
+    """Return the number of a random stream, below 2^32: others for other seeds of images, extinctions
+    and parts.
+
+    Images may be cut into different numbers of parts, so this number must not count. The streams of
+    a part are those of the first, shifted by a multiple of 2^32 over the golden ratio: shifts of
+    different parts lie far from one another, and seeds of images are below 2^21.
+    """
+    return (seed * 3 + extinction + part * 0x9E3779B1) % 2**32
 
 
 def _parts(counts: Counts) -> list[slice]:

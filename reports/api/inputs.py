@@ -13,6 +13,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
@@ -113,6 +114,13 @@ def several(things: Any) -> list[Any]:
     if things is None:
         return []
     return list(things) if isinstance(things, list | tuple) else [things]
+
+
+def whole_numbers(**given: Any) -> None:
+    """Refuse values that are no whole numbers, by their names; None stands for no value."""
+    for name, value in given.items():
+        if value is not None and not isinstance(value, Integral):
+            raise InputError(f"{name}: got {value!r}, expected a whole number")
 
 
 def exclude(option: str, why: str, beside: Mapping[str, Any]) -> None:

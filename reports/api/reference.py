@@ -23,6 +23,7 @@ from airlight.reports.api.inputs import (
     pixels_of,
     several,
     telling,
+    whole_numbers,
 )
 
 if TYPE_CHECKING:
@@ -111,6 +112,7 @@ def reference(
     >>> traced.standard_error.shape
     (24, 32, 3)
     """
+    whole_numbers(samples=samples, seed=seed)
     files = [Path(path) for path in several(merge)]
     budgets = {"samples": samples, "error": error, "seconds": seconds}
     # Merging joins the samples of files that exist: options of tracing would have no effect.

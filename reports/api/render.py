@@ -33,6 +33,7 @@ from airlight.reports.api.inputs import (
     pixels_of,
     several,
     telling,
+    whole_numbers,
     with_kernels,
 )
 
@@ -158,6 +159,7 @@ def render(
     ((24, 32, 3), 'float32')
     """
     # All words are checked first; then Mitsuba starts, which takes seconds.
+    whole_numbers(samples=samples, frames=frames, run=run, frame=frame)
     files = output_files(output, ".exr (all layers)", ".png (a picture)")
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
     # Both select random numbers and have to fit a signed 32-bit number.

@@ -398,16 +398,18 @@ def _measured(
 
 
 def _study_of(path: Path) -> "Study":
-    """Return the study of a file; one whose sizes or media a report does not have is refused."""
+    """Return the study of a file; one that asks for something that a report drops is refused."""
     from airlight.validation.study.study import read_study
 
     study = read_study(path)
     dropped = ["sizes"] if len(study.sizes) > 1 else []
     dropped += ["media"] if any(study.media) else []
+    dropped += study.asked_of("timed", "limit", "retries")
     if dropped:
         raise InputError(
-            f"study {path}: got {' and '.join(dropped)}, but a report has one size and the media "
-            f"of its scenes: leave them out, or airlight sweep {path}"
+            f"study {path}: got {', '.join(dropped)}, but a report has one size, the media of its "
+            "scenes, and all of them timed, in processes without a limit: leave them out, or "
+            f"airlight sweep {path}"
         )
     return study
 

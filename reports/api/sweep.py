@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from airlight.errors import InputError
 from airlight.reports.api.inputs import File, Progress, exclude, one_error, telling
 from airlight.reports.tables.record import Result, Said
 
@@ -136,6 +137,11 @@ def sweep(
     place = parse_place(cluster)
     number = str(100 if study is None else study)
     chosen = default_study(int(number)) if number.isdecimal() else read_study(Path(number))
+    if dropped := chosen.asked_of("half", "points", "checks", "growth", "stability"):
+        raise InputError(
+            f"study {number}: got {', '.join(dropped)}, but a sweep measures methods alone, each "
+            f"scene in the sizes of the study: leave them out, or airlight report {number}"
+        )
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
     # The store keeps every row as it comes: an interrupted sweep continues from there.

@@ -235,11 +235,16 @@ def _reference(old: Scene, new: Scene) -> Iterator[Finding]:
     for key, agreement in old.agreement.items():
         if key not in new.agreement:
             yield Finding("worse", name, "", f"the comparison with {key} is gone")
+            continue
+        was, is_now = verdict(agreement), verdict(new.agreement[key])
         # An estimator that had no time has not spoken against the reference.
-        elif verdict(agreement) is True and verdict(new.agreement[key]) is None:
+        if was is True and is_now is None:
             yield Finding(
                 "note", name, "", f"{key} ran out of time before it could confirm the reference"
             )
+        # Where another check spoke against it before, the verdict over all checks does not say so.
+        if was is not False and is_now is False and not confirmed([old]):
+            yield Finding("worse", name, "", f"{key} contradicts the reference")
     # Counts of shadow rays grow with the pixels, so that only images of one size have comparable
     # ones.
     if old.size == new.size:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of two reports compared, by the rules of `validation.statistics.noise`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from airlight.reports.data.records import Report, Size
@@ -113,7 +113,7 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     """Return the pairs of comparable times, and a note on each time without a partner."""
     before, after = _timed(old), _timed(new)
     pairs: dict[Key, tuple[Times, Times]] = {}
-    notes: dict[Finding, None] = {}
+    notes: dict[Finding, None] = dict.fromkeys(_lost(before, new))
     # Two times are a pair if frames of one size were timed in one way. Notes are keys of a
     # dictionary, which drops repetitions and keeps the order.
     for key in [key for key in before if key in after]:
@@ -152,6 +152,15 @@ def _timed(report: Report) -> dict[Key, tuple[Size, str | None, FrameTimes]]:
         for entry in scene.methods
         if entry.times
     }
+
+
+def _lost(before: Iterable[Key], new: Report) -> Iterator[Finding]:
+    """Yield a note on each scene whose methods still run and have no times any more."""
+    for scene in new.scenes:
+        runs = {entry.label for entry in scene.methods if not (entry.reason or entry.times)}
+        lost = [label for name, label in before if name == scene.name and label in runs]
+        if lost:
+            yield Finding("note", scene.name, "", f"times are gone: {', '.join(lost)}")
 
 
 def _all_times(report: Report) -> list[Times]:

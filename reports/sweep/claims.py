@@ -69,7 +69,7 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
     surely = finite & (sample.errors + sample.reference_errors <= target)
-    possibly = finite & (sample.errors - sample.reference_errors <= target)
+    possibly = finite & (sample.errors <= target + sample.reference_errors)
     # Faults are tries that missed; refusals and scenes without a reference are none.
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())

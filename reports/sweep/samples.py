@@ -222,7 +222,7 @@ class Sample:
     #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN
     #: where nothing was measured.
     errors: Numbers = field(repr=False)
-    #: the reference's own, over its mean [1]; 0 where it says nothing
+    #: the reference's own, over its mean [1]: infinite where it is not known, 0 where it is black
     reference_errors: Numbers = field(repr=False)
     nonfinite: Numbers = field(repr=False)  #: pixels with NaN or infinity, in all cells of a scene
     times: Numbers = field(repr=False)  #: of a frame [ms], see `comparable_times`; NaN elsewhere
@@ -247,7 +247,11 @@ def samples(sweep: Sweep) -> list[Sample]:
     # Columns as arrays, one entry a row.
     labels, scenes, statuses = sweep["label"], sweep["scene"], _statuses(sweep)
     methods, errors = sweep["method"], errors_of(sweep)
-    reference_errors = np.nan_to_num(sweep["reference.error"], nan=0.0)
+    # An error that is not known may be anything. A black reference has no relative error: what is
+    # compared with it is black or not.
+    black = sweep["reference.mean"] == 0
+    reference_errors = np.nan_to_num(sweep["reference.error"], nan=np.inf)
+    reference_errors = np.where(black, 0.0, reference_errors)
     nonfinite = np.nan_to_num(sweep["error.nonfinite"], nan=0.0)
     times = np.where(comparable_times(sweep), sweep[FRAME_MS], np.nan)
     # Random scenes are a sample; chosen ones count only where there are no others (see the module).

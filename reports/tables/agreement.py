@@ -50,11 +50,13 @@ def verdict(compared: Agreement) -> bool | None:
     statistics = compared.statistics
     if statistics.equivalent:
         return True
-    low, high = statistics.relative_bias_ci
-    if compared.finished or low is None or high is None or statistics.margin is None:
+    if compared.finished:
         return False
-    # The run stopped early: its interval is undecided if it overlaps the margin, and against the
-    # reference if it lies outside.
+    # The run stopped early: without an interval nothing is decided; an interval that overlaps the
+    # margin is undecided, and one that lies outside is against the reference.
+    low, high = statistics.relative_bias_ci
+    if low is None or high is None or statistics.margin is None:
+        return None
     return None if low <= statistics.margin and high >= -statistics.margin else False
 
 

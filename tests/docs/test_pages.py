@@ -91,7 +91,7 @@ def test_commands_and_options_that_documents_name_exist():
         for words in command_names()
     } | {"study": set()}
     found, wrong = 0, []
-    for document in sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md"), DOCS / "claims.toml"]):
+    for document in sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md"), DOCS / "claims.toml"]):
         if document.name == "CHANGELOG.md":
             continue  # tells of commands that have gone
         text = document.read_text(encoding="utf-8")

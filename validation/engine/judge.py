@@ -335,7 +335,8 @@ def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[st
     for name in KINDS:
         layers = [reference_layer(reference, name, emitted=judged.emitted) for reference in fitting]
         errors[name] = min(_mean_square(judged.values - values) for values in layers)
-        powers[name] = _mean_square(layers[0])
+        # The same pixels count in both: a mask has made the others of the image NaN.
+        powers[name] = _mean_square(np.where(np.isfinite(judged.values), layers[0], np.nan))
     nearest = min(errors, key=errors.__getitem__)
     # A dim image is near to a layer without light, but not nearer than a tenth of that layer's own.
     if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(
@@ -439,7 +440,7 @@ def all_but_few(compared: EngineComparison, mask: Bools | None = None) -> str:
         np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image)
     )
     chosen = np.ones(reference.shape[:2], dtype=bool) if mask is None else mask
-    finite = np.isfinite(reference)
+    finite = np.isfinite(reference) & chosen[..., None]
     floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
     # Six median errors: noise of a normal distribution is beyond in 5 pixels of 100 000.

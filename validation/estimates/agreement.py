@@ -77,8 +77,8 @@ def agreement(
         reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
     )
     masks = layer_masks(read_reference(scene), plain)
-    # A layer without any light has no relative bias.
-    layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
+    # A layer without any light in the pixels that are compared has no relative bias.
+    layers = [layer for layer in LAYERS if np.any(getattr(plain, layer)[masks[layer]] > 0)]
 
     def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]

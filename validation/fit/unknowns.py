@@ -276,7 +276,7 @@ def _chosen(
     # A name wins over a number: a light may be called '2'.
     if place in names:
         return [choices[names.index(place)]]
-    if place.isdigit() and 1 <= int(place) <= len(choices):
+    if place.isdecimal() and 1 <= int(place) <= len(choices):
         return [choices[int(place) - 1]]
     raise InputError(
         f"fit: got '{name}', expected a {what} of the scene, {', '.join(names)}, or its number"

@@ -17,8 +17,9 @@ A change goes into Mitsuba's own scene, so the methods and the reference read th
 | `medium.albedo` | single-scattering albedo: RGB |
 | `medium.g` | mean cosine of an isotropic or a Henyey-Greenstein phase function |
 
-One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are
-media: first the one around the camera, then those with bounds in the order of their shapes.
+One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, a sky comes
+last. Media are named so too: first the one around the camera, then those with bounds in the order
+of their shapes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -57,7 +58,7 @@ def changeable(scene) -> dict[str, Changeable]:
     """Return the changeable parameters of a Mitsuba scene, by name, with their values."""
     # A scene without a camera has lights and media to change all the same.
     found = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
-    for number, emitter in enumerate(scene.emitters(), 1):
+    for number, emitter in enumerate(_lights(scene), 1):
         found += _of_light(_numbered("light", number), emitter)
     for number, medium in enumerate(_media(scene), 1):
         found += _of_medium(_numbered("medium", number), medium)
@@ -93,25 +94,13 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     A name that the scene does not have and a value that it cannot have are refused,
     and the scene is as it was.
     """
-    # All values are checked before any is set: a refused change leaves the scene as it was.
-    known = changeable(scene)
+    # All values are checked before any is set. What a part refuses of values together, such as
+    # numbers of height fog without a bound, is known only then: all parts get their old values.
     wanted = checked_changes(scene, changes)
-    camera = {
-        name.partition(".")[2]: values
-        for name, values in wanted.items()
-        if name.startswith("camera.")
-    }
-    # Origin, target and up make one transform: coordinates that are not changed are read from the
-    # camera.
-    if camera:
-        _change_camera(
-            scene.sensors()[0],
-            {name: known[f"camera.{name}"].value for name in _AIM} | camera,
-            camera,
-        )
-    # Changes of one light or medium are made together, since its plugin is updated once.
+    changed = []
     for kind, parts, change in (
-        ("light", scene.emitters(), _change_light),
+        ("camera", scene.sensors()[:1], _change_camera),
+        ("light", _lights(scene), _change_light),
         ("medium", _media(scene), _change_medium),
     ):
         for number, part in enumerate(parts, 1):
@@ -121,8 +110,24 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
                 for name, values in wanted.items()
                 if name.startswith(prefix)
             }
-            if own:
-                change(part, own)
+            changed += [(part, change, own)] if own else []
+    before = [(part, _parameters(part)) for part, _, _ in changed]
+    try:
+        # The changes of one part are made together, since its plugin is updated once.
+        for part, change, own in changed:
+            change(part, own)
+    except InputError:
+        for part, values in before:
+            parameters = mi.traverse(part)
+            for name, value in values.items():
+                parameters[name] = value
+            parameters.update()
+        raise
+
+
+def _parameters(part: Any) -> dict[str, Any]:
+    """Return copies of the parameters of a plugin, which Mitsuba may change in place."""
+    return {name: type(value)(value) for name, value in mi.traverse(part)}
 
 
 def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> None:
@@ -261,9 +266,13 @@ def _of_camera(sensor) -> Iterable[Changeable]:
     yield Changeable("camera.fov", _values(parameters["x_fov"]), (1,), 0.1, 179.0, "degrees")
 
 
-def _change_camera(sensor, aim: Mapping[str, Values], changed: Mapping[str, Values]) -> None:
+def _change_camera(sensor, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(sensor)
+    # Origin, target and up make one transform: coordinates that are not changed are read from the
+    # camera.
     if set(changed) & set(_AIM):
+        aim = {item.name.removeprefix("camera."): item.value for item in _of_camera(sensor)}
+        aim |= changed
         parameters["to_world"] = _looking(parameters["to_world"], *(aim[name] for name in _AIM))
     if "fov" in changed:
         parameters["x_fov"] = changed["fov"][0]
@@ -287,6 +296,13 @@ def _looking(like, origin: Values, target: Values, up: Values):
 
 
 # Lights -------------------------------------------------------------------------------------------
+
+
+def _lights(scene) -> list[Any]:
+    """Return the emitters in the order of their names: a sky comes behind the lights, which methods
+    count without it.
+    """
+    return sorted(scene.emitters(), key=lambda emitter: emitter.is_environment())
 
 
 def _of_light(prefix: str, emitter) -> Iterable[Changeable]:

@@ -169,6 +169,11 @@ class Study(Settings):
             checks=replace(self.checks, size=checked, samples=samples),
         )
 
+    def asked_of(self, *names: str) -> list[str]:
+        """Return those of some fields that are not as in a study without a file."""
+        plain = Study()
+        return [name for name in names if getattr(self, name) != getattr(plain, name)]
+
     def wants_flip(self, chosen: Configuration) -> bool:
         """Return whether HDR-FLIP of a configuration is asked for."""
         return self.flip == "all" or (self.flip == "kinds" and (chosen in QUICK or chosen.own))

@@ -44,8 +44,8 @@ from airlight.realtime.methods.light_volumes.face_lines import (
 from airlight.realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
 from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
-_FACE_BITS = 3  # of the number of a face in an order of faces
-_NO_FACE = (1 << _FACE_BITS) - 1  # stands behind the last
+_NO_FACE = 0b111  # stands behind the last in an order of faces, whose numbers are 0 to 5
+_FACE_BITS = _NO_FACE.bit_length()  # of each number there
 
 
 @dataclass

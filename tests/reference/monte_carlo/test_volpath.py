@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airlight.reference.monte_carlo.batches import merged
-from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.monte_carlo.volpath import stream_of, volpath_batch
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
@@ -110,3 +110,17 @@ def test_agrees_with_the_quadrature(variant, name):
     assert [each.sigma_t.tolist() for each in again.media] == [
         each.sigma_t.tolist() for each in reference.media
     ]
+
+
+def test_no_two_images_channels_or_parts_share_a_stream():
+    """The number of parts was a factor: an airlight in two parts and a surface in one of another
+    batch shared streams.
+    """
+    random = np.random.default_rng(7)
+    drawn = zip(
+        random.integers(0, 2**21, 200_000).tolist(),
+        random.integers(0, 3, 200_000).tolist(),
+        random.integers(0, 64, 200_000).tolist(),
+    )
+    images = set(drawn)
+    assert len({stream_of(*image) for image in images}) == len(images)

@@ -162,6 +162,16 @@ OF_SCENE = {"reference": "open-fog", "test": np.ones((3, 4, 3))}
         (airlight.render, {"scene": "open-fog", "frames": 0}, "frames: got 0, expected 1 or more"),
         (
             airlight.render,
+            {"scene": "open-fog", "samples": 1.5},
+            r"samples: got 1\.5, expected a whole number",
+        ),
+        (
+            airlight.reference,
+            {"scene": "open-fog", "estimator": "volpath", "seed": "3"},
+            "seed: got '3', expected a whole number",
+        ),
+        (
+            airlight.render,
             {"scene": "open-fog", "run": -1},
             "run: got -1, expected a whole number from 0",
         ),

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a report measures what its study says, or refuses it."""
+"""Claim: a report and a sweep measure what their study says, or refuse it."""
 
 import pytest
 
 from airlight.errors import InputError
 from airlight.reports.api.report import _study_of
+from airlight.reports.api.sweep import sweep
 
 
 @pytest.mark.parametrize(
@@ -12,6 +13,9 @@ from airlight.reports.api.report import _study_of
     [
         ('sizes = ["16x12", "32x24"]', "got sizes, but"),
         ('media = [{ "medium.sigma_t" = 0.17 }]', "got media, but"),
+        ("limit = 7", "got limit, but"),
+        ("retries = 1", "got retries, but"),
+        ('times = "alone"\ntimed = 3', "got timed, but"),
         ("media = [{}]", None),
     ],
 )
@@ -24,3 +28,24 @@ def test_what_a_report_would_drop_is_refused(tmp_path, line, dropped):
         return
     with pytest.raises(InputError, match=dropped):
         _study_of(path)
+
+
+@pytest.mark.parametrize(
+    ("lines", "dropped"),
+    [
+        ('half = ["open-fog"]', "half"),
+        ("points = 4", "points"),
+        ("[checks]\nbatches = 64", "checks"),
+        ('growth = ["size"]', "growth"),
+        ("stability = 100", "stability"),
+    ],
+)
+def test_what_a_sweep_would_drop_is_refused(tmp_path, monkeypatch, lines, dropped):
+    """The rows were those of a study without it."""
+    pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(f'scenes = ["open-fog"]\n{lines}\n')
+    with pytest.raises(InputError, match=f"got {dropped}, but"):
+        sweep(path)
+    assert list(tmp_path.iterdir()) == [path]

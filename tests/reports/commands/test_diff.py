@@ -234,6 +234,26 @@ def test_what_has_other_sizes_is_not_compared_and_said():
         compare_reports(report(), new)
 
 
+def test_times_that_are_gone_are_said():
+    """A method that still runs had lost its times without a word."""
+    new = report(1)
+    method(new)["times"] = None
+    difference = compare_reports(report(), new)
+    assert words(difference) == []
+    assert "hall times are gone: shadow-planes (exact)" in words(difference, "note")
+
+
+def test_a_check_that_turns_is_named_where_another_one_had_turned_before():
+    old, new = report(), report(1)
+    for data, says in ((old, True), (new, False)):
+        data["scenes"][0]["agreement"] = {
+            "single-scatter airlight": agreement(False),
+            "volpath airlight": agreement(says),
+        }
+    assert words(compare_reports(old, new)) == ["fog volpath airlight contradicts the reference"]
+    assert words(compare_reports(new, old)) == []
+
+
 def test_times_of_two_devices_are_never_compared():
     old, new = report(), report()
     method(old)["device"], method(new)["device"] = "llvmpipe (LLVM 15.0.6, 256 bits)", "NVIDIA A100"

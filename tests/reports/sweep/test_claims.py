@@ -51,6 +51,10 @@ TRIES = {
         [_RIGHT, _NO_REFERENCE, {"status": "hung", "reason": "stopped after 600 s"}],
         (2, 1, 0, 0, 1),
     ),
+    "an error of the reference that is not known decides nothing": (
+        [_RIGHT, {"relative_rmse": 5e-4, "reference_error": None}],
+        (2, 1, 1, 0, 0),
+    ),
     "what the reference cannot tell is undecided": (
         [
             *[_RIGHT] * 10,

@@ -151,7 +151,8 @@ def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
         (False, [-0.001, 0.03], True, False),
         (False, [-0.001, 0.03], False, None),  # not decided in time
         (False, [0.006, 0.03], False, False),  # outside as a whole
-        (False, [None, None], False, False),
+        (False, [None, None], True, False),
+        (False, [None, None], False, None),  # stopped before there was an interval
     ],
 )
 def test_a_reference_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):

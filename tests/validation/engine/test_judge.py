@@ -340,6 +340,18 @@ def test_pixels_that_a_file_does_not_hold_are_not_among_the_few_that_are_wrong()
     assert words in all_but_few(compared, held)
 
 
+def test_light_that_a_mask_leaves_out_does_not_hide_the_few_pixels_that_are_wrong():
+    """The floor of relative errors was a fraction of the mean with the masked light."""
+    reference = np.full((40, 40, 3), 1e-3)
+    reference[:10] = 1e3
+    held = np.arange(40)[:, None] >= np.full((1, 40), 10)
+    image = reference.copy()
+    image[20:22, 5] = 3e-3
+    compared = SimpleNamespace(reference=reference, image=image)
+    words = "all is right but 2 of 1200 pixels, in columns 5 to 5 and rows 20 to 21"
+    assert words in all_but_few(compared, held)
+
+
 def test_the_rest_of_an_error_is_that_of_the_pixels_that_are_compared():
     """It was a mean with the pixels that a mask leaves out, which have no error: half of it."""
     expected, lamp = np.ones((40, 40, 3)), np.full((40, 40), 99.0)

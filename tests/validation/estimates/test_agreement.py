@@ -3,6 +3,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from airlight.reference.quadrature.reference import reference_image
@@ -143,3 +144,12 @@ def test_the_time_of_the_pilot_does_not_count(scene, own_cache, monkeypatch):
     verdicts = agreement(scene, margin=1e-7, batches=9, samples=4, seconds=50.0)
     assert now == 100.0
     assert {verdict.batches for verdict in verdicts.values()} == {9}
+
+
+def test_a_layer_whose_light_is_all_left_out_has_no_verdict(scene, monkeypatch):
+    """Its bias was a quotient by zero."""
+    none = np.zeros((18, 24), dtype=bool)
+    monkeypatch.setattr(
+        agreement_module, "layer_masks", lambda *_: {"airlight": none, "surface": ~none}
+    )
+    assert set(agreement(scene, margin=0.02, batches=2, samples=4)) == {"surface"}

@@ -269,3 +269,30 @@ def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
     for moved in animate(scene, animation, 4):
         _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
     assert calls == {"surface": casts, "prepare": prepared_frames}
+
+
+def test_a_medium_that_refuses_late_leaves_camera_and_light_as_they_were():
+    """Height fog sees only when all numbers are set that nothing bounds its density."""
+    scene = load_scene("street", (16, 12)).scene
+    before = {name: item.value for name, item in changeable(scene).items()}
+    changes = {
+        "camera.origin": tuple(value + 0.1 for value in before["camera.origin"]),
+        "light.intensity": (7.0, 7.0, 7.0),
+        "medium.z_1": (5000.0,),
+    }
+    with pytest.raises(InputError, match="nothing bounds the density"):
+        change_scene(scene, changes)
+    after = {name: item.value for name, item in changeable(scene).items()}
+    assert after.keys() == before.keys()
+    for name, value in before.items():
+        np.testing.assert_allclose(after[name], value, rtol=1e-6, atol=1e-6, err_msg=name)
+
+
+def test_a_sky_before_the_lights_has_the_last_name():
+    """Frames of an animation name the lights that methods see, which count no sky."""
+    description = SCENES["open-fog"].build()
+    sky = {"sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.1}}}
+    known = changeable(mi.load_dict({"type": "scene"} | sky | description))
+    assert "light.position" in known
+    assert "light-2.position" not in known
+    assert "light-2.radiance" in known
