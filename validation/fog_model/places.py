@@ -24,7 +24,6 @@ which the fog knows.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
@@ -308,7 +307,7 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
         sigma_t = medium.sigma_t
     else:
         fog, up = fog_of(medium), medium.up
-        heights: list[Any] = [
+        heights: list[float] = [
             place @ up,
             reference.origin @ up,
             *(layer.base for layer in fog.layers),
