@@ -14,9 +14,10 @@ how many count as one: with S the sum of the errors of a block and Q the sum of 
     A = sum over blocks of S^2 / sum over blocks of Q
 
 is 1 in the mean for independent errors, and the number of pixels in a block where all pixels of a
-block have one error. The gain over A, less log(n/A)/2 for each number (Schwarz 1978, Ann. Statist. 6, 461), is the
-evidence. It is a score: its limit is measured by `docs/tools/calibrate_diagnosis.py`, on right
-images with the errors that engines have and on faulty ones.
+block have one error. The gain over A, less log(n/A)/2 for each number (Schwarz 1978, Ann. Statist.
+6, 461), is the evidence. It is a score: its limit is measured by
+`docs/tools/calibrate_diagnosis.py`, on right images with the errors that engines have and on faulty
+ones.
 
 **Noise.** An explanation leaves noise if A is 1 at most, within two standard errors of it for
 independent pixels, sqrt(2/blocks). One image in thirty of normal noise alone is beyond: A is then a
@@ -24,9 +25,9 @@ mean over blocks of chi-squares.
 
 **Choice.** The explanation with the most evidence is chosen, or the simplest one of all that are as
 good. A pair of faults is chosen if the second is as sure as the first, in an image that has the
-first one. The fault is named if its evidence and the fraction of the error that it leaves are within
-the limits of `calibration.json`: the diagnosis then names a fault in at most 5 % of the right images
-with errors of engines.
+first one. The fault is named if its evidence and the fraction of the error that it leaves are
+within the limits of `calibration.json`: the diagnosis then names a fault in at most 5 % of the
+right images with errors of engines.
 """
 
 import json
@@ -39,6 +40,7 @@ from pathlib import Path
 import numpy as np
 
 from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.engine.judge import BLOCK
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
 
@@ -67,11 +69,11 @@ class Blocks:
     @classmethod
     def of(cls, predictor: Predictor) -> "Blocks":
         """Return the blocks of what is looked at."""
-        # Eight pixels a side, as in a comparison (`validation.engine.judge`), but six blocks at
+        # As many pixels a side as in a comparison (`validation.engine.judge`), but six blocks at
         # least along the shorter side: a few blocks tell no noise from a gradient. Not all pixels
         # are looked at, so that blocks have different numbers of them, or none.
         height, width = predictor.shape
-        side = max(1, min(8, min(height, width) // 6))
+        side = max(1, min(BLOCK, min(height, width) // 6))
         row, column = np.divmod(predictor.pixels, width)
         used, number = np.unique((row // side) * width + column // side, return_inverse=True)
         return cls(number, len(used))

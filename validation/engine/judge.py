@@ -363,7 +363,8 @@ def fitting_kind(
     faults of the whole image.
 
     `reference_of`: computes a reference; asked for the means only if the image does not fit the
-    centres to 0.1 %; `kinds`: what its pixels may be, see `validation.engine.observation.pixel_kinds`.
+    centres to 0.1 %; `kinds`: what its pixels may be, see
+    `validation.engine.observation.pixel_kinds`.
     """
 
     def attempt(kind: str) -> tuple[Array, Hints]:

@@ -164,9 +164,9 @@ def fit_image(
     observation = replace(observation, used=observation.used & ~stops, rays=20_000, apart=0)
     # Four pixels for each number, sixteen at least.
     fewest = max(16, 4 * len(unknowns))
-    if int(observation.used.sum()) < fewest:
+    if (count := int(observation.used.sum())) < fewest:
         raise InputError(
-            f"{path}: {int(observation.used.sum())} pixels of the layer '{judged.name}' say something; "
+            f"{path}: {count} pixels of the layer '{judged.name}' say something; "
             "expected at least "
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )

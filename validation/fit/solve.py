@@ -422,8 +422,8 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
             # No end yet: a step a little beyond where a line through the profile reaches it, three
-            # times as far at most. Where an image allows 30 of a logarithm, a factor of 10^13, there
-            # is no end.
+            # times as far at most. Where an image allows 30 of a logarithm, a factor of 10^13,
+            # there is no end.
             if abs(distance) > 3.0 * farthest[number]:
                 break
             distance *= min(1.1 * SIGMAS / max(errors, 1e-9), 3.0)

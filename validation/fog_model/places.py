@@ -308,8 +308,8 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
     else:
         fog, up = fog_of(medium), medium.up
         heights: list[float] = [
-            place @ up,
-            reference.origin @ up,
+            float(place @ up),
+            float(reference.origin @ up),
             *(layer.base for layer in fog.layers),
         ]
         sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])
