@@ -175,14 +175,14 @@ class _Search:
     def __init__(self, predictor: Predictor, faults: tuple[Fault, ...]) -> None:
         self.predictor, self.faults = predictor, faults
         self.numbers = tuple(number for fault in faults for number in fault.parameters)
-        self.known: dict[Values, Array] = {}
+        self.cached: dict[Values, Array] = {}  # errors by values
 
     def errors(self, values: Values) -> Array:
-        if values not in self.known:
-            self.known[values] = self.predictor.errors(
+        if values not in self.cached:
+            self.cached[values] = self.predictor.errors(
                 guess_of(self.predictor, self.faults, values)
             )
-        return self.known[values]
+        return self.cached[values]
 
     def loss(self, values: Values, scale: float) -> float:
         return float(np.mean(np.log1p((self.errors(values) / scale) ** 2)))
