@@ -135,7 +135,7 @@ class Candidates:
         """Return the candidates with further explanations."""
         return replace(self, tried=(*self.tried, *explanations))
 
-    # What an explanation leaves.
+    # The errors that an explanation leaves.
 
     def is_little(self, explanation: Explanation) -> bool:
         """Return whether an explanation leaves no more than the error of the fog model itself, or
