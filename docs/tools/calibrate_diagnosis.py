@@ -122,11 +122,11 @@ def _images(scene: str, seed: int) -> list[dict[str, Any]]:
     """
     from airlight.reference.scene.read import read_reference
     from airlight.reference.storage.exr import Image
-    from airlight.validation.engine.fault import traits
     from airlight.validation.engine.faults import FAULTS
+    from airlight.validation.engine.observation import JudgedLayer, observation_of
     from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
-    from airlight.validation.engine.search import _own_starts
-    from airlight.validation.engine.seen import JudgedLayer, seen_image
+    from airlight.validation.engine.search import starts_of
+    from airlight.validation.engine.traits import traits
     from airlight.validation.scenes.loading import load_scene
 
     rng = np.random.default_rng(seed)
@@ -134,16 +134,18 @@ def _images(scene: str, seed: int) -> list[dict[str, Any]]:
     light = SceneLight(read_reference(loaded.scene))
     shape = (_SIZE[1], _SIZE[0], 3)
     blank = Image({"total": np.ones(shape)})
-    seen, _ = seen_image(blank, JudgedLayer("total", "total", blank.layers["total"]), loaded.scene)
+    observation, _ = observation_of(
+        blank, JudgedLayer("total", "total", blank.layers["total"]), loaded.scene
+    )
 
     def shown(guess: Any, values: Array | None = None) -> tuple[Predictor, Array, Array]:
         predictor = Predictor(
-            replace(seen, values=seen.values if values is None else values), light
+            replace(observation, values=observation.values if values is None else values), light
         )
         fog, surface = predictor.layers(guess)
         return predictor, fog.reshape(shape), surface.reshape(shape)
 
-    plain = Guess(Predictor(seen, light).fog)
+    plain = Guess(Predictor(observation, light).fog)
     predictor, fog, surface = shown(plain)
     right = fog + surface
     predictor, _, _ = shown(plain, right.reshape(-1, 3))
@@ -173,7 +175,7 @@ def _images(scene: str, seed: int) -> list[dict[str, Any]]:
         for _ in range(2):
             while True:
                 fault = possible[rng.integers(len(possible))]
-                starts = [tuple(start) for start in _own_starts(predictor, fault, (), ())]
+                starts = [tuple(start) for start in starts_of(predictor, [fault])]
                 start = starts[rng.integers(len(starts))]
                 start = tuple(
                     min(max(value * math.exp(rng.uniform(-0.2, 0.2)), number.low), number.high)

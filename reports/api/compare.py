@@ -400,7 +400,7 @@ def _fit(
 
     activate()
     from airlight.reports.api.comparisons import fitted
-    from airlight.validation.engine.seen import judged_layer, scene_of_size
+    from airlight.validation.engine.observation import judged_layer, scene_of_size
     from airlight.validation.fit.fit import fit_image
 
     # The scene is loaded at the size of the image, whose pixels the fit explains.

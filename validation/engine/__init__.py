@@ -3,14 +3,18 @@
 
 Read in this order:
 
-- `seen.py`: which layer of an image is judged, its values, and the pixels that take part;
+- `observation.py`: which layer of an image is judged, its values, and the pixels that take part;
 - `prediction.py`: the image of a scene for a fog, lights, a camera and an encoding;
+- `fault.py`: what a fault is, and the numbers that are looked for in it;
+- `faults.toml` and `faults.py`: the catalogue of all faults, and the faults of single lights;
+- `targets.py`: what of a guess of an image a fault changes;
+- `transforms.py`: the formulas of faults;
 - `curves.py`: encodings and tone curves;
-- `fault.py`: what a fault is, and how it changes a guess;
-- `media_faults.py`, `light_faults.py`, `image_faults.py`, `layer_faults.py`: the faults;
-- `faults.py`: the catalogue of all faults, and the faults of single lights;
-- `search.py`: the parameters with which faults fit best;
-- `evidence.py`: how much speaks for an explanation, and whether it leaves noise alone;
+- `starts.py`: the values with which the search for the numbers of a fault begins;
+- `traits.py`: what a scene and its image have that faults need;
+- `search.py`: the numbers with which faults fit best;
+- `decide.py`: how much speaks for an explanation, what it leaves, and whether it is named;
+- `stages.py`: in which order faults are tried, and when that is enough;
 - `error_place.py`: where an error lies;
 - `diagnose.py`: what is wrong with an image;
 - `hints.py`: what may be wrong with an image as a whole, without any path of light;

@@ -3,7 +3,7 @@
 below 0 stay, or become 0.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -125,15 +125,4 @@ def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
 PRIMARIES: Mapping[str, Array] = {
     name: np.asarray(np.linalg.solve(_to_cones(space), _to_cones(_SRGB)), dtype=np.float64)
     for name, space in _SPACES.items()
-}
-
-#: Tone curves by the words for them in a sentence on an image.
-TONE_CURVES: Mapping[str, Callable[[Array], Array]] = {
-    "the tone curve x/(1 + x)": reinhard,
-    "the tone curve 1 - exp(-x)": exponential,
-    "a filmic (ACES) tone curve": filmic,
-    "the tone curve x/(1 + x), then the sRGB curve": lambda radiance: to_srgb(reinhard(radiance)),
-    "a filmic (ACES) tone curve, then the sRGB curve": lambda radiance: to_srgb(filmic(radiance)),
-    "Blender's view transform Filmic": blender_filmic,
-    "Blender's view transform AgX": agx,
 }

@@ -4,31 +4,19 @@ make, and the data choose.
 
 1. An image that is right by `validation.engine.judge` is right: no fault is looked for.
    One that is black is black.
-2. Faults without paths of their own are tried alone. Where none of them leaves noise alone, pairs
-   of faults of different kinds follow, and then the faults that need paths of their own. Whether
-   pixels are centres or means is decided once, by the errors that the faults without paths of their
-   own leave.
-3. The explanation with the most evidence is chosen, or the simplest one of all that are as good
-   (`evidence.py`).
-4. It is named if its evidence and the fraction of the error that it leaves are within the limits of
-   the calibration (`calibration.json`). The limits are chosen so that the diagnosis names a fault
-   in at most 5 % of the right images with errors of engines.
+2. The stages of `stages.py` try faults, until one leaves nothing to explain. Whether pixels are
+   centres or means is decided once, by the errors that the first stage leaves.
+3. `decide.py` chooses an explanation, and says whether it is named.
 """
 
 import os
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
 
 from airlight.errors import InputError
 from airlight.reference.storage.exr import NOTE, Image, read_exr
 from airlight.validation.arrays import Progress
+from airlight.validation.engine.decide import Candidates
 from airlight.validation.engine.error_place import place_words
-from airlight.validation.engine.evidence import EVIDENCE, KNOWN, LEFT, Blocks, evidence, scale_of
-from airlight.validation.engine.fault import Fault
-from airlight.validation.engine.faults import KINDS, faults_of
 from airlight.validation.engine.judge import (
     EngineComparison,
     ReferenceOf,
@@ -36,24 +24,21 @@ from airlight.validation.engine.judge import (
     judge_image,
     references,
 )
-from airlight.validation.engine.prediction import Predictor, SceneLight
-from airlight.validation.engine.search import Explanation, begin, explain
-from airlight.validation.engine.seen import (
+from airlight.validation.engine.observation import (
     PIXEL_WORDS,
     decide_pixel,
     judged_layer,
     layers_of,
+    observation_of,
     pixel_kinds,
     scene_of_size,
-    seen_image,
 )
+from airlight.validation.engine.prediction import Predictor, SceneLight
+from airlight.validation.engine.search import Explanation
+from airlight.validation.engine.stages import QUICK, Attempt
 from airlight.validation.scenes.loading import LoadedScene
 
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
-
-_LITTLE = 0.05  # fraction of the error: less is no second fault, nor another image
-# Fractions of the progress: faults of the costs 0, 1 and 2, and pairs, which follow the cost 0.
-_PARTS = (0.0, 0.3), (0.5, 0.8), (0.8, 1.0), (0.3, 0.5)
 
 
 @dataclass(frozen=True)
@@ -64,7 +49,7 @@ class Ranked:
     parameters: tuple[float, ...]
     words: str
     residual: float  #: mean relative error that it leaves, together with the others of `together`
-    evidence: float  #: score against the unchanged scene, see `validation.engine.evidence`
+    evidence: float  #: score against the unchanged scene, see `validation.engine.decide`
     #: names of all that explain the image together, where it takes more than one
     together: tuple[str, ...]
 
@@ -149,21 +134,41 @@ def diagnose_file(
     *,
     layer: str | None = None,
     holds: str | None = None,
-    **how: Any,
+    pixel: str | None = None,
+    light: SceneLight | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
-    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has
-    both; see `diagnose_image`.
+    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both.
 
-    `path`, `scene`: the EXR file; a built-in scene or a Mitsuba XML file; `layer`, `holds`: which
-    layer, see `validation.engine.seen.judged_layer`. A layer that is black, as it should be, says
-    nothing beside another one.
+    A layer that is black, as it should be, says nothing beside another one.
+
+    Parameters
+    ----------
+    path
+        The EXR file.
+    scene
+        A built-in scene or a Mitsuba XML file.
+    layer, holds
+        Which layer, and what it holds, see `validation.engine.observation.judged_layer`.
+    pixel, light, progress
+        See `diagnose_image`.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
     loaded = scene_of_size(scene, several[0].size, path)
-    how["reference_of"] = references(loaded)
+    reference_of = references(loaded)
     diagnoses = [
-        diagnose_image(image, loaded, path=str(path), layer=each.name, holds=each.holds, **how)
+        diagnose_image(
+            image,
+            loaded,
+            path=str(path),
+            layer=each.name,
+            holds=each.holds,
+            pixel=pixel,
+            light=light,
+            reference_of=reference_of,
+            progress=progress,
+        )
         for each in several
     ]
     # A black layer without an error is right: it is left out, unless there is no other layer.
@@ -206,9 +211,9 @@ def diagnose_image(
         If fewer than 16 pixels say something, or fits and diagnoses do not predict the scene.
     """
     judged = judged_layer(image, path, name=layer, holds=holds)
-    seen, failures = seen_image(image, judged, loaded.scene)
+    observation, failures = observation_of(image, judged, loaded.scene)
     fewest = 16  # pixels
-    if (count := int(seen.used.sum())) < fewest:
+    if (count := int(observation.used.sum())) < fewest:
         raise InputError(
             f"{path}: {count} pixels of the layer '{judged.name}' say something; expected at least "
             f"{fewest}, finite "
@@ -220,19 +225,21 @@ def diagnose_image(
     compared = judge_image(
         image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data()
     )
-    # The comparison has decided what the pixels of a right image are. Elsewhere every kind of pixel
-    # has an attempt with the faults that cost nothing, and the smaller error decides. An image that
-    # is wrong as a whole, such as a black one, needs no search.
-    light = light or SceneLight(seen.reference)
+    # The comparison has decided what the pixels of a right image are. Elsewhere the first stage is
+    # tried with every kind of pixels, and the smaller error decides. An image that is wrong as a
+    # whole, such as a black one, needs no search.
+    light = light or SceneLight(observation.reference)
     pixels = (compared.pixel,) if compared.verdict.right else pixel_kinds(image, pixel)
+    is_searched = not compared.verdict.right and not compared.hints.reason
 
-    def begun(kind: str) -> _Attempt:
-        attempt = _Attempt(Predictor(replace(seen, area=kind == "area"), light), kind, progress)
-        if not compared.verdict.right and not compared.hints.reason:
-            attempt.try_faults(0)
-        return attempt
+    def begun(kind: str) -> Attempt:
+        attempt = Attempt.begun(Predictor(replace(observation, area=kind == "area"), light), kind)
+        return attempt.after(QUICK, progress) if is_searched else attempt
 
-    kind, attempt = decide_pixel(pixels, begun, lambda each: [one.chosen.error for one in each])
+    kind, attempt = decide_pixel(
+        pixels, begun, lambda attempts: [each.candidates.chosen.error for each in attempts]
+    )
+    right = attempt.candidates.right
     # The diagnosis of a right image, from which the others differ by what a search finds.
     diagnosis = Diagnosis(
         scene=loaded.name,
@@ -240,9 +247,9 @@ def diagnose_image(
         layer=judged.name,
         pixel=kind.pixel,
         first=RIGHT,
-        ranked=tuple(_rows(attempt.right, 0.0)),
-        residual=attempt.right.error,
-        left=attempt.right.error,
+        ranked=tuple(_rows(right, 0.0)),
+        residual=right.error,
+        left=right.error,
         rest="little",
         explained=True,
         place="",
@@ -261,32 +268,33 @@ def diagnose_image(
         row = Ranked(first, (), compared.hints.reason, diagnosis.residual, 0.0, ())
         return replace(diagnosis, first=first, ranked=(row,), rest="", explained=False)
     # Where a few pixels are wrong and all others right, such as a mark on the image, no path of
-    # light explains it: the costly faults are not tried.
-    few = "" if attempt.chosen.faults else all_but_few(compared, image.with_data())
+    # light explains it: the later stages are left out.
+    is_right_so_far = not attempt.candidates.chosen.faults
+    few = all_but_few(compared, image.with_data()) if is_right_so_far else ""
     if not few:
-        attempt.go_on()
+        attempt = attempt.finished(progress)
     return _concluded(diagnosis, attempt, compared, few)
 
 
 def _concluded(
-    diagnosis: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str
+    diagnosis: Diagnosis, attempt: Attempt, compared: EngineComparison, few: str
 ) -> Diagnosis:
     """Return a diagnosis with what a search has found."""
-    chosen = attempt.chosen
-    if chosen.faults and attempt.is_named(chosen):
+    candidates, chosen = attempt.candidates, attempt.candidates.chosen
+    if chosen.faults and candidates.is_named(chosen):
         first = chosen.names[0]
-    elif attempt.blocks.is_noise(attempt.right) and compared.verdict.noise_alone:
+    elif candidates.blocks.is_noise(candidates.right) and compared.verdict.noise_alone:
         # Noise alone makes blocks differ: that is no fault, and the comparison says so too.
-        first, chosen = RIGHT, attempt.right
+        first, chosen = RIGHT, candidates.right
     else:
         first = UNEXPLAINED
     # The record has eight rows. Where the error lies is said only if it is not explained.
-    rest = attempt.rest(chosen)
+    rest = candidates.remainder(chosen)
     explained = bool(rest) and first != UNEXPLAINED
     return replace(
         diagnosis,
         first=first,
-        ranked=tuple(attempt.ranked(chosen)[:8]),
+        ranked=tuple(_ranked(candidates, chosen)[:8]),
         left=chosen.error,
         rest=rest,
         explained=explained,
@@ -295,205 +303,18 @@ def _concluded(
     )
 
 
-class _Attempt:
-    """The search among all faults, with pixels of one kind."""
-
-    def __init__(self, predictor: Predictor, pixel: str, progress: Progress | None) -> None:
-        self.many = predictor.many
-        self.predictor = predictor.few if self.many else predictor
-        self.pixel, self.progress = pixel, progress
-        self.blocks = Blocks.of(self.predictor)
-        self.right = explain(self.predictor, ())
-        self.faults = faults_of(self.predictor)
-        self.found: list[Explanation] = []
-
-    def go_on(self) -> None:
-        """Try what costs more where it is needed."""
-        for step in (self.try_pairs, lambda: self.try_faults(1), lambda: self.try_faults(2)):
-            if self.is_settled(self.chosen):
-                return
-            step()
-
-    def try_faults(self, costly: int) -> None:
-        """Try all faults of a cost, each alone."""
-        faults, tried = (
-            [fault for fault in self.faults if fault.costly == costly],
-            list[Explanation](),
-        )
-        for number, fault in enumerate(faults):
-            self._tell(_PARTS[costly], number / len(faults), fault.name)
-            tried.append(explain(self.predictor, (fault,), fine=False))
-        self.found += self._refined(tried)
-
-    def try_pairs(self) -> None:
-        """Try two faults of different kinds.
-
-        Each pair has one of the faults that leave least, and starts from the values found for its
-        faults alone; the best pairs are followed until one leaves nothing to explain.
-        """
-        # Single faults that cost nothing, by what they leave; some are never half of a pair.
-        ordered = sorted(self.found, key=lambda each: each.error)
-        cheap = [
-            each.faults[0]
-            for each in ordered
-            if not each.faults[0].costly and not each.faults[0].single
-        ]
-        # An exposure is wrong beside anything else, and alone explains little
-        # where a curve comes after it.
-        cheap.sort(key=lambda fault: fault.name != "factor")
-        # The first six faults are tried with all that follow them.
-        pairs = [
-            _in_order(a, b)
-            for n, a in enumerate(cheap[:6])
-            for b in cheap[n + 1 :]
-            if _differ(a, b)
-        ]
-        # First half of the time: the error of each pair at its best start, on few pixels.
-        few, begun = self.predictor.few, []
-        for number, pair in enumerate(pairs):
-            self._tell(
-                _PARTS[-1], 0.5 * number / len(pairs), " and ".join(fault.name for fault in pair)
-            )
-            begun.append((*begin(few, pair), pair))
-        begun.sort(key=lambda each: each[0])
-        # Second half: the twelve pairs that leave least are followed, on few pixels first. All
-        # pixels are looked at only if a pair leaves much less than the best single fault.
-        most = 12
-        explanations: list[Explanation] = []
-        for number, (_, near, pair) in enumerate(begun[:most]):
-            self._tell(
-                _PARTS[-1], 0.5 + 0.5 * number / most, " and ".join(fault.name for fault in pair)
-            )
-            rough = explain(few, pair, near, fine=False)
-            if rough.error < LEFT * ordered[0].error:
-                explanations.append(explain(self.predictor, pair, rough.values))
-                if self.is_settled(explanations[-1]):
-                    break
-        self.found += explanations
-
-    def is_settled(self, explanation: Explanation) -> bool:
-        """Return whether an explanation leaves noise, or little: nothing for another fault."""
-        return self.blocks.is_noise(explanation) or self._is_little(explanation)
-
-    def _is_little(self, explanation: Explanation) -> bool:
-        """Return whether an explanation leaves no more than the error of the fog model itself, or
-        little more.
-        """
-        # A twentieth of the error of the image is little too, up to the model's error of means.
-        most = max(KNOWN[self.pixel], min(KNOWN["area"], _LITTLE * self.right.error))
-        return explanation.error <= most
-
-    def is_named(self, explanation: Explanation) -> bool:
-        """Return whether an explanation is within the limits of the calibration."""
-        weight = self._evidence([explanation])[0]
-        return weight > EVIDENCE and (
-            self.is_settled(explanation) or explanation.error < LEFT * self.right.error
-        )
-
-    def rest(self, explanation: Explanation) -> str:
-        """Return what an explanation leaves in words; nothing where something else is wrong too."""
-        if self.blocks.is_noise(explanation):
-            return "like noise: neighbouring pixels do not share it"
-        return "little" if self._is_little(explanation) else ""
-
-    @property
-    def chosen(self) -> Explanation:
-        """The explanation with the most evidence, or the simplest of all that are as good; or the
-        scene as it is.
-        """
-        singles = [each for each in self.found if len(each.faults) == 1]
-        pairs = [each for each in self.found if len(each.faults) > 1]
-        best = self._best([self.right, *singles])
-        if pairs:
-            # The second fault must be as sure as the first, in an image that has the first one.
-            pair = self._best(pairs)
-            one, two = self._evidence([best, pair])
-            best = pair if two > one + EVIDENCE and pair.error < LEFT * best.error else best
-        return best
-
-    def _best(self, explanations: Sequence[Explanation]) -> Explanation:
-        """Return the explanation with the most evidence, or the simplest of all that are as good.
-
-        A further number is worth its error only where the simpler explanation leaves more than
-        little: fog with a scale height of 10 km is an extinction, and so is fog with a scale height
-        of 90 m that fits a rest of 0.1 %.
-        """
-        # Explanations whose evidence differs by five are as good as one another.
-        weights = self._evidence(explanations)
-        ordered = sorted(zip(weights, explanations, strict=True), key=lambda each: -each[0])
-        most, best = ordered[0]
-        alike = [
-            each for weight, each in ordered if weight >= most - 5.0 or self._is_as_good(each, best)
-        ]
-        return min(alike, key=lambda each: (each.parameters, len(each.faults)))
-
-    def _is_as_good(self, one: Explanation, best: Explanation) -> bool:
-        """Return whether an explanation is nearly the image of the best one, and
-        leaves little or hardly more.
-        """
-        apart = float(np.abs(one.errors - best.errors).mean())
-        leaves_little = bool(one.faults) and self._is_little(one)
-        # An explanation that leaves noise alone is better than one that
-        # does not, by however little.
-        noise_too = self.blocks.is_noise(one) or not self.blocks.is_noise(best)
-        hardly_more = noise_too and one.error <= (1 + _LITTLE) * best.error
-        return apart <= _LITTLE * self.right.error and (leaves_little or hardly_more)
-
-    def _evidence(self, explanations: Iterable[Explanation]) -> list[float]:
-        """Return the evidence of explanations."""
-        # The explanation that leaves least says how large the errors are that no fault makes, and
-        # how many pixels count as one: the same scale for all explanations.
-        least = min([self.right, *self.found], key=lambda each: scale_of(each, self.pixel))
-        scale, area = scale_of(least, self.pixel), self.blocks.area(least.errors, least.lit)
-        return [evidence(each, self.right, scale, max(area, 1.0)) for each in explanations]
-
-    def ranked(self, chosen: Explanation) -> list[Ranked]:
-        """Return all explanations in the order of evidence, the chosen one first."""
-        singles = [each for each in self.found if len(each.faults) == 1]
-        weights = dict(
-            zip(map(id, [chosen, *singles]), self._evidence([chosen, *singles]), strict=True)
-        )
-        # Several faults have one name, such as the laws of distance: the best one is listed.
-        rows = _rows(chosen, weights[id(chosen)])
-        named = {row.name for row in rows}
-        for each in sorted(singles, key=lambda each: -weights[id(each)]):
-            if each.names[0] not in named:
-                named.add(each.names[0])
-                rows += _rows(each, weights[id(each)])
-        return rows
-
-    def _refined(self, explanations: list[Explanation]) -> list[Explanation]:
-        """Return explanations; the few that leave least have their parameters to all digits."""
-        # After a coarse search the best five faults are refined. More digits do not bring an error
-        # down from three times the least error, or three times the error of the model.
-        least = min((each.error for each in [*self.found, *explanations]), default=1.0)
-        finer: dict[int, Explanation] = {}
-        for each in sorted(explanations, key=lambda each: each.error)[:5]:
-            if each.parameters and each.error < 3.0 * max(least, KNOWN[self.pixel]):
-                finer[id(each)] = explain(self.predictor, each.faults, each.values)
-        return [finer.get(id(each), each) for each in explanations]
-
-    def _tell(self, span: tuple[float, float], part: float, what: str) -> None:
-        if self.progress is not None:
-            self.progress(span[0] + (span[1] - span[0]) * part, what)
-
-
-def _differ(first: Fault, second: Fault) -> bool:
-    """Return whether two faults are of different kinds, and do not both
-    look for paths of their own.
-    """
-    moves = [any(parameter.step for parameter in each.parameters) for each in (first, second)]
-    lights = [each.kind == "light" for each in (first, second)]
-    return first.kind != second.kind and not (any(moves) and any(lights))
-
-
-def _in_order(first: Fault, second: Fault) -> tuple[Fault, Fault]:
-    """Return faults in the order in which they happen: the scene, its
-    image, what is done to values.
-    """
-    return (
-        (first, second) if KINDS.index(first.kind) <= KINDS.index(second.kind) else (second, first)
-    )
+def _ranked(candidates: Candidates, chosen: Explanation) -> list[Ranked]:
+    """Return the chosen explanation and single faults in the order of evidence."""
+    singles = [each for each in candidates.tried if len(each.faults) == 1]
+    weighed = [(candidates.evidence(each), each) for each in singles]
+    # Several faults have one name, such as the laws of distance: the best one is listed.
+    rows = _rows(chosen, candidates.evidence(chosen))
+    listed = {row.name for row in rows}
+    for weight, each in sorted(weighed, key=lambda row: -row[0]):
+        if each.names[0] not in listed:
+            listed.add(each.names[0])
+            rows += _rows(each, weight)
+    return rows
 
 
 def _rows(explanation: Explanation, weight: float) -> list[Ranked]:

@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from airlight.validation.arrays import Array
-from airlight.validation.engine.faults import FAULTS
-from airlight.validation.engine.image_faults import BRIGHTNESS
-from airlight.validation.engine.seen import stopped
+from airlight.validation.engine.faults import BRIGHTNESS, FAULTS
+from airlight.validation.engine.observation import stopped
 from airlight.validation.metrics.errors import FLOOR
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named

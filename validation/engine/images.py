@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from airlight.errors import InputError, nearest
 from airlight.reference.storage.exr import read_exr
 from airlight.validation.engine.judge import EngineComparison, ReferenceOf, judge_image
-from airlight.validation.engine.seen import AIRLIGHT, SURFACE, judged_layer
+from airlight.validation.engine.observation import AIRLIGHT, SURFACE, judged_layer
 from airlight.validation.metrics.errors import Metrics, error_metrics
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.timing import Timing

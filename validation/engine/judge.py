@@ -29,7 +29,6 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,7 @@ from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.comparison.images import Comparison, compare_images, read_mask
 from airlight.validation.engine.error_place import ErrorPlace, error_place
 from airlight.validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
-from airlight.validation.engine.seen import (
+from airlight.validation.engine.observation import (
     KINDS,
     PIXEL_WORDS,
     JudgedLayer,
@@ -171,7 +170,7 @@ def compare_scene(
     path
         The EXR file.
     layer, holds
-        The layer to judge and what it holds, see `validation.engine.seen.judged_layer`.
+        The layer to judge and what it holds, see `validation.engine.observation.judged_layer`.
     pixel
         'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the
         image says of itself, or what fits.
@@ -185,6 +184,7 @@ def compare_scene(
     progress
         Called with (fraction done, what).
     """
+    # The layer, the scene at the size of the image, and the pixels that file and mask have.
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
     loaded = scene_of_size(scene, judged.size, path)
@@ -212,7 +212,7 @@ def judge_image(
     pixel: str | None = None,
     mask: Bools | None = None,
     margin: float | None = None,
-    **metrics: Any,
+    all_metrics: bool = False,
 ) -> EngineComparison:
     """Judge a layer of an image by the reference of its scene, as in `compare_scene` and reports.
 
@@ -229,8 +229,8 @@ def judge_image(
         See `compare_scene`.
     mask
         Which pixels are compared, (height, width); all by default.
-    metrics
-        More parameters of `validation.comparison.images.compare_images`.
+    all_metrics
+        See `validation.comparison.images.compare_images`.
     """
     # Pixels outside of the mask count nowhere: neither in what pixels are, nor in the verdict.
     check_margin(margin)
@@ -262,7 +262,7 @@ def judge_image(
         layer=name,
         mask=mask,
         margin=margin if with_errors else None,
-        **metrics,
+        all_metrics=all_metrics,
     )
     # Without standard errors a margin is no matter of statistics: the bias must be within it.
     bias = comparison.metrics.relative_bias
@@ -364,7 +364,8 @@ def fitting_kind(
     faults of the whole image.
 
     `reference_of`: computes a reference; asked for the means only if the image does not fit the
-    centres to 0.1 %; `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
+    centres to 0.1 %; `kinds`: what its pixels may be, see
+    `validation.engine.observation.pixel_kinds`.
     """
 
     def attempt(kind: str) -> tuple[Array, Hints]:

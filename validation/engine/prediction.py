@@ -3,10 +3,10 @@
 scene, then changed values.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TypeVar, cast
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -15,10 +15,11 @@ from airlight.reference.monte_carlo.batches import LAYERS
 from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.arrays import Array, Bools, Index
-from airlight.validation.engine.seen import APART, Seen, relative_errors
+from airlight.validation.engine.observation import Observation, relative_errors
 from airlight.validation.fog_model.radiance import Fog, FogModel, scene_fog
 from airlight.validation.fog_model.view import Ends, Scenery, View
 
+Value = TypeVar("Value")
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
 _FEW_RAYS = 800  # with which faults that move paths are told apart
@@ -48,19 +49,24 @@ class _Recent:
     taken: int = 0
     # With their sizes. A dictionary keeps the order of insertion: an entry that is used is taken
     # out and put in again, so that the one used last comes last.
-    entries: dict[Any, tuple[Any, int]] = field(default_factory=dict)
+    entries: dict[Hashable, tuple[object, int]] = field(default_factory=dict)
 
-    def once(self, key: Any, compute: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+    def once(
+        self, key: Hashable, compute: Callable[[], Value], size: Callable[[Value], int]
+    ) -> Value:
         """Return the value of a key, computed where it is not here."""
         entry = self.entries.pop(key, None)
-        if entry is None:
-            value = compute()
-            entry = value, size(value)
-            self.taken += entry[1]
-            while self.entries and self.taken > self.room:
-                self.taken -= self.entries.pop(next(iter(self.entries)))[1]
-        self.entries[key] = entry
-        return entry[0]
+        if entry is not None:
+            self.entries[key] = entry
+            return cast(Value, entry[0])
+        # The values that were used longest ago make room for a new one.
+        value = compute()
+        number_count = size(value)
+        self.taken += number_count
+        while self.entries and self.taken > self.room:
+            self.taken -= self.entries.pop(next(iter(self.entries)))[1]
+        self.entries[key] = value, number_count
+        return value
 
 
 @dataclass
@@ -103,49 +109,51 @@ class SceneLight:
         width = reference.width / 40
         return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
 
-    def view(self, seen: Seen, scenery: Scenery) -> View:
+    def view(self, observation: Observation, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
-        key = "view", scenery.offset, scenery.zoom, _sight(seen)
+        key = "view", scenery.offset, scenery.zoom, _sight(observation)
         return self._paths.once(
-            key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size
+            key, lambda: observation.view(scenery), lambda view: 40 * view.distance.size
         )
 
-    def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
+    def model(
+        self, observation: Observation, scenery: Scenery, layer: int, ends: Ends | None = None
+    ) -> FogModel:
         """Return the paths of a layer of an image in a scenery, 0: airlight, 1:
         surfaces; `ends`: of a fog.
         """
-        key = "model", scenery, layer, ends, _sight(seen)
-        view = self.view(seen, scenery)
+        key = "model", scenery, layer, ends, _sight(observation)
+        view = self.view(observation, scenery)
         return self._paths.once(
             key,
-            lambda: seen.model(view, scenery, layer, ends),
+            lambda: observation.model(view, scenery, layer, ends),
             lambda model: 20 * model.places,
         )
 
-    def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
+    def radiance(self, observation: Observation, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""
         # Factors on lights need no new sums: the radiance by light is found without them.
         plain = fog.without_factors
         ends = fog.ends if layer == 0 else None
-        key = scenery, plain, layer, _sight(seen)
+        key = scenery, plain, layer, _sight(observation)
         by_light = self._radiance.once(
             key,
-            lambda: self.model(seen, scenery, layer, ends).by_light(plain),
+            lambda: self.model(observation, scenery, layer, ends).by_light(plain),
             lambda each: each.size,
         )
         return fog.combined(by_light)[layer]
 
 
-def _sight(seen: Seen) -> tuple[Any, ...]:
+def _sight(observation: Observation) -> tuple[Hashable, ...]:
     """Return the key of the paths of an image: all that its pixels depend on."""
     return (
-        seen.area,
-        seen.holds,
-        seen.samples,
-        seen.rays,
-        seen.steps,
-        seen.used.tobytes(),
-        seen.cut_off.tobytes(),
+        observation.area,
+        observation.holds,
+        observation.samples,
+        observation.rays,
+        observation.steps,
+        observation.used.tobytes(),
+        observation.cut_off.tobytes(),
     )
 
 
@@ -153,13 +161,13 @@ def _sight(seen: Seen) -> tuple[Any, ...]:
 class Predictor:
     """Predicts images."""
 
-    seen: Seen
+    observation: Observation
     light: SceneLight
 
     @property
     def reference(self) -> ReferenceScene:
         """The scene."""
-        return self.seen.reference
+        return self.observation.reference
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -169,7 +177,7 @@ class Predictor:
     @property
     def fog(self) -> Fog:
         """The fog as the scene has it."""
-        return scene_fog(self.seen.reference)
+        return scene_fog(self.observation.reference)
 
     @cached_property
     def many(self) -> bool:
@@ -182,53 +190,41 @@ class Predictor:
     @cached_property
     def few(self) -> "Predictor":
         """A predictor with fewer pixels."""
-        return Predictor(replace(self.seen, rays=_FEW_RAYS), self.light)
+        return Predictor(replace(self.observation, rays=_FEW_RAYS), self.light)
 
     @cached_property
     def quick(self) -> "Predictor":
         """A predictor with enough pixels to tell faults apart that move no paths."""
         # As many pixels as with centres: a mean over the area of a pixel has nine rays.
-        rays = _FEW_RAYS * (9 if self.seen.area else 1)
-        return Predictor(replace(self.seen, rays=min(rays, self.seen.rays)), self.light)
+        rays = _FEW_RAYS * (9 if self.observation.area else 1)
+        return Predictor(
+            replace(self.observation, rays=min(rays, self.observation.rays)), self.light
+        )
 
     @cached_property
     def fewest(self) -> "Predictor":
         """A predictor with just enough pixels for the size of a light: each needs many paths."""
-        return Predictor(replace(self.seen, rays=_FEW_RAYS // 8), self.light)
+        return Predictor(replace(self.observation, rays=_FEW_RAYS // 8), self.light)
 
     @cached_property
     def coarse(self) -> "Predictor":
         """A predictor with fewer pixels, and with shadow rays where exact paths cost much."""
         # 64 shadow rays find the lit parts of a ray.
-        return Predictor(replace(self.few.seen, steps=64), self.light) if self.many else self.few
+        return (
+            Predictor(replace(self.few.observation, steps=64), self.light)
+            if self.many
+            else self.few
+        )
 
     @cached_property
     def view(self) -> View:
         """The rays of the scene."""
-        return self.light.view(self.seen, Scenery())
+        return self.light.view(self.observation, Scenery())
 
     @cached_property
     def pixels(self) -> Index:
         """Which pixels take part, in any scenery, (m,)."""
         return self.view.pixels
-
-    @cached_property
-    def pairs(self) -> tuple[Index, Index]:
-        """Which rows of `errors` are pixels, and which their neighbours: in the next column
-        where all pixels are looked at.
-        """
-        # `partner` is the row of each pixel's neighbour, if there is one: pixels ascend.
-        pixels, width = self.pixels, self.shape[1]
-        for apart in (1, APART) if len(pixels) == self.seen.used.sum() else (APART,):
-            partner = np.searchsorted(pixels, pixels + apart)
-            row = np.flatnonzero(partner < len(pixels))
-            partner = partner[row]
-            paired = (pixels[partner] == pixels[row] + apart) & (
-                pixels[row] % width + apart < width
-            )
-            if paired.any():
-                return row[paired], partner[paired]
-        return np.empty(0, np.int64), np.empty(0, np.int64)
 
     def layers(self, guess: Guess) -> tuple[Array, Array]:
         """Return airlight and surfaces of the pixels, (m, 3) each; 0 where the
@@ -236,7 +232,7 @@ class Predictor:
         """
         parts = []
         for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
-            is_shown = self.seen.holds != ("surface", "airlight")[layer]
+            is_shown = self.observation.holds != ("surface", "airlight")[layer]
             # Where surfaces have their own scenery, a light that moves with its paths held
             # moves for the fog alone.
             fog = (
@@ -244,7 +240,9 @@ class Predictor:
                 if layer == 1 and guess.surfaces
                 else guess.fog
             )
-            parts.append(self.light.radiance(self.seen, scenery, fog, layer) if is_shown else None)
+            parts.append(
+                self.light.radiance(self.observation, scenery, fog, layer) if is_shown else None
+            )
         airlight, surface = (
             np.zeros((len(self.pixels), 3)) if part is None else part for part in parts
         )
@@ -254,14 +252,14 @@ class Predictor:
 
     def predicted(self, guess: Guess) -> Array:
         """Return the values of the pixels, (m, 3)."""
-        radiance = self.seen.held(np.stack(self.layers(guess)))
+        radiance = self.observation.held(np.stack(self.layers(guess)))
         for change in guess.values:
             radiance = change(radiance)
         return radiance
 
     def transmittance(self, guess: Guess) -> Array:
         """Return the fraction of light that a guess leaves of what surfaces send, (m, 3)."""
-        return self.light.model(self.seen, guess.scenery, 0).transmittance(guess.fog)
+        return self.light.model(self.observation, guess.scenery, 0).transmittance(guess.fog)
 
     @cached_property
     def cosines(self) -> Array:
@@ -272,7 +270,7 @@ class Predictor:
         """Return the values of the image in these pixels, (m, 3), with the
         fault of the grid taken back.
         """
-        values = self.seen.values
+        values = self.observation.values
         if guess.undo is not None:
             values = np.ascontiguousarray(guess.undo(values.reshape(*self.shape, 3))).reshape(-1, 3)
         return values[self.pixels]

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters with which faults fit an image best, one alone or two together.
+"""The numbers with which a fault, or two faults together, fit an image best.
 
-The measure is the mean of log(1 + (e/s)^2) over all values, with e the relative errors and s a
-scale: pixels that disagree cannot decide (Cauchy's loss). One parameter is looked for on the line,
-since there may be several minima. Several parameters are looked for by steps of Gauss and Newton
-with Cauchy's weights. A light that is off moves shadows. The pixels of these are off by all of
-their light whatever a small step does, so that there are no slopes to follow: the light is looked
-for along the axes first, by steps as long as its shadows are wide (Hooke and Jeeves 1961, J. ACM 8,
-212). The scale of the first search is the least usual error at any start. The scale of the second
-search is the usual error that the first one leaves.
+The loss is Cauchy's, the mean of log(1 + (e/s)^2) over all values, with the relative errors e and a
+scale s: outliers cannot decide. A single number is found by a bounded search on the line, since the
+loss may have several minima there. Several numbers are found by steps of Gauss and Newton with
+Cauchy's weights. The position of a light moves shadows: a pixel in a wrong shadow is off by all of
+its light whatever a small step of the light does, so that the loss has no slope. The search for a
+position begins along the axes, by strides as long as shadows are wide (Hooke and Jeeves 1961, J.
+ACM 8, 212). The scale of the first search is the least usual error at any start. The scale of the
+second search is the usual error that the first one leaves.
 """
 
 import math
@@ -22,8 +22,10 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.fault import Fault, Number, Values
 from airlight.validation.engine.prediction import Guess, Predictor
 
-_LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
-_SMALL = 0.02  # of the step of differences: a change that is none
+# Fraction of the loss that a step leaves which gains little, and fraction of the step of
+# differences: a shorter move is none. Both end a search; more steps cost paths of light.
+_LITTLE = 0.9
+_SMALL = 0.02
 
 
 @dataclass(frozen=True)
@@ -61,57 +63,58 @@ def explain(
     # The first search looks at few pixels: paths of a fault that moves them are found again for
     # each value. A second one, if all digits are asked for, looks at all pixels.
     coarse = _coarse(predictor, faults)
-    predictors = [coarse, *[predictor] * fine]
-    if predictor.many and not fine:
-        predictor = coarse
-    searches = [_Search(each, tuple(faults)) for each in predictors]
-    search = searches[0]
-    parameters = search.numbers
-    starts = [tuple(value for part in near for value in part)] if near else _starts(coarse, faults)
-    best = starts[0]
-    if all(fault.solved or not fault.parameters for fault in faults):
-        parameters = ()
-    if parameters:
-        # The starts by their loss, at the least scale of any of them.
-        scale = min(search.scale(start, fine) for start in starts)
-        starts = sorted(starts, key=lambda start: search.loss(start, scale))
-        on_a_line = len(parameters) == 1
-        moves = any(parameter.step for parameter in parameters)
-        # One start is followed where paths move, which cost most. Elsewhere two are followed on a
-        # line, and three by steps: the best one may lead to a lesser minimum. Half of the starts of
-        # fog that thins with height lead to even fog.
-        followed = 1 if moves else 2 if on_a_line else 3
-        places = [inward(parameters, start) for start in starts[:followed]]
-        if any(parameter.stride for parameter in parameters) and not near:
-            places = [search.along_axes(place, scale) for place in places]
-        # The second search begins where the first one ends, at the scale of the errors there. Where
-        # paths move it is near the end already, and takes few steps.
-        for turn, search in enumerate(searches):
-            scale = scale if turn == 0 else search.scale(outward(parameters, places[0]), fine)
-            if on_a_line:
-                places = [
-                    search.on_line(place, scale, fine, moves and turn > 0) for place in places
-                ]
-            else:
-                places = [
-                    search.by_steps(place, scale, fine, moves and turn > 0) for place in places
-                ]
-        best = min(
-            (outward(parameters, place) for place in places),
-            key=lambda values: search.loss(values, scale),
-        )
-    guess = guess_of(predictor, faults, best)
-    errors = predictor.errors(guess)
+    searches = [_Search(each, tuple(faults)) for each in (coarse, *[predictor] * fine)]
+    given = [tuple(value for part in near for value in part)] if near else []
+    starts = given or starts_of(coarse, faults)
+    values = starts[0]
+    if any(fault.parameters and not fault.solved for fault in faults):
+        values = _best_values(searches, starts, fine=fine, is_near=bool(near))
+    # The errors that they leave, in all pixels where those do not cost much.
+    shown = coarse if predictor.many and not fine else predictor
+    guess = guess_of(shown, faults, values)
+    errors = shown.errors(guess)
     error = float(np.abs(errors).mean())
-    return Explanation(
-        tuple(faults), _parted(faults, best), guess, errors, predictor.lit(guess), error
-    )
+    parts = _parted(faults, values)
+    return Explanation(tuple(faults), parts, guess, errors, shown.lit(guess), error)
 
 
-def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
+def _best_values(
+    searches: "Sequence[_Search]", starts: Sequence[Values], *, fine: bool, is_near: bool
+) -> Values:
+    """Return the best values that searches find one after the other, on more and more pixels.
+
+    `is_near`: whether the starts are near the best values already.
+    """
+    search = searches[0]
+    numbers = search.numbers
+    # The starts by their loss, at the least scale of any of them.
+    scale = min(search.scale(start, fine) for start in starts)
+    starts = sorted(starts, key=lambda start: search.loss(start, scale))
+    # One start is followed where paths move, which cost most. Elsewhere two are followed on a
+    # line, and three by steps: the best one may lead to a lesser minimum. Half of the starts of
+    # fog that thins with height lead to even fog.
+    on_a_line = len(numbers) == 1
+    moves = any(number.step for number in numbers)
+    followed = 1 if moves else 2 if on_a_line else 3
+    places = [inward(numbers, start) for start in starts[:followed]]
+    if any(number.stride for number in numbers) and not is_near:
+        places = [search.along_axes(place, scale) for place in places]
+    # The second search begins where the first one ends, at the scale of the errors there. Where
+    # paths move it is near the end already, and takes few steps.
+    for turn, search in enumerate(searches):
+        scale = scale if turn == 0 else search.scale(outward(numbers, places[0]), fine)
+        follow = search.on_line if on_a_line else search.by_steps
+        places = [follow(place, scale, fine, moves and turn > 0) for place in places]
+    ends = [outward(numbers, place) for place in places]
+    return min(ends, key=lambda values: search.loss(values, scale))
+
+
+def best_of_starts(
+    predictor: Predictor, faults: Sequence[Fault]
+) -> tuple[float, tuple[Values, ...]]:
     """Return the least mean error at the starts of some faults together, and the values there."""
     predictor = _coarse(predictor, faults) if predictor.many else predictor
-    starts = _starts(predictor, faults)
+    starts = starts_of(predictor, faults)
     errors = [
         float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean())
         for start in starts
@@ -121,9 +124,9 @@ def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[V
 
 def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
     """Return a predictor with fewer pixels, by what the paths of faults cost."""
-    if any(fault.costly > 1 for fault in faults) and not predictor.many:
+    if any(fault.stage == "extent" for fault in faults) and not predictor.many:
         return predictor.fewest
-    moves = any(parameter.step for fault in faults for parameter in fault.parameters)
+    moves = any(fault.moves for fault in faults)
     return predictor.coarse if moves else predictor.quick
 
 
@@ -172,14 +175,14 @@ class _Search:
     def __init__(self, predictor: Predictor, faults: tuple[Fault, ...]) -> None:
         self.predictor, self.faults = predictor, faults
         self.numbers = tuple(number for fault in faults for number in fault.parameters)
-        self.known: dict[Values, Array] = {}
+        self.cached: dict[Values, Array] = {}  # errors by values
 
     def errors(self, values: Values) -> Array:
-        if values not in self.known:
-            self.known[values] = self.predictor.errors(
+        if values not in self.cached:
+            self.cached[values] = self.predictor.errors(
                 guess_of(self.predictor, self.faults, values)
             )
-        return self.known[values]
+        return self.cached[values]
 
     def loss(self, values: Values, scale: float) -> float:
         return float(np.mean(np.log1p((self.errors(values) / scale) ** 2)))
@@ -336,7 +339,7 @@ def _parted(faults: Sequence[Fault], values: Values) -> tuple[Values, ...]:
     return tuple(parts)
 
 
-def _starts(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
+def starts_of(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
     """Return values to begin with: a fault chooses its own on the guess that the faults before it
     have changed.
     """
@@ -344,18 +347,17 @@ def _starts(predictor: Predictor, faults: Sequence[Fault]) -> list[Values]:
     for number, fault in enumerate(faults):
         before = faults[:number]
         starts = [
-            (*start, *more)
-            for start in starts
-            for more in _own_starts(predictor, fault, before, start)
+            (*start, *more) for start in starts for more in _starts(predictor, fault, before, start)
         ]
     return starts
 
 
-def _own_starts(
+def _starts(
     predictor: Predictor, fault: Fault, before: Sequence[Fault], values: Values
 ) -> Sequence[Values]:
     if fault.begin is not None:
         return fault.begin(predictor, guess_of(predictor, before, values))
+    # One number is tried at each of its starts, several together at the first of each.
     if len(fault.parameters) == 1:
         return [(start,) for start in fault.parameters[0].starts]
     return [tuple(parameter.starts[0] for parameter in fault.parameters)]

@@ -5,8 +5,7 @@ and what no fit can tell.
 Read in this order:
 
 - `unknowns.py`: the parameters by name, as faults of a guess that set a number;
-- `solve.py`: Levenberg and Marquardt's method with the weights that the noise
-  asks for, and intervals;
+- `solve.py`: robust least squares with the weights that the noise asks for, and intervals;
 - `confounding.py`: which parameters an image does not tell apart;
 - `fit.py`: an image file against a scene.
 """

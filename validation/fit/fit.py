@@ -4,7 +4,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,17 +12,18 @@ from airlight.errors import InputError
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.arrays import Array, Bools, Progress
-from airlight.validation.engine.prediction import Predictor, SceneLight
-from airlight.validation.engine.seen import (
+from airlight.validation.engine.observation import (
     PIXEL_WORDS,
-    Seen,
+    Observation,
     decide_pixel,
     judged_layer,
+    observation_of,
     pixel_kinds,
     relative_errors,
-    seen_image,
     stopped,
 )
+from airlight.validation.engine.prediction import Predictor, SceneLight
+from airlight.validation.engine.search import usual_size
 from airlight.validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from airlight.validation.fit.solve import (
     SIGMAS,
@@ -136,7 +136,7 @@ def fit_image(
     parameters
         The names of the parameters that are looked for, see `validation.fit.unknowns`.
     layer, holds
-        The layer, and what it holds, see `validation.engine.seen.judged_layer`.
+        The layer, and what it holds, see `validation.engine.observation.judged_layer`.
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     mask
@@ -156,24 +156,24 @@ def fit_image(
     took = stopwatch()
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
-    unknowns = read_unknowns(parameters, seen.reference, starts or {})
+    observation, wrong = observation_of(image, judged, loaded.scene, mask=mask)
+    unknowns = read_unknowns(parameters, observation.reference, starts or {})
     # Pixels that are cut off at the brightest value say only that they are brighter. 20 000 rays
     # are looked at, each pixel by itself: more say nothing new of few numbers.
-    stops = stopped(np.where(seen.used[:, None], seen.values, np.nan)).any(axis=1)
-    seen = replace(seen, used=seen.used & ~stops, rays=20_000, apart=0)
+    stops = stopped(np.where(observation.used[:, None], observation.values, np.nan)).any(axis=1)
+    observation = replace(observation, used=observation.used & ~stops, rays=20_000, apart=0)
     # Four pixels for each number, sixteen at least.
     fewest = max(16, 4 * len(unknowns))
-    if int(seen.used.sum()) < fewest:
+    if (count := int(observation.used.sum())) < fewest:
         raise InputError(
-            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; "
+            f"{path}: {count} pixels of the layer '{judged.name}' say something; "
             "expected at least "
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
 
     def solved(kind: str) -> _Solved:
         tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
-        return _solved(_predictor(replace(seen, area=kind == "area")), unknowns, tell)
+        return _solved(_predictor(replace(observation, area=kind == "area")), unknowns, tell)
 
     # Each kind of pixels is solved for by itself, and the kind that leaves less is right; at a mean
     # relative error of 1e-5 the first kind is right beyond doubt.
@@ -189,9 +189,9 @@ def fit_image(
     )
 
 
-def _predictor(seen: Seen) -> Predictor:
+def _predictor(observation: Observation) -> Predictor:
     """Return what predicts an image; every evaluation needs all its paths, so none are dropped."""
-    return Predictor(seen, SceneLight(seen.reference, most=math.inf))
+    return Predictor(observation, SceneLight(observation.reference, most=math.inf))
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
@@ -215,9 +215,9 @@ def _solved(
         progress(0.5, "lit intervals")
     # Starts are compared on 3000 rays. Paths cost more than the sums over them: these rays have
     # paths of their own only where they are less than a quarter of all.
-    few = _predictor(replace(predictor.seen, rays=3000))
+    few = _predictor(replace(predictor.observation, rays=3000))
     start = best_start(
-        Model.of(few, unknowns) if len(model.image) > 4 * few.seen.most_pixels else model
+        Model.of(few, unknowns) if len(model.image) > 4 * few.observation.most_pixels else model
     )
     # Some of the parameters that the image does not tell apart are held from here on.
     groups = confounded_groups(
@@ -243,7 +243,7 @@ def _solved(
         still = np.maximum(1e-6 * _size(predictor.reference), 0.02 * error)
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
-        model = replace(model, at=inner, predictor=_predictor(predictor.seen))
+        model = replace(model, at=inner, predictor=_predictor(predictor.observation))
     return _Solved(model, free, groups, solution)
 
 
@@ -301,7 +301,7 @@ def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], solved:
         rows.append(Fitted(unknown.name, value, *ends, unknown.unit, unknown.scene))
     # Residual and variance are those of the pixels without outliers; an image of one value has no
     # variance to explain.
-    mask = solution.kept
+    mask = solution.mask
     image, residual = model.image[mask], solution.residual[mask]
     relative = _relative_residual(solution)
     mean = float(np.abs(image).mean()) if image.size else math.nan
@@ -313,11 +313,11 @@ def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], solved:
         1 - float(np.sum(residual**2)) / spread if spread > 0 else math.nan,
         len(mask),
         int((~mask).sum()),
-        1.4826 * float(np.median(relative)) if relative.size else math.nan,
+        usual_size(relative) if relative.size else math.nan,
         tuple(confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
         math.nan,
     )
 
 
-def _finite(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Levenberg and Marquardt's method on the pixels of an image, robust to those that
-disagree, with intervals.
+"""Least squares on the pixels of an image, robust to outliers, with intervals.
+
+The search is SciPy's trust-region method for parameters with ends (Branch, Coleman and Li 1999,
+SIAM J. Sci. Comput. 21, 1).
 
 1. Starts are tried over three decades of extinction and the whole range of g, each with the factor
    on the image that fits best, by a loss of relative errors that no single pixel decides
@@ -45,7 +47,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress, product
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
@@ -53,13 +54,15 @@ from scipy.optimize import least_squares, nnls
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.fault import Number
 from airlight.validation.engine.prediction import Guess, Predictor
-from airlight.validation.engine.search import guess_of, inward, outward
+from airlight.validation.engine.search import guess_of, inward, outward, usual_size
 from airlight.validation.fit.unknowns import Unknown
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
 
 # of numbers on the whole line: central differences err by its square, and by rounding over it
 _STEP = 1e-4
+# Factors on the extinctions to begin with, about three apart over three decades; and g from
+# backward to forward lobes. `best_start` follows the best of all.
 _SIGMA_STARTS = (1.0, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0)
 _G_STARTS = (0.0, -0.6, 0.5, 0.85)
 _FACTORS = ("intensity", "exposure", "albedo")
@@ -141,7 +144,7 @@ class Solution:
     covariance: Array  #: (parameters, parameters)
     residual: Array  #: image minus model, (pixels, 3) [W/(m^2 sr)]
     radiance: Array  #: of the model, (pixels, 3) [W/(m^2 sr)]
-    kept: Bools  #: which pixels took part in the end, (pixels,)
+    mask: Bools  #: which pixels took part in the end, (pixels,)
     weights: Array  #: 1/sigma, (pixels, 3)
     stretch: Array  #: variances over those of independent values of these weights, (parameters,)
 
@@ -172,11 +175,10 @@ def robust_fit(model: Model, start: Array) -> Array:
 def _search(model: Model, start: Array, steps: int) -> Array:
     """Return the end of a search for the least Cauchy loss of relative errors."""
     residual, slopes = _weighted(model, 1 / model.relative, np.ones(len(model.image), dtype=bool))
-    # Errors beyond two usual ones, 1.4826 medians each, count less and less. The scale is 1e-7 at
-    # least: an image may have no error at all.
-    unit = max(2 * 1.4826 * float(np.median(np.abs(residual(start)))), 1e-7)
-    how: dict[str, Any] = {"loss": "cauchy", "f_scale": unit, "max_nfev": steps}
-    return _least(residual, slopes, model.numbers, start, **how)
+    # Errors beyond two usual ones count less and less. The scale is 1e-7 at least: an image may
+    # have no error at all.
+    unit = max(2 * usual_size(residual(start)), 1e-7)
+    return _least(residual, slopes, model.numbers, start, steps=steps, loss="cauchy", f_scale=unit)
 
 
 def _least(
@@ -184,21 +186,37 @@ def _least(
     slopes: Callable[[Array], Array],
     numbers: Sequence[Number],
     start: Array,
-    **how: Any,
+    *,
+    steps: int,
+    loss: str = "linear",
+    f_scale: float = 1.0,
+    ftol: float = 1e-8,
 ) -> Array:
-    """Return the place with the least sum of squares, or of another loss of SciPy's, in
-    the ranges of the numbers.
+    """Return the place with the least sum of squares, or of another loss, in the ranges of the
+    numbers; `steps` at most. `loss`, `f_scale`, `ftol`: of `scipy.optimize.least_squares`.
 
     A logarithm, or an artanh, does not go farther than 10 from where it starts, a factor of 22 000:
     an image that needs more says nothing of it, and an unbounded step may overflow.
     """
+    # The search stays in the ranges of the numbers, and within a distance of its start.
     reach = _farthest(numbers)
     low, high = (
         inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high")
     )
     start = np.clip(start, low, high)
     ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
-    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
+    solved = least_squares(
+        residuals,
+        start,
+        slopes,
+        bounds=ends,
+        x_scale="jac",
+        loss=loss,
+        f_scale=f_scale,
+        ftol=ftol,
+        max_nfev=steps,
+    )
+    return np.asarray(solved.x)
 
 
 def _farthest(numbers: Sequence[Number]) -> Array:
@@ -269,7 +287,7 @@ def weighted_fit(model: Model, start: Array) -> Solution:
             break
         old_inner, inner = (
             inner,
-            _least(*_weighted(model, weights, mask), model.numbers, inner, max_nfev=40),
+            _least(*_weighted(model, weights, mask), model.numbers, inner, steps=40),
         )
         step = float(np.max(np.abs(inner - old_inner), initial=0.0))
         if step < 1e-9 and np.array_equal(old_mask, mask):
@@ -340,7 +358,7 @@ def noise_of(radiance: Array, residual: Array) -> Array:
         group for group in np.array_split(order, min(24, max(1, len(order) // 8))) if len(group)
     ]
     # Scatter of each group, and f^2 in it.
-    scatter = np.array([1.4826 * np.median(np.abs(residual[group])) for group in groups])
+    scatter = np.array([usual_size(residual[group]) for group in groups])
     scatter = np.maximum(scatter, [np.median(least[group]) for group in groups])
     squares = np.array([np.median(radiance[group] ** 2) for group in groups])
     # sigma^2 = a^2 + b^2 f^2 by least squares of relative errors: each row is divided by the square
@@ -404,8 +422,8 @@ def _end(model: Model, solution: Solution, number: int, step: float) -> float:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
             # No end yet: a step a little beyond where a line through the profile reaches it, three
-            # times as far at most. Where an image allows 30 of a logarithm, a factor of 10^13, there
-            # is no end.
+            # times as far at most. Where an image allows 30 of a logarithm, a factor of 10^13,
+            # there is no end.
             if abs(distance) > 3.0 * farthest[number]:
                 break
             distance *= min(1.1 * SIGMAS / max(errors, 1e-9), 3.0)
@@ -424,12 +442,11 @@ def _profile(model: Model, solution: Solution, number: int, place: Array) -> tup
     if free.any():
         others = model.holding(free, place)
         # The sum of squares is some thousand: `ftol` tells standard errors to 1 %.
-        how: dict[str, Any] = {"ftol": 1e-5, "max_nfev": 20}
-        weighted = _weighted(others, solution.weights, solution.kept)
-        best[free] = _least(*weighted, others.numbers, place[free], **how)
+        weighted = _weighted(others, solution.weights, solution.mask)
+        best[free] = _least(*weighted, others.numbers, place[free], steps=20, ftol=1e-5)
     # The root of (Q_k(t) - Q)/a_k is a number of standard errors. Rounding may make it negative.
-    residual, _ = _weighted(model, solution.weights, solution.kept)
-    least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
+    residual, _ = _weighted(model, solution.weights, solution.mask)
+    least = float(np.sum((solution.residual * solution.weights)[solution.mask] ** 2))
     return best, math.sqrt(
         max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number])
     )

@@ -5,7 +5,7 @@
 |---|---|
 | `sigma_t` | extinction of a medium [1/m]; `sigma_t.r`, `.g`, `.b` one channel of it |
 | `albedo` | single-scattering albedo; `albedo.r`, `.g`, `.b` |
-| `sigma_1`, `z_1`, `H_1` | extinction at its base [1/m], base height and scale height [m] of a layer of height fog |
+| `sigma_1`, `z_1`, `H_1` | of a layer: extinction at its base [1/m], base, scale height [m] |
 | `sigma_2`, `z_2`, `H_2`, `sigma_0` | the second layer, and the constant part [1/m] |
 | `phase.g` | g of Henyey and Greenstein's function |
 | `intensity` | factor on a light |

@@ -24,7 +24,6 @@ which the fog knows.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
@@ -314,9 +313,9 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
         sigma_t = medium.sigma_t
     else:
         fog, up = fog_of(medium), medium.up
-        heights: list[Any] = [
-            place @ up,
-            reference.origin @ up,
+        heights: list[float] = [
+            float(place @ up),
+            float(reference.origin @ up),
             *(layer.base for layer in fog.layers),
         ]
         sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])

@@ -18,9 +18,9 @@ height fog a path counts by its length times the mean density between its ends
 light's height; the extinction is then a factor on that density.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -38,16 +38,23 @@ Colour = tuple[float, float, float]
 Path = tuple[str | int, ...]  #: of a number in a fog: fields, and places in tuples
 #: of the cosine of the scattering angle, of mean 1 over the sphere
 PhaseLaw = Callable[[Array], Array]
+Record = TypeVar("Record")  #: a frozen dataclass
 
 
-def _put(whole: Any, path: Path, value: Any) -> Any:
-    # Records are copied from the number at the end of the path outwards: none of them is changed.
+def put(whole: Record, path: Path, value: object) -> Record:
+    """Return a copy of a record with another value at a path of fields, and places in tuples."""
+    # Records are copied from the value at the end of the path outwards: none of them is changed.
+    changed: Record = _copied(whole, path, value)
+    return changed
+
+
+def _copied(whole: Any, path: Path, value: object) -> Any:
     if not path:
         return value
     first, rest = path[0], path[1:]
     if isinstance(first, str):
-        return replace(whole, **{first: _put(getattr(whole, first), rest, value)})
-    return (*whole[:first], _put(whole[first], rest, value), *whole[first + 1 :])
+        return replace(whole, **{first: _copied(getattr(whole, first), rest, value)})
+    return (*whole[:first], _copied(whole[first], rest, value), *whole[first + 1 :])
 
 
 @dataclass(frozen=True)
@@ -84,12 +91,11 @@ class Fog:
     height: HeightFog | None = None
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
-    def put(self, path: Path, value: Any) -> "Fog":
+    def put(self, path: Path, value: object) -> "Fog":
         """Return the fog with another number, given by fields and by places in tuples,
         such as ('moved', 0, 2).
         """
-        fog: Fog = _put(self, path, value)
-        return fog
+        return put(self, path, value)
 
     @property
     def ends(self) -> Ends | None:
@@ -141,7 +147,7 @@ def scene_fog(reference: ReferenceScene) -> Fog:
     )
 
 
-def colour(values: Any) -> Colour:
+def colour(values: Iterable[float]) -> Colour:
     """Return three numbers as a tuple."""
     red, green, blue = (float(value) for value in values)
     return red, green, blue

@@ -6,9 +6,9 @@ The lit intervals depend on the place of a light and on the width of its cone. T
 its fall-off, the fog or the values: a view finds them once.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TypeVar, cast
 
 import mitsuba as mi
 import numpy as np
@@ -22,7 +22,7 @@ from airlight.reference.scene.camera import camera_matrix, film_directions, pixe
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
-from airlight.reference.scene.shapes import read_shapes
+from airlight.reference.scene.shapes import Shapes, read_shapes
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.candidates import Ball
 from airlight.reference.visibility.certificate import LitIntervals
@@ -39,6 +39,7 @@ from airlight.validation.fog_model.places import (
 )
 
 Light = ReferenceLight | DirectionalLight
+Value = TypeVar("Value")
 #: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around
 #: it; 'depth': the depth of the surface taken for the distance along the ray.
 Ends = tuple[float, float, str]
@@ -103,15 +104,16 @@ class View:
 
     reference: ReferenceScene  #: the scene, with these rays in the place of its own
     pixels: Index  #: numbers of the pixels, row by row, ascending, (m,)
-    ray_pixel: Index  #: by ray, which of these it belongs to, (rays,)
+    ray_pixel: Index  #: the place in `pixels` of the pixel of each ray, (rays,)
     axis: Array  #: of the camera, unit, (3,)
     distance: Array  #: along the rays to the surfaces, (rays,) [m]
-    interaction: Any  #: Mitsuba's, at the surfaces
-    shapes: Any  #: the shapes that shadow
+    interaction: "mi.SurfaceInteraction3f"  #: at the surfaces
+    shapes: Shapes  #: that cast shadows
     length: Array  #: of the rays up to the surfaces in each medium, (rays, media) [m]
     #: shadow rays that find the lit parts of a ray, an end to half a step; 0: they are exact
     steps: int = 0
-    _found: dict[Any, Any] = field(default_factory=dict, repr=False)
+    #: what was computed of the view, by its key
+    _cached: dict[Hashable, object] = field(default_factory=dict, repr=False)
 
     def ends(self, ends: Ends) -> tuple[Array, Array]:
         """Return the distances along the rays between which a fog is (rays,) each [m]."""
@@ -126,15 +128,16 @@ class View:
         )
         return near_ends, far_ends
 
-    def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> Any:
+    def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> LitRays:
         """Return which parts of the rays a light reaches; the shape of an area light
         does not shadow its samples.
         """
 
-        def lit_parts() -> Any:
+        def lit_parts() -> LitRays:
             # The shapes that can stand in the light: none without shadows; for the samples of an
             # area light neither its own shape nor what lies behind it.
-            reference, shapes = self.reference, self.shapes
+            reference = self.reference
+            shapes: Shapes | None = self.shapes
             empty = self._once("empty", lambda: mi.load_dict({"type": "scene"}))
             if not shadows:
                 reference, shapes = replace(reference, occluders=empty), None
@@ -166,7 +169,7 @@ class View:
             ("reach", _place_of(light), shadows, None if area is None else area.name), lit_parts
         )
 
-    def _tested(self, reach: LitRays, light: ReferenceLight, occluders: Any) -> LitRays:
+    def _tested(self, reach: LitRays, light: ReferenceLight, occluders: "mi.Scene") -> LitRays:
         """Return the lit parts of rays by shadow rays from the middles of
         equal angles at the light.
         """
@@ -236,13 +239,14 @@ class View:
 
         return self._once(("surface", _place_of(light)[:2], shadows), reflection)
 
-    def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
-        if key not in self._found:
-            self._found[key] = compute()
-        return self._found[key]
+    def _once(self, key: Hashable, compute: Callable[[], Value]) -> Value:
+        """Return what is computed of this view, from the second time on without computing it."""
+        if key not in self._cached:
+            self._cached[key] = compute()
+        return cast(Value, self._cached[key])
 
 
-def _place_of(light: Light) -> tuple[Any, ...]:
+def _place_of(light: Light) -> tuple[Hashable, ...]:
     """Return the properties that decide which parts of rays a light reaches."""
     if isinstance(light, DirectionalLight):
         return light.direction.tobytes(), None
@@ -336,12 +340,14 @@ def scattering_paths(
         )
         for given in source.lights:
             light = _whole_within(given, scenery.blend) if scenery.blend else given
-            is_far = isinstance(light, DirectionalLight)
             # Which parts of rays a light reaches, their nodes, and another edge of a spot on these.
-            if 0 in layers and (far or not is_far):
+            if 0 in layers and (far or not isinstance(light, DirectionalLight)):
                 reach = view.reach(light, shadows=shadows, area=source.area)
-                make: Any = parallel_nodes if is_far else point_nodes
-                nodes.append(_edged(make(reference, light, reach, between), light, source, edge))
+                if isinstance(light, DirectionalLight):
+                    lit_nodes = parallel_nodes(reference, light, reach, between)
+                else:
+                    lit_nodes = point_nodes(reference, light, reach, between)
+                nodes.append(_edged(lit_nodes, light, source, edge))
             if 1 in layers and reference.occluders.shapes():
                 lit = surface_points(
                     reference, light, view.distance, *view.reflected(light, shadows=shadows)

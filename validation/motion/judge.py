@@ -33,7 +33,7 @@ from airlight.reference.storage.exr import NOTE, read_exr
 from airlight.reference.storage.files import temporary_folder
 from airlight.validation.arrays import Array, Bools, Index, Progress
 from airlight.validation.engine.judge import lamp_distance
-from airlight.validation.engine.seen import (
+from airlight.validation.engine.observation import (
     PIXELS,
     JudgedLayer,
     expected_layer,

@@ -56,7 +56,12 @@ from airlight.reference.storage.exr import read_exr
 from airlight.validation.arrays import Array, Progress
 from airlight.validation.engine.images import image_times
 from airlight.validation.engine.judge import fitting_kind, references
-from airlight.validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
+from airlight.validation.engine.observation import (
+    expected_layer,
+    judged_layer,
+    pixel_kinds,
+    scene_of_size,
+)
 from airlight.validation.estimates.quadrature import known_to, known_words
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
 from airlight.validation.motion.lag import SURE

@@ -18,13 +18,13 @@ from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.engine.curves import to_srgb
+from airlight.validation.engine.decide import Blocks
 from airlight.validation.engine.diagnose import diagnose_image
-from airlight.validation.engine.evidence import Blocks
 from airlight.validation.engine.fault import Fault
-from airlight.validation.engine.light_faults import PLACE
+from airlight.validation.engine.faults import FAULTS
+from airlight.validation.engine.observation import judged_layer, observation_of
 from airlight.validation.engine.prediction import Guess, SceneLight
 from airlight.validation.engine.search import Explanation, _Search
-from airlight.validation.engine.seen import judged_layer, seen_image
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
 from airlight.validation.fog_model.view import Scenery, scattering_paths, view_of
 from airlight.validation.scenes.loading import load_scene
@@ -316,19 +316,19 @@ def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
     """
     scene = load_scene("open-fog", (160, 120)).scene
     values = np.random.default_rng(3).random((120, 160, 3))
-    whole, _ = seen_image(
+    whole, _ = observation_of(
         Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene
     )
     assert not len(whole.cut_off)
     values[40:50, 70:94] = 1.0
-    seen, _ = seen_image(
+    observation, _ = observation_of(
         Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene
     )
-    pixels, before = (replace(each, area=True).view().pixels for each in (seen, whole))
+    pixels, before = (replace(each, area=True).view().pixels for each in (observation, whole))
     added = np.setdiff1d(pixels, before)
-    assert len(seen.cut_off) == 240
-    assert np.isin(pixels, seen.cut_off).sum() >= 4
-    assert np.isin(added, seen.cut_off).all()
+    assert len(observation.cut_off) == 240
+    assert np.isin(pixels, observation.cut_off).sum() >= 4
+    assert np.isin(added, observation.cut_off).all()
     assert len(added) <= 5  # 355 of 19 200 pixels are looked at, 1.25 % of which are cut off
 
 
@@ -343,7 +343,8 @@ def test_a_place_is_found_where_pixels_are_lit_or_dark():
             (widths < np.linalg.norm(np.array(place) - true))[:, None], 3, axis=1
         ).astype(float)
 
-    place_of = Fault("place", "", lambda predictor, guess, p: p, PLACE)
+    (position,) = (each for each in FAULTS if each.name == "light-position")
+    place_of = Fault("place", "", lambda predictor, guess, p: p, position.parameters)
     search = _Search(SimpleNamespace(fog=None, errors=errors), (place_of,))
     begun = np.zeros(3)
     np.testing.assert_array_equal(search.by_steps(begun, 0.01, False), begun)

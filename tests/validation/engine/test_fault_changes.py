@@ -16,9 +16,8 @@ from airlight.analytic.height_fog import HeightFog, Layer
 from airlight.validation.engine import prediction
 from airlight.validation.engine.fault import Fault, factor_name
 from airlight.validation.engine.faults import FAULTS
-from airlight.validation.engine.layer_faults import scaled
-from airlight.validation.engine.light_faults import position_held
 from airlight.validation.engine.prediction import Guess, SceneLight
+from airlight.validation.engine.targets import position_held, scaled
 from airlight.validation.fog_model.radiance import Fog
 
 FOG = Fog(
@@ -219,7 +218,7 @@ def test_spots_and_places_are_those_of_the_scenery():
     assert changed(fault("as a line in the cosine")).scenery.edge == "linear"
     assert changed(fault("as glTF has it")).scenery.edge == "square"
     assert changed(fault("3 x^2 - 2 x^3")).scenery.edge == "smoothstep"
-    assert changed(fault("Blender's with a blend"), 0.4).scenery.blend == 0.4
+    assert changed(fault("Blender's do"), 0.4).scenery.blend == 0.4
     assert changed(fault("are spheres of the radius"), 0.4).scenery.radius == 0.4
     assert changed(
         fault("the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m"), 1.0, -2.0, 0.5
@@ -250,9 +249,10 @@ def test_values_and_the_camera_by_hand():
     np.testing.assert_allclose(values("channel order G, B, R"), colours[:, [1, 2, 0]])
     np.testing.assert_allclose(values("a black level", numbers=(0.5,)), colours + 0.5)
     np.testing.assert_allclose(values("a gamma of", numbers=(2.0,)), np.sqrt(colours))
-    seen = SimpleNamespace(values=np.array([[1.5, np.nan, 0.3]]))
+    observation = SimpleNamespace(values=np.array([[1.5, np.nan, 0.3]]))
     np.testing.assert_allclose(
-        values("cut off at", predictor=SimpleNamespace(seen=seen)), np.minimum(colours, 1.5)
+        values("cut off at", predictor=SimpleNamespace(observation=observation)),
+        np.minimum(colours, 1.5),
     )
     cosines = SimpleNamespace(cosines=np.array([1.0, 0.5]))
     fallen = values("a vignette", numbers=(2.0,), predictor=cosines)

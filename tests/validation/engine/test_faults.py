@@ -4,6 +4,7 @@ scene cannot have are not.
 """
 
 from collections import defaultdict
+from pathlib import Path
 from types import SimpleNamespace
 
 import mitsuba as mi
@@ -12,12 +13,24 @@ import pytest
 
 from airlight.analytic.height_fog import HeightFog
 from airlight.reference.scene.read import read_reference
-from airlight.validation.engine import faults
-from airlight.validation.engine.diagnose import _PARTS, _Attempt, _differ, _in_order
-from airlight.validation.engine.fault import Fault, Number, traits
+from airlight.validation.engine import faults, stages
+from airlight.validation.engine.decide import Candidates
+from airlight.validation.engine.fault import Fault, Number
 from airlight.validation.engine.faults import FAULTS, faults_of
-from airlight.validation.engine.prediction import Predictor
-from airlight.validation.engine.seen import APART
+from airlight.validation.engine.stages import PAIRS, STAGES, Attempt, differ, in_order
+from airlight.validation.engine.starts import STARTS
+from airlight.validation.engine.targets import GUESSES
+from airlight.validation.engine.traits import traits
+from airlight.validation.engine.transforms import (
+    LAYERS,
+    LOBES,
+    MIXES,
+    OPTICS,
+    PHASES,
+    TURNS,
+    VALUES,
+    WINDOWS,
+)
 from airlight.validation.fog_model.radiance import Fog
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
@@ -66,6 +79,19 @@ def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
     assert 0 < len(found) < len(FAULTS)
 
 
+def test_every_formula_has_a_fault_and_a_key_that_nothing_reads_is_an_error():
+    """A misspelt key of the table would leave a fault without its needs in silence."""
+    text = Path(faults.__file__).with_name("faults.toml").read_text(encoding="utf-8")
+    for table in (OPTICS, LOBES, PHASES, LAYERS, WINDOWS, MIXES, VALUES, TURNS, GUESSES, STARTS):
+        assert [name for name in table if f'"{name}"' not in text] == []
+    row = {"name": "albedo", "words": "the albedo was applied twice", "optics": "albedo twice"}
+    assert faults._fault("medium", row).kind == "medium"
+    with pytest.raises(TypeError, match="need"):
+        faults._fault("medium", row | {"need": ["absorption"]})
+    with pytest.raises(KeyError, match="albedo thrice"):
+        faults._fault("medium", row | {"optics": "albedo thrice"})
+
+
 def test_traits_of_a_scene_and_its_image_by_hand():
     """A lamp, a soft and a hard spot over a ball in fog of Henyey and Greenstein's
     function, seen in 4 x 3 pixels.
@@ -99,7 +125,7 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         predictor = SimpleNamespace(
             reference=reference,
             fog=Fog(**(plain | ones | {"moved": ((0.0,) * 3,)} | fog)),
-            seen=SimpleNamespace(holds=holds, values=values),
+            observation=SimpleNamespace(holds=holds, values=values),
             shape=shape,
             shown=lambda guess: values,
             predicted=lambda guess: values - 0.1,
@@ -151,33 +177,46 @@ def test_pairs_have_faults_of_two_kinds_in_the_order_in_which_they_happen():
 
     extinction, curve = fault("medium", 0.0), fault("values")
     lamp, shift = fault("light", 0.0), fault("camera", 0.1, 0.1)
-    assert _differ(extinction, curve)
-    assert not _differ(curve, fault("values", 0.0))
-    assert not _differ(lamp, shift)  # each shift would need new paths of the changed light
-    assert _differ(shift, extinction)
-    assert _differ(lamp, extinction)
-    assert _in_order(curve, extinction) == _in_order(extinction, curve) == (extinction, curve)
-    assert _in_order(shift, lamp) == (lamp, shift)
+    assert differ(extinction, curve)
+    assert not differ(curve, fault("values", 0.0))
+    assert not differ(lamp, shift)  # each shift would need new paths of the changed light
+    assert differ(shift, extinction)
+    assert differ(lamp, extinction)
+    assert in_order(curve, extinction) == in_order(extinction, curve) == (extinction, curve)
+    assert in_order(shift, lamp) == (lamp, shift)
 
 
-def test_a_diagnosis_tells_how_far_it_is_from_nothing_to_all():
-    spans = sorted(_PARTS)
-    assert [begin for begin, _ in spans] + [1.0] == [0.0] + [end for _, end in spans]
-    told = []
-    teller = SimpleNamespace(progress=lambda *words: told.append(words))
-    _Attempt._tell(teller, (0.3, 0.5), 0.25, "extinction")
-    assert told == [(pytest.approx(0.35), "extinction")]
+def test_a_diagnosis_tells_how_far_it_is_from_nothing_to_all(monkeypatch):
+    """Each stage is an equal part; every fault of the catalogue is in one of them."""
+    assert {fault.stage for fault in FAULTS} == {*STAGES} - {PAIRS}
+    heard = []
+    monkeypatch.setattr(stages, "explain", lambda predictor, faults, fine: None)
+    monkeypatch.setattr(stages, "_refined", lambda attempt, explanations: explanations)
+    faults_of_stages = tuple(
+        Fault(f"{stage} {number}", "words", None, stage=stage)
+        for stage in STAGES
+        for number in (1, 2)
+    )
+    attempt = Attempt(None, faults_of_stages, Candidates("centre", None, None))
+    for stage in ("quick", "extent"):
+        attempt = attempt.after(stage, lambda *words: heard.append(words))
+    assert heard == [(0.0, "quick 1"), (0.125, "quick 2"), (0.75, "extent 1"), (0.875, "extent 2")]
+    assert len(attempt.candidates.tried) == 4
 
 
-def test_pixels_are_paired_with_their_neighbours_in_the_next_columns():
-    def pairs(pixels, width, used):
-        seen = SimpleNamespace(used=np.ones(used, dtype=bool))
-        asked = SimpleNamespace(pixels=np.array(pixels), shape=(3, width), seen=seen)
-        return [each.tolist() for each in Predictor.pairs.func(asked)]
+def test_a_search_ends_after_the_first_stage_that_leaves_nothing(monkeypatch):
+    """Stages cost more and more: no later one is begun without need."""
+    done = []
 
-    # All pixels of 3 x 4: none of the last column has a next one.
-    assert pairs(range(12), 4, 12) == [[0, 1, 2, 4, 5, 6, 8, 9, 10], [1, 2, 3, 5, 6, 7, 9, 10, 11]]
-    # Some of many: pixels of the same row, so far apart that their errors are their own.
-    # 8 is in another row
-    assert pairs([0, 1, APART, APART + 1, 8 - APART, 8], 8, 99) == [[0, 1], [2, 3]]
-    assert pairs([0, 5], 12, 99) == [[], []]
+    def after(attempt, stage, progress):
+        done.append(stage)
+        return attempt
+
+    monkeypatch.setattr(Attempt, "after", after)
+    for enough_after, expected in ((0, []), (1, ["pairs"]), (9, ["pairs", "paths", "extent"])):
+        done.clear()
+        candidates = SimpleNamespace(
+            chosen=None, is_enough=lambda chosen, most=enough_after: len(done) >= most
+        )
+        Attempt(None, (), candidates).finished(None)
+        assert done == expected

@@ -23,7 +23,7 @@ from airlight.validation.engine.judge import (
     judge,
     references,
 )
-from airlight.validation.engine.seen import expected_layer, judged_layer, seen_image
+from airlight.validation.engine.observation import expected_layer, judged_layer, observation_of
 from airlight.validation.estimates.quadrature import (
     reference_error,
     reference_layer,
@@ -151,7 +151,7 @@ def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_
         np.testing.assert_array_equal(expected_layer(expected, own), own.values)
     # Neither a fit nor a diagnosis explains the radiance of the light itself.
     image = read_exr(file)
-    left = seen_image(image, judged_layer(image, file), loaded.scene)[0].used
+    left = observation_of(image, judged_layer(image, file), loaded.scene)[0].used
     assert 0.7 < left.mean() < 1
     assert not left.reshape(12, 16)[expected.emitted.any(axis=2)].any()
 

@@ -17,8 +17,8 @@ from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import Image
 from airlight.validation.engine.fault import Number
+from airlight.validation.engine.observation import Observation
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
-from airlight.validation.engine.seen import Seen
 from airlight.validation.fit.fit import fit_image
 from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
 from airlight.validation.fit.unknowns import Unknown, read_unknowns
@@ -54,7 +54,8 @@ def image_of(path):
 
 def predictor_of(reference, values):
     return Predictor(
-        Seen(reference, values, "airlight", np.ones(len(values), bool)), SceneLight(reference)
+        Observation(reference, values, "airlight", np.ones(len(values), bool)),
+        SceneLight(reference),
     )
 
 
@@ -204,7 +205,7 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
             "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
         }[noise]()
         model = Model.of(
-            Predictor(replace(predictor.seen, values=noisy), predictor.light), unknowns
+            Predictor(replace(predictor.observation, values=noisy), predictor.light), unknowns
         )
         solution = weighted_fit(model, robust_fit(model, wanted))
         low, high = interval_ends(model, solution).T

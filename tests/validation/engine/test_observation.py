@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airlight.validation.engine import seen
-from airlight.validation.engine.seen import (
+from airlight.validation.engine import observation
+from airlight.validation.engine.observation import (
     PixelKind,
     decide_pixel,
     needed_samples,
@@ -28,23 +28,23 @@ def images(monkeypatch):
         layers[0], layers[1, 0], layers[1, 1] = 0.0, 1.0, dim.get(samples, 0.02)
         return SimpleNamespace(layers=lambda fog: layers)
 
-    monkeypatch.setattr(seen, "scene_fog", lambda reference: None)
-    monkeypatch.setattr(seen, "view_of", lambda reference, pixels: None)
-    monkeypatch.setattr(seen, "scattering_paths", lambda view, samples: samples)
-    monkeypatch.setattr(seen, "FogModel", model)
+    monkeypatch.setattr(observation, "scene_fog", lambda reference: None)
+    monkeypatch.setattr(observation, "view_of", lambda reference, pixels: None)
+    monkeypatch.setattr(observation, "scattering_paths", lambda view, samples: samples)
+    monkeypatch.setattr(observation, "FogModel", model)
     return dim
 
 
 def test_samples_of_a_light_are_doubled_until_dim_pixels_stay_too(images):
     lit, unlit = (SimpleNamespace(area=area, width=2, height=1) for area in (("lamp",), ()))
-    first = seen.SAMPLES
+    first = observation.SAMPLES
     assert needed_samples(lit) == first
     # a fiftieth of the bright pixel, and off by its half and its quarter
     images[first], images[2 * first] = 0.08, 0.04
     assert needed_samples(lit) == 4 * first
     assert needed_samples(unlit) == first
     images.update({first * 2**n: 0.02 * 2.0**-n for n in range(12)})
-    assert needed_samples(lit) == seen._MOST_SAMPLES
+    assert needed_samples(lit) == observation._MOST_SAMPLES
 
 
 def test_errors_are_relative_to_the_larger_and_at_least_to_a_floor():

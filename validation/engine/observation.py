@@ -7,8 +7,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
@@ -34,7 +35,7 @@ from airlight.validation.fog_model.view import (
 from airlight.validation.metrics.errors import wrong_pixels
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 
-Found = TypeVar("Found")  #: the result of an attempt at an image
+Result = TypeVar("Result")  #: the result of an attempt at an image
 
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
@@ -47,8 +48,8 @@ PIXEL_WORDS = {"centre": "at pixel centres", "area": "means over pixels"}
 #: what a pixel may be: the radiance at its centre, or the mean over its area
 PIXELS = tuple(PIXEL_WORDS)
 
-#: Pixels between those whose errors are compared: a filter that is wider than
-#: a pixel joins neighbours.
+#: Distance of the two pixels of a pair [pixels]: a filter that is wider than a pixel joins them, so
+#: that pairs show which errors are shared (`validation.engine.decide.Blocks`).
 APART = 2
 
 _SIDE = 3  # rays along a side of a pixel, for means over its area
@@ -125,7 +126,7 @@ def _usual(image: Image, path: str | os.PathLike[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Observation:
     """An image that is to be explained, and which of its pixels and rays are looked at."""
 
     reference: ReferenceScene
@@ -218,9 +219,9 @@ def _evenly(count: int, fraction: float) -> Index:
     return np.linspace(0, count - 1, min(count, max(4, round(count * fraction)))).astype(np.int64)
 
 
-def seen_image(
-    image: Image, judged: JudgedLayer, scene: Any, *, mask: Bools | None = None
-) -> tuple[Seen, tuple[str, ...]]:
+def observation_of(
+    image: Image, judged: JudgedLayer, scene: "mi.Scene", *, mask: Bools | None = None
+) -> tuple[Observation, tuple[str, ...]]:
     """Return a layer of an image that is to be explained, and the faults of the file: pixels
     that are not finite.
 
@@ -271,10 +272,10 @@ def seen_image(
             .reshape(reference.height, reference.width)
         )
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
-    seen = Seen(
+    observation = Observation(
         reference, values, judged.holds, np.asarray(used), samples=needed_samples(reference)
     )
-    return seen, wrong_pixels(
+    return observation, wrong_pixels(
         ~finite.reshape(reference.height, reference.width), "left out, NaN or infinite"
     )
 
@@ -319,7 +320,7 @@ class PixelKind:
         names = {"centre": "centres", "area": "means over the area"}
         if not self.errors:
             return f"judged by {names[self.pixel]}"
-        # The kind that fits comes first: it is the one for which `!=` is false.
+        # The kind that fits comes first: `!=` is false for it.
         own, other = (
             f"{100 * self.errors[kind]:.3g} % off" for kind in sorted(PIXELS, key=self.pixel.__ne__)
         )
@@ -329,17 +330,17 @@ class PixelKind:
 
 def decide_pixel(
     kinds: Sequence[str],
-    attempt: Callable[[str], Found],
-    errors: Callable[[Sequence[Found]], Sequence[float]],
-    exact: Callable[[Found], bool] = lambda found: False,
-) -> tuple[PixelKind, Found]:
+    attempt: Callable[[str], Result],
+    errors: Callable[[Sequence[Result]], Sequence[float]],
+    exact: Callable[[Result], bool] = lambda result: False,
+) -> tuple[PixelKind, Result]:
     """Return the kind of an image's pixels, and the attempt for this kind.
 
     `kinds`: the possible kinds, see `pixel_kinds`; `errors`: the errors of attempts, which are
     compared where there are several; `exact`: whether the error of an attempt is so small that no
     other attempt can have a smaller one.
     """
-    attempts: list[Found] = []
+    attempts: list[Result] = []
     for kind in kinds:
         attempts.append(attempt(kind))
         if len(kinds) == 1 or exact(attempts[-1]):
