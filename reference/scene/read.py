@@ -126,22 +126,20 @@ def read_reference(scene: "mi.Scene") -> ReferenceScene:
     """
     sensor = perspective_sensor(scene)
     width, height = (int(n) for n in sensor.film().size())
-    # Emitters by how they shine: around the scene, from a direction, from an area, from a place.
+    # Emitters shine from around the scene, from a direction, from an area or from a place.
     background = _background(scene)
     emitters = [emitter for emitter in scene.emitters() if emitter != background]
-    far = tuple(emitter for emitter in emitters if is_directional(emitter))
-    wide = tuple(emitter for emitter in emitters if is_area(emitter))
-    near = tuple(
+    points = [
         emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter)
-    )
+    ]
     if not emitters and background is None:
         raise InputError(
             "the scene has no light; expected at least one emitter of type 'point', 'spot', "
             "'directional' or 'area'"
         )
-    lights = tuple(_read_light(emitter) for emitter in near)
+    lights = tuple(_read_light(emitter) for emitter in points)
     origin = camera_matrix(sensor)[:3, 3]
-    area = tuple(read_area_light(emitter, origin) for emitter in wide)
+    area = tuple(read_area_light(emitter, origin) for emitter in emitters if is_area(emitter))
     # Shapes that stop light, and shapes that bound media. The medium of a shape that holds the
     # whole box of a density grid counts as the medium around the camera, and the shape bounds
     # nothing.
@@ -149,19 +147,20 @@ def read_reference(scene: "mi.Scene") -> ReferenceScene:
     grid = _grid_in_a_shape(sensor, boundaries, origin)
     media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
     medium = grid or _read_ambient(sensor, origin, media, boundaries)
-    suns = tuple(read_directional(emitter) for emitter in far)
+    suns = tuple(read_directional(emitter) for emitter in emitters if is_directional(emitter))
     # Light from infinity never arrives through an unbounded medium, nor along paths in height fog
     # that do not rise.
-    for emitter, sun in zip(far, suns, strict=True):
+    for sun in suns:
+        name = sun.emitter.id()
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(
-                f"light '{emitter.id()}' is directional: nothing of it arrives through a medium "
+                f"light '{name}' is directional: nothing of it arrives through a medium "
                 "without bounds; give the medium bounds, a closed convex shape of material 'null' "
                 "with the medium as its interior"
             )
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(
-                f"light '{emitter.id()}' is directional and shines from the horizon or below: each "
+                f"light '{name}' is directional and shines from the horizon or below: each "
                 "of its light paths through height fog, which has no sides, is infinitely deep; "
                 "expected a light from above the horizon"
             )

@@ -148,7 +148,7 @@ def _property_bytes(value: object) -> bytes:
     if isinstance(value, mi.Properties.Reference):
         return value.id().encode()
     # a spectrum, whose type has no name of its own in every variant
-    if hasattr(value, "wavelengths"):
+    if hasattr(value, "wavelengths") and hasattr(value, "values"):
         return _value_bytes(value.wavelengths) + b"|" + _value_bytes(value.values)
     if isinstance(value, str):
         # A word may name a file, whose content counts, not its name.

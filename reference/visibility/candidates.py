@@ -46,9 +46,10 @@ class Ball:
 
 @dataclass(frozen=True)
 class Near:
-    """The shapes near each ray: lists of numbers, and where the list of a ray begins and ends."""
+    """The shapes near each ray: of each kind the lists of all rays, one after the other."""
 
-    triangles: tuple[Index, Index, Index]  #: begin, end, (rays,) each, and numbers
+    #: where the list of each ray begins and ends, (rays,) each, and the numbers of the shapes
+    triangles: tuple[Index, Index, Index]
     spheres: tuple[Index, Index, Index]
     disks: tuple[Index, Index, Index]
 
@@ -58,8 +59,8 @@ def near_shapes(
 ) -> Near:
     """Return the shapes that can stand between a light and rays.
 
-    `light`: what holds it; `origin`, `direction`, `length`: of the rays: where all begin, (3,) [m],
-    unit vectors, (rays, 3), and how far they go, (rays,) [m]; `shapes`: the shapes.
+    `light`: its bounds; `origin`, `direction`, `length`: where all rays begin, (3,) [m], their unit
+    directions, (rays, 3), and how far they go, (rays,) [m]; `shapes`: the shapes.
     """
     none = (
         np.zeros(len(direction), np.int64),
@@ -103,46 +104,47 @@ def _tiles(
 ) -> Iterator[tuple[Index, Index]]:
     """Yield rays, and the solids near all of them."""
     to_light = light.centre - light.w * origin
-    far = np.linalg.norm(to_light)
-    axis = to_light / far if far > 0 else np.array([0.0, 0.0, 1.0])
+    distance = np.linalg.norm(to_light)
+    axis = to_light / distance if distance > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     turned = np.cross(axis, across)
     # Rays by their azimuth about the axis: neighbours in this order make thin strips.
     azimuth = np.argsort(np.arctan2(direction @ turned, direction @ across), kind="stable")
     leaning = direction @ axis
-    wide = light.radius > 0 and light.w == 1
+    is_ball = light.radius > 0 and light.w == 1
     # A tile has 32 rays. The strip of a point light has 128, thin in azimuth; about a ball, which
     # no plane through the axis holds, tiles are about as wide as long.
     tile, parts = 32, 4
-    width = max(tile, int(np.sqrt(tile * len(azimuth)))) if wide else 128
+    width = max(tile, int(np.sqrt(tile * len(azimuth)))) if is_ball else 128
     # 1e-9 of the size of the scene is slack for rounding.
-    size = 1e-9 * (1 + (far if light.w else 0) + light.radius + np.abs(solids[0]).max(initial=0))
-    waiting = [(azimuth, np.arange(len(solids[0])))]
-    while waiting:
-        rays, numbers = waiting.pop()
+    largest = np.abs(solids[0]).max(initial=0)
+    slack = 1e-9 * (1 + (distance if light.w else 0) + light.radius + largest)
+    groups = [(azimuth, np.arange(len(solids[0])))]
+    while groups:
+        rays, numbers = groups.pop()
         # The fan of directions in the plane of a ray and the axis [rad]; in a group wider than a
         # strip only the planes on both sides are tried.
         fan = np.arange(12 if len(rays) <= width else 0) * np.pi / 6
-        hull = _Hull(light, axis, to_light, direction[rays], length[rays], fan, size)
+        hull = _Hull(light, axis, to_light, direction[rays], length[rays], fan, slack)
         numbers = hull.near(solids, numbers)
         if not len(numbers):
             continue
         # To look through 512 pairs of rays and shapes costs less than to divide the group, for 50
         # samples of a light.
-        if len(rays) <= (1 if wide else tile) or len(rays) * len(numbers) <= 512:
+        if len(rays) <= (1 if is_ball else tile) or len(rays) * len(numbers) <= 512:
             yield rays, numbers
             continue
         # A strip is divided by the angle from the axis from here on.
         if len(rays) <= width and len(rays) > width // parts:
             rays = rays[np.argsort(leaning[rays], kind="stable")]
         step = -(-len(rays) // parts)
-        waiting += [(rays[first : first + step], numbers) for first in range(0, len(rays), step)]
+        groups += [(rays[first : first + step], numbers) for first in range(0, len(rays), step)]
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return the cross product of two vectors: NumPy's, for many of them, takes
-    fifty times as long for two.
+    """Return the cross product of two vectors, in a fiftieth of the time that NumPy's takes, which
+    is made for many vectors.
     """
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
@@ -162,8 +164,8 @@ class _Hull:
         slack: float,
     ):
         # The frame of the group: its mean ray, across it the direction `up` in the plane of ray and
-        # axis, and `side` across that plane. Rays that cancel, or a mean ray along the axis, leave
-        # any frame as good.
+        # axis, and `side` across that plane. Where rays cancel, or the mean ray is along the axis,
+        # any frame will do.
         mean = direction.mean(axis=0)
         size = np.linalg.norm(mean)
         mean = mean / size if size > 1e-6 else direction[0]
@@ -215,7 +217,7 @@ class _Hull:
         self.m, self.support, self.norm = m[useful], self.support[useful], norm[useful]
 
     def near(self, solids: tuple[Array, Array], numbers: Index) -> Index:
-        """Return which balls of these numbers no half space leaves out."""
+        """Return the numbers of the balls that no half space leaves out, of those given."""
         centre, radius = solids
         for first in range(len(self.m)):
             # One plane after the other while more than 300 shapes are left: the planes beside the

@@ -247,7 +247,7 @@ def batch_tracer(
         if estimator == "cloud-paths":
             seen = seen_clouds(clouds).meets
             return layers, lambda seed: cloud_paths_batch(
-                clouds, seed, samples, sets=sets, seen=seen
+                clouds, seed, samples, sets=sets, mask=seen
             )
     given = f"estimator: got {estimator!r} with max_depth {max_depth} and orders {orders}"
     raise ValueError(f"{given}, expected one of {', '.join(ESTIMATORS)}")

@@ -46,21 +46,21 @@ def cloud_paths_batch(
     samples: int,
     *,
     sets: Sequence[tuple[str, tuple[int, float]]],
-    seen: NDArray[np.bool_],
+    mask: NDArray[np.bool_],
 ) -> Batches:
     """Trace one batch.
 
     `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
     samples a pixel, at most 256; `sets`: names of disjoint sets of orders with their first and last
-    order, the last `math.inf` for one without end; `seen`: pixels whose rays meet a cloud or a
-    surface, (pixels,).
+    order, the last `math.inf` for an unbounded set; `mask`: pixels whose rays meet a cloud or a
+    surface, (pixels,): the others get no samples.
     """
     check_samples(samples)
     targets = _targets([orders for _, orders in sets])
-    pixels = np.flatnonzero(seen)
+    pixels = np.flatnonzero(mask)
     most = 1 << 18  # lanes followed at once: their sums take 16 MB a layer
     streams = _streams(len(pixels), samples)
-    sums = np.zeros((targets.count, len(seen), 3))
+    sums = np.zeros((targets.count, len(mask), 3))
     # Flights depend on the extinction: channels with the same extinction in all clouds share a
     # walk, each other channel has its own.
     extinctions = np.stack([cloud.sigma_t for cloud in clouds.clouds], axis=1)

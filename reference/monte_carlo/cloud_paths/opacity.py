@@ -33,8 +33,8 @@ class SeenClouds:
 def seen_clouds(clouds: CloudScene) -> SeenClouds:
     """Follow the pixel-centre rays of a scene."""
     count = len(clouds.direction)
-    # `passed` is how far each ray has been summed up; `cast` is where its next ray cast starts, a
-    # little behind the last crossing.
+    # `passed` is the distance up to which the depth of each ray is summed; `cast` is where its next
+    # ray cast starts, a little behind the last crossing.
     depth, distance = np.zeros((count, 3)), np.full(count, np.inf)
     passed, cast, meets = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
     inside = np.full(count, clouds.camera_cloud)
@@ -46,6 +46,7 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
     reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
     while active.size:
+        # The next crossing of the rays that have not met an opaque surface yet.
         way = clouds.direction[active]
         start = cast[active]
         ray = mi.Ray3f(mi.Point3f((clouds.origin + start[:, None] * way).T), mi.Vector3f(way.T))
@@ -77,8 +78,8 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         # Two crossings that rounding swaps leave a stretch of length 0.
         stretch = np.maximum(length - passed[active], 0.0)
         for number, cloud in enumerate(clouds.clouds):
-            # With a density the stretch counts with the integral of the fraction of the largest
-            # extinction.
+            # In a cloud with a density the length is weighted by the extinction over the largest
+            # one.
             in_cloud = within == number
             if cloud.density is not None:
                 stretch[in_cloud] = cloud.density.along(

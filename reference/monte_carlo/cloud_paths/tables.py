@@ -161,11 +161,11 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
         int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n
         for n, each in enumerate(clouds.clouds, 1)
     }
-    every = [
+    last = max(
         int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
         for shape in clouds.scene.shapes()
-    ]
-    kinds = np.zeros(max(every) + 1, dtype=np.uint32)
+    )
+    kinds = np.zeros(last + 1, dtype=np.uint32)
     kinds[list(numbers)] = list(numbers.values())
     functions = list(dict.fromkeys(each.phase for each in clouds.clouds))
     # Suns are drawn by irradiance, and count with irradiance over probability.

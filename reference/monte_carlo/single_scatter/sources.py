@@ -252,11 +252,11 @@ def is_sky(emitter: "mi.Emitter") -> bool:
 def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     """Return the lights of a scene."""
     emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
-    wide = [
+    area = [
         AreaSource(emitting(light), mi.Color3f(*map(float, light.radiance)))
         for light in reference.area
     ]
-    return (*map(_source, emitters), *wide)
+    return (*map(_source, emitters), *area)
 
 
 def _source(emitter: "mi.Emitter") -> Source:

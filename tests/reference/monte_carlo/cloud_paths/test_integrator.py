@@ -44,7 +44,7 @@ def paths(clouds, count, samples, sets=SETS, first=0):
     return reduce(
         merged,
         (
-            cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
+            cloud_paths_batch(clouds, seed, samples, sets=sets, mask=seen)
             for seed in range(first, first + count)
         ),
     )
