@@ -26,9 +26,11 @@ from airlight.errors import InputError
 from airlight.validation.arrays import Array
 from airlight.validation.readers import Reader, read_named, read_number, read_table, read_toml
 
-#: of ranges as they are drawn without a file of one's own
+#: The ranges that are drawn from where a user gives no file.
 FILE = Path(__file__).with_name("ranges.toml")
 
+#: The distributions of a random scene by name, as a file has them: of a range its ends, two numbers;
+#: of a choice the weights by word; `meshes` is a folder, or empty.
 Ranges = dict[str, Any]
 
 PREFIX = "random:"
@@ -90,10 +92,10 @@ class Draws:
 
     def pick(self, weights: Mapping[str, float], name: str = "") -> str:
         """Return one of several words by their weights."""
-        left = self.fraction(name) * sum(weights.values())
+        remainder = self.fraction(name) * sum(weights.values())
         for word, weight in weights.items():
-            left -= weight
-            if left < 0:
+            remainder -= weight
+            if remainder < 0:
                 return word
         # Rounding may leave a remainder of 0 after the last weight.
         return [word for word, weight in weights.items() if weight > 0][-1]
@@ -146,7 +148,7 @@ def read_ranges(path: Path) -> Ranges:
     return ranges_from(table, str(path))
 
 
-def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
+def ranges_from(table: Mapping[str, object], where: str = "ranges") -> Ranges:
     """Return the usual ranges with what a table says in their place.
 
     Unknown names, ranges that are empty or beyond what can be drawn, and weights of which
@@ -154,7 +156,7 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     """
     usual, limits = _defaults()
     # A name with limits is a range; every other name is a table of weights.
-    readers: dict[str, Reader] = {"meshes": _folder}
+    readers: dict[str, Reader[object]] = {"meshes": _folder}
     readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
     readers |= {
         name: partial(_weights, names=tuple(usual[name])) for name in usual if name not in readers
@@ -165,23 +167,23 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
         raise InputError(f"{where}: {error}") from None
 
 
-def _folder(what: str, value: Any) -> str:
+def _folder(what: str, value: object) -> str:
     if not isinstance(value, str) or (value and not Path(value).is_dir()):
         raise InputError(f"{what} is {value!r}; expected a folder of .obj and .ply files")
     return value
 
 
-def _range(what: str, value: Any, *, limits: tuple[float, float]) -> tuple[float, float]:
+def _range(what: str, value: object, *, limits: tuple[float, float]) -> tuple[float, float]:
     pair = value if isinstance(value, list | tuple) else [value, value]
-    found = tuple(float(read_number(what, each, *limits, whole=False)) for each in pair)
-    if len(found) != 2 or found[0] > found[1]:
+    ends = [float(read_number(what, end, *limits)) for end in pair]
+    if len(ends) != 2 or ends[0] > ends[1]:
         raise InputError(f"{what}: got {value!r}, expected [from, to]")
-    return found[0], found[1]
+    return ends[0], ends[1]
 
 
-def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, float]:
+def _weights(what: str, value: object, *, names: tuple[str, ...]) -> dict[str, float]:
     heaviest = 1e9  # weight of a choice
-    read = partial(read_number, least=0, most=heaviest, whole=False)
+    read = partial(read_number, least=0, most=heaviest)
     weights = read_named(f"{what}.", read_table(what, value), dict.fromkeys(names, read))
     if not any(weights.values()):
         raise InputError(f"{what}: no weight is above 0; expected one at least")
