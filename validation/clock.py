@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -41,24 +41,19 @@ def timed(work: Callable[[], T]) -> tuple[T, Spent]:
 
 
 def time_repeated(
-    work: Callable[[], Any],
+    work: Callable[[], object],
     *,
     seconds: float = 0.6,
     least: int = 5,
     most: int = 200,
-    warm_up: int = 2,
 ) -> Timing:
-    """Time a piece of work repeatedly.
-
-    It takes about so many `seconds`, and `least` to `most` repetitions, after some runs of
-    `warm_up`: the first compiles and records, the second is the first replay.
-    """
-    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most, warm_up=warm_up)
+    """Time a piece of work repeatedly: for about so many `seconds`, and `least` to `most` times."""
+    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most)
     return timing
 
 
 def time_in_turns(
-    works: Sequence[Callable[[], Any]],
+    works: Sequence[Callable[[], object]],
     *,
     seconds: float = 3.0,
     least: int = 5,
@@ -68,8 +63,8 @@ def time_in_turns(
     """Time several pieces of work in turns, so that other load on the machine
     affects all of them alike.
 
-    Parameters are those of `time_repeated`; `seconds` are of all works together,
-    `least` and `most` of each.
+    `seconds` are of all works together, `least` and `most` the repetitions of each. The first
+    `warm_up` runs do not count: the first compiles and records, the second is the first replay.
     """
     for _ in range(warm_up):
         for work in works:
@@ -113,7 +108,7 @@ def in_turns(
     return results
 
 
-def _spent(work: Callable[[], Any]) -> Spent:
+def _spent(work: Callable[[], object]) -> Spent:
     return timed(work)[1]
 
 
@@ -125,7 +120,7 @@ def timing_of(spent: Sequence[Spent]) -> Timing:
     return Timing(median, low, high, len(spent), min(each.cpu_ms for each in spent) or None)
 
 
-def peak_memory(work: Callable[[], Any]) -> float | None:
+def peak_memory(work: Callable[[], object]) -> float | None:
     """Return how much more memory the process holds at the peak of `work` than before it [MiB].
 
     Memory that `work` frees before it ends counts; memory that was freed before does not. None

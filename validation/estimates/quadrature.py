@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of a scene, from the cache where it was computed before, and what the image
-of a renderer holds of it.
+"""The reference of a scene, from the cache where it was computed before, and the layers of it that
+the image of a renderer shows.
 
 Refused are references that are infinite, of rays that meet a light, and what is not
 finite for any other reason.
@@ -27,10 +27,14 @@ How near is on the ray? Mitsuba holds positions as float32 numbers, the largest 
 and light known to 2^-24 of it. A smaller h is not known to be anything but 0.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import TypedDict, Unpack
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,20 +67,27 @@ class ReferenceInputs(Inputs):
     points: int | None = None
 
 
-def reference_inputs(scene, **settings: Any) -> ReferenceInputs:
-    """Return the inputs of the reference of an `mi.Scene`, `settings` by the
-    names of `ReferenceInputs`.
-    """
+class ReferenceSettings(TypedDict, total=False):
+    """The fields of `ReferenceInputs` that have a default, as keywords."""
+
+    checks: int
+    shadow_scale: float
+    pixel: str
+    points: int | None
+
+
+def reference_inputs(scene: mi.Scene, **settings: Unpack[ReferenceSettings]) -> ReferenceInputs:
+    """Return the inputs of the reference of a scene."""
     return ReferenceInputs(scene_content(scene), **settings)
 
 
 def reference_result(
-    scene, inputs: ReferenceInputs | None = None, *, progress: Counted | None = None
+    scene: mi.Scene, inputs: ReferenceInputs | None = None, *, progress: Counted | None = None
 ) -> Kept[ReferenceImage]:
-    """Return the quadrature reference of an `mi.Scene`, and what it took, from
-    the cache or computed now.
+    """Return the quadrature reference of a scene, and the time that it took, from the cache or
+    computed now.
 
-    `inputs`: of this scene, with the settings of `reference_inputs`; by default with its defaults.
+    `inputs`: of this scene; by default with the default settings.
 
     Raises InputError for radiance that is not finite.
     """
@@ -84,72 +95,74 @@ def reference_result(
     return stored(asked, lambda: _computed(scene, asked, progress), ReferenceImage)
 
 
-def reference_image(scene, *, progress: Counted | None = None, **settings: Any) -> ReferenceImage:
-    """Return the quadrature reference of an `mi.Scene` at its own size,
-    (height, width, 3) [W/(m^2 sr)].
-
-    `settings`: by the names of `ReferenceInputs`.
+def reference_image(
+    scene: mi.Scene,
+    *,
+    progress: Counted | None = None,
+    **settings: Unpack[ReferenceSettings],
+) -> ReferenceImage:
+    """Return the quadrature reference of a scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     Raises InputError for radiance that is not finite.
     """
     return reference_result(scene, reference_inputs(scene, **settings), progress=progress).value
 
 
-def _computed(scene, inputs: ReferenceInputs, progress: Counted | None) -> ReferenceImage:
+def _computed(scene: mi.Scene, inputs: ReferenceInputs, progress: Counted | None) -> ReferenceImage:
     reference, points = read_reference(scene), inputs.points
-    # Only area lights take so long that a run is worth going on with.
+    # Only area lights take so long that an interrupted run should go on from its parts.
     keep = _parts(inputs.key) if reference.area and inputs.pixel == "centre" else None
-    # A given number of points is taken as it is: first and most are the same, and no error is asked
-    # for.
-    settings = {
-        "checks": inputs.checks,
-        "shadow_scale": inputs.shadow_scale,
-        "pixel": inputs.pixel,
-        "plan": PointPlan(error=0.0, first=points, most=points) if points else None,
-    }
-    return _checked_image(reference, settings, keep=keep, progress=progress)
+    # A given number of points is fixed: first and most are the same, and no error is asked for.
+    plan = PointPlan(error=0.0, first=points, most=points) if points else None
+    compute = partial(
+        quadrature_image,
+        reference,
+        checks=inputs.checks,
+        shadow_scale=inputs.shadow_scale,
+        pixel=inputs.pixel,
+        plan=plan,
+        keep=keep,
+        progress=progress,
+    )
+    return _checked_image(reference, compute, inputs.pixel)
 
 
 def reference_of_pixels(
-    scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
+    scene: mi.Scene, pixels: NDArray[np.integer], plan: PointPlan | None = None
 ) -> ReferenceImage:
-    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row,
-    (1, count, 3); not kept.
+    """Return the quadrature reference of pixels of a scene, (1, count, 3) [W/(m^2 sr)]; it is not
+    cached.
 
-    `plan`: how many samples stand for area lights.
+    `pixels`: their numbers, row by row, (count,); `plan`: how many samples stand for area lights.
     """
     whole = read_reference(scene)
-    some = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
-    return _checked_image(some, {"plan": plan})
+    chosen = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
+    return _checked_image(chosen, partial(quadrature_image, chosen, plan=plan), "centre")
 
 
 def _checked_image(
-    reference: ReferenceScene,
-    settings: Mapping[str, Any],
-    *,
-    keep: Keep | None = None,
-    progress: Counted | None = None,
+    reference: ReferenceScene, compute: Callable[[], ReferenceImage], pixel: str
 ) -> ReferenceImage:
-    """Return the reference of an image whose every value is finite."""
+    """Return the image of a reference; refuse a scene, or an image, that is infinite somewhere."""
     check_camera(reference)
     # The mean over a pixel is finite even where its centre ray meets a light.
-    if settings.get("pixel", "centre") == "centre":
+    if pixel == "centre":
         check_rays(reference, surface_hits(reference).distance)
-    image = quadrature_image(reference, **settings, keep=keep, progress=progress)
+    image = compute()
     check_values(reference, image)
     return image
 
 
 def _parts(key: str | None) -> Keep:
-    """Return a store for parts of a reference until it is done: a run that was
+    """Return a cache for parts of a reference until it is done: a run that was
     interrupted goes on from them.
     """
 
-    def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    def keep(name: str, work: Callable[[], Mapping[str, Array]]) -> Mapping[str, Array]:
         part = None if key is None else f"{key}/{name}"
-        # Without a key nothing can be kept: the work is done each time.
-        found, spent = load(part), stopwatch()
-        return (found or store(part, work(), spent())).value
+        # Without a key nothing can be cached: the work is done each time.
+        cached, took = load(part), stopwatch()
+        return (cached or store(part, work(), took())).value
 
     return keep
 
@@ -174,8 +187,8 @@ def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without
     area lights, where it is 0.
 
-    Airlight and surface have their own draws, so that the variances of the total add up;
-    what lights emit is exact.
+    Airlight and surface are sampled independently: their variances add up to that of the total.
+    The emission of lights is exact.
     """
     if reference.airlight_se is None or reference.surface_se is None:
         return None
@@ -245,13 +258,13 @@ def check_rays(reference: ReferenceScene, distance: Array) -> None:
     for number, light in enumerate(reference.lights, 1):
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
         foot, height = foot_and_height(origin, reference.direction, light.position)
-        # A light counts as on the ray where its distance from it is not known to be more than 0; it
-        # must be in front of the camera, before the surface, and shine along the ray.
-        known = _uncertainty(reference, light)
+        # A light counts as on the ray where its distance from the ray is 0 within rounding. It must
+        # be in front of the camera, before the surface, and shine along the ray.
+        uncertainty = _uncertainty(reference, light)
         meets = (
-            (height <= known)
+            (height <= uncertainty)
             & (foot > 0)
-            & (foot <= ends + known)
+            & (foot <= ends + uncertainty)
             & _looks_along(light, reference.direction)
         )
         if meets.any() and _scatters(reference, light):
@@ -269,7 +282,7 @@ def check_rays(reference: ReferenceScene, distance: Array) -> None:
 def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
     """Refuse a reference that is not finite, by its first pixel."""
     for what in ("airlight", "airlight_bound", "surface"):
-        values: Any = getattr(image, what)
+        values: Array = getattr(image, what)
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             # The first pixel in reading order.
@@ -288,13 +301,13 @@ def _name(number: int, light: ReferenceLight) -> str:
 
 
 def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
-    """Return how well the distance from the camera to a light is known [m]."""
+    """Return the error of the distance from the camera to a light [m]."""
     # Positions are float32 numbers, known to 2^-24 of the largest coordinate.
     return 2.0**-24 * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
 
 
 def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
-    """Return whether there is a medium where a light is: beside it the airlight is finite."""
+    """Return whether a light is in a medium; without one the airlight is finite there."""
     # A light within a bounded medium is in that medium, else in the one around all.
     inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else reference.medium

@@ -104,20 +104,20 @@ def errors_by_group(
     assert cases.value is not None
     # One computation for all groups; each group then takes its rows.
     error = relative_error(values, cases.value, precision, underflow_allowance(cases, precision))
-    accepted, known = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
+    accepted, has_value = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
     return {
-        name: _errors(cases, values, error, known, group & accepted, group)
+        name: _errors(cases, values, error, has_value, group & accepted, group)
         for name, group in rows.items()
     }
 
 
 def _errors(
-    cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools
+    cases: Cases, values: Array, error: Array, has_value: Bools, tried: Bools, group: Bools
 ) -> KernelErrors:
     # Rows of refused phase functions count as refused, not as wrong; rows whose reference is not
     # finite have no error.
     J, finite = values[tried], np.isfinite(error) & tried
-    bad = tried & known & ~np.isfinite(values)
+    bad = tried & has_value & ~np.isfinite(values)
     median = p99 = largest = mean = worst = None
     if finite.any():
         median, p99, largest = (float(q) for q in np.percentile(error[finite], [50, 99, 100]))
@@ -134,7 +134,7 @@ def _errors(
         max=largest,
         mean=mean,
         nan=int(np.isnan(J).sum()),
-        infinite=int((np.isinf(values) & known & tried).sum()),
+        infinite=int((np.isinf(values) & has_value & tried).sum()),
         negative=int((J < 0).sum()),
         worst=None if worst is None else case_row(cases, worst),
     )

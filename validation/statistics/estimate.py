@@ -56,8 +56,8 @@ class Estimate:
         if self.value is None or self.error is None:
             return None
         half = self.error * (errors if self.kind == "statistical" else 1.0)
-        known = math.isfinite(self.value) and math.isfinite(half)
-        return (self.value - half, self.value + half) if known else None
+        finite = math.isfinite(self.value) and math.isfinite(half)
+        return (self.value - half, self.value + half) if finite else None
 
     def exceeds(self, limit: float, errors: float = INTERVAL) -> Answer:
         """Return whether the true number is above a limit; `errors` as of `ends`."""

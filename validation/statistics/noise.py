@@ -67,13 +67,13 @@ the eight times the work of the shortest ladder, that is a time at one end that 
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from airlight.validation.statistics.comparison import LEVEL
 from airlight.validation.statistics.estimate import Answer, Estimate
 from airlight.validation.statistics.samples import sidak
+from airlight.validation.timing import TimeGrowth, Timing
 
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error
@@ -97,7 +97,6 @@ _WITNESSES = {
     "objects_moved": (),
 }
 
-Timing = Any  #: has median_ms, low_ms, high_ms, repetitions
 Times = Mapping[str, Timing]  #: by stage
 
 
@@ -226,20 +225,16 @@ def _medians(times: Times) -> dict[str, float]:
     return medians
 
 
-def other_power(old: Any, new: Any) -> float:
-    """Return by how much a time grows with another power of the work than before, 0
-    where noise may explain it.
+def other_power(old: TimeGrowth, new: TimeGrowth) -> float:
+    """Return the change of the power of the work with which a time grows, 0 where noise may explain
+    it.
 
-    Both have an `exponent` and its `standard_error`, None where it is not known: two steps have a
-    power without an error, and of that nothing can be told.
+    Two steps have a power without an error: whether it changed is unknown, and the change is 0.
     """
     before, after = old.exponent, new.exponent
-    errors = old.standard_error, new.standard_error
-    if before is None or after is None or None in errors:
+    old_error, new_error = old.standard_error, new.standard_error
+    if before is None or after is None or old_error is None or new_error is None:
         return 0.0
-    change = Estimate(after - before, math.hypot(*errors))
-    return (
-        after - before
-        if abs(after - before) > POWER_TOLERANCE and change.within(0.0, 3.0) is Answer.NO
-        else 0.0
-    )
+    change = after - before
+    moved = Estimate(change, math.hypot(old_error, new_error)).within(0.0, 3.0) is Answer.NO
+    return change if abs(change) > POWER_TOLERANCE and moved else 0.0
