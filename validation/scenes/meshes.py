@@ -169,9 +169,9 @@ def icosphere(levels: int) -> Mesh:
     vertices = vertices / np.linalg.norm(vertices[0])
     # Only the midpoints are new; they are moved out to the unit sphere.
     for _ in range(levels):
-        known = len(vertices)
+        count = len(vertices)
         vertices, faces = divided((vertices, faces))
-        vertices[known:] /= np.linalg.norm(vertices[known:], axis=1, keepdims=True)
+        vertices[count:] /= np.linalg.norm(vertices[count:], axis=1, keepdims=True)
     return vertices, faces
 
 
