@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def timed(work: Callable[[], T]) -> tuple[T, Spent]:
-    """Do some work and return what it gave, and what it took until its arrays are ready."""
+    """Do some work; return its result, and the time until its arrays are ready."""
     took = stopwatch()
     value = work()
     dr.sync_thread()
@@ -78,20 +78,20 @@ def time_in_turns(
 class Piece(Generic[T]):
     """A piece of work that takes turns with others."""
 
-    work: Callable[[], T]  #: does it once, and returns what it took
-    seconds: float  #: to spend on it in all rounds together; once a round is the least
-    rounds: int | None = None  #: in how many rounds it takes part, None for all
+    work: Callable[[], T]  #: does it once, and returns the time that it took
+    seconds: float  #: for all rounds together; it is done once a round at least
+    rounds: int | None = None  #: the number of rounds in which it takes part, None for all
 
 
 def in_turns(
     pieces: Sequence[Piece[T]], *, rounds: int = ROUNDS, most: int = 200
 ) -> list[list[list[T]]]:
-    """Do pieces of work in turns and return what they gave, by piece, by round in which it
+    """Do pieces of work in turns and return their results: by piece, by round in which the piece
     takes part, by repetition.
 
-    In each round every piece is repeated for its part of its seconds, so that what it left in the
-    caches of the machine is there as in an animation. A piece that takes part in few rounds has
-    them evenly among all. `most` is the largest number of repetitions in all rounds together.
+    In each round a piece is repeated until its part of its seconds is over: the caches of the
+    machine then hold its data, as in an animation. The rounds of a piece that takes part in few of
+    them are spread evenly. `most` is the largest number of repetitions in all rounds together.
     """
     results: list[list[list[T]]] = [[] for _ in pieces]
     for number in range(rounds):
@@ -113,7 +113,7 @@ def _spent(work: Callable[[], object]) -> Spent:
 
 
 def timing_of(spent: Sequence[Spent]) -> Timing:
-    """Return median and quartiles of what repetitions took, and their least processor time."""
+    """Return median and quartiles of the times of repetitions, and their least processor time."""
     low, median, high = (
         float(value) for value in np.percentile([each.ms for each in spent], [25, 50, 75])
     )

@@ -35,7 +35,7 @@ class Column:
 
     key: str  #: the path of the value in the record, with dots
     heading: str
-    unit: str  #: '1' for a number without a unit, empty for what is no number
+    unit: str  #: '1' for a number without a unit, empty for words and truth values
     meaning: str
     kind: str  #: 'string', 'int64', 'float64', 'bool' or 'binary', as Arrow names them
 
@@ -113,8 +113,8 @@ def flat(data: Mapping[str, object]) -> dict[str, Any]:
 
 
 def plain(value: object) -> Any:
-    """Return records, containers, arrays and numbers as JSON holds them: no NumPy types,
-    None for what is not finite.
+    """Return records, containers, arrays and numbers as JSON holds them: without NumPy types, and
+    with None for a number that is not finite.
 
     A field that `repr` does not show, such as an image, is left out.
     """
@@ -134,7 +134,7 @@ def plain(value: object) -> Any:
 def record_of(data: object, kind: type[_Record]) -> _Record:
     """Return a record of plain data, or of values by name; keys without a field are passed over.
 
-    Raises `msgspec.ValidationError` for what does not fit its types.
+    Raises `msgspec.ValidationError` for data that do not fit the types of the fields.
     """
     import msgspec
 

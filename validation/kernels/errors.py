@@ -15,19 +15,20 @@ A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, ove
 
 * The exponential is wrong by at most t, so f by t p/r^2. Summed up that is t V, V the
   integral without extinction.
-* A product w_k f_k is smaller than its factors, so it is the one that is flushed: by
-  at most t, and J by n t L.
+* A product w_k f_k is smaller than its factors and is flushed first: it is wrong by at most t, and
+  J by n t L.
 * J itself is wrong by at most t.
 
 A value is therefore right, on every processor, where
 
     |J - J_true| <= bar J_true + a,        a = t (n L + V + 1),
 
-with n = 8 nodes, those of the longest rule in x and of one panel, and upper bounds
-in the place of L and V:
+with n = 8 nodes, as many as the longest rule in x and one panel have, and upper bounds in the place
+of L and V:
 
 * L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by
-  e^-87 = t, and what is left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
+  e^-87 = t, and the rest of the integral is below t V. It ends at 2^63 m in any case: there p/r^2
+  itself is t.
 * V = int p/r^2 dx is at most the largest p times L/r^2, r the least distance to the light,
   and times pi/h, all angles.
 

@@ -288,8 +288,8 @@ def pierced(
     hole,
     cells: tuple[int, int],
 ) -> Mesh:
-    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0]
-    of which touch the hole.
+    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, of which cells[0] touch
+    the hole.
 
     A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal
     across x up. The hole has the position of its centre along `across` and along `up`, as fractions

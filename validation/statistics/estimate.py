@@ -93,5 +93,5 @@ UNKNOWN = Estimate(None)
 
 
 def fact(value: float) -> Estimate:
-    """Return a number that has no error: a count, or what was computed of all there is."""
+    """Return a number without an error: a count, or a number computed from all values."""
     return Estimate(value, 0.0, "proven")

@@ -37,15 +37,17 @@ far the next run will be. Four rules:
    same machine when it was shared. A ratio counts from `(1 + tolerance) spread` on, with the larger
    spread of the two reports. That is the least slowdown that can be seen; on a busy machine little
    can be, and the comparison says so.
-2. *Drift.* The median ratio over all frames is what all share: the machine, or something that every
-   method uses. A method is slower only if it is slower as measured and beside this. The drift
-   itself is judged by rule 1, once. Between two machines only what is left beside the drift is
-   compared, with four times the tolerance: methods do not profit alike from wider vectors, larger
+2. *Drift.* All frames share the median ratio over all of them: it is the machine, or code that every
+   method uses. A method is slower only if it is slower as measured and after the drift is divided
+   out. The drift
+   itself is judged by rule 1, once. Between two machines ratios are compared after the drift is
+   divided out, with four times the tolerance: methods do not profit alike from wider vectors, larger
    caches or more threads.
-3. *Witnesses.* Each stage has timings of its own, and is part of others: surface and airlight of
-   the frame, the frame of one after the light moved, that of one after objects moved. Work that
-   grew is seen in them too, a burst is not: every stage that contains it must have grown by half as
-   many milliseconds. The surface alone is no concern of a method.
+3. *Witnesses.* Each stage has timings, and is part of longer stages: surface and airlight are parts
+   of the frame, the frame is a part of a frame after the light moved, and this of one after objects
+   moved. If the work of a stage grew, the longer stages grew too; a burst hits one alone. Every
+   stage that contains it must have grown by half as many milliseconds. The surface alone is no
+   concern of a method.
 4. *Chance.* If a burst multiplies a time by exp(E), E exponential with the mean tau, the logarithm
    of the ratio of two times of the same work is the difference of two such E: U has Laplace's law,
    P(U > u) = exp(-u/tau)/2 for u > 0. All |U| of the n timings of other configurations are

@@ -107,8 +107,8 @@ def first_frame(renderer: FrameRenderer) -> FrameCache:
 
 @dataclass(frozen=True)
 class FrameSpent:
-    """The times of the frames of one turn, by the names of `FrameTimes`; None
-    for what was not asked for.
+    """The times of the frames of one turn, by the names of `FrameTimes`; None for a frame that was
+    not asked for.
     """
 
     frame: Spent

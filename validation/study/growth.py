@@ -96,7 +96,7 @@ def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
     """Return the steps of a kind of work, of `GROWTH`, for a scene at a size
     [pixels], the least work first.
 
-    A scene that has nothing of the kind of which there could be less or more is refused.
+    Raises InputError for a scene without work of that kind.
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
     if kind not in makers:

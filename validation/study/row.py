@@ -5,8 +5,8 @@ are the fields of `Row`.
 A row leaves as JSON, records within records, and as a row of a Parquet, whose columns have the
 paths of the values in that JSON as names: `error.relative_rmse`, `times.frame.median_ms`. Values
 that are not known, not measured or not finite are null, never NaN or an infinity. In addition a
-Parquet has the scene's properties, `properties.NAME`, those that any of its rows has. `key` is the
-identity of a row: two rows of one key say the same.
+Parquet has the properties of scenes that any of its rows has, `properties.NAME`. `key` is the
+identity of a row: two rows of one key have the same numbers.
 
 Errors are those of the airlight, by the formulae of `validation.metrics`, as `airlight compare
 --metrics all` prints them. Where the epsilon of a formula is a radiance, `normalised` has the same
@@ -112,7 +112,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Growth:
-    """A step of a kind of work, of which there is more and less (`validation.study.growth`)."""
+    """A step of work that grows (`validation.study.growth`)."""
 
     kind: str = column("work", meaning="'size', 'triangles', 'lights' or 'map'")
     amount: float = column(

@@ -23,7 +23,7 @@ _OLD = ("sigma_s", "sigma_a")
 
 def give_extinction(state: mi.parser.ParserState) -> list[str]:
     """Give homogeneous media extinction and albedo in place of scattering and absorption;
-    return what was changed.
+    return notes on the changes.
     """
     notes = []
     for index in of_kind(state, "Medium"):
@@ -92,11 +92,11 @@ def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> Non
 
 
 def grey_densities(state: mi.parser.ParserState) -> None:
-    """Say of media whose density is height fog or a grid that they are grey.
+    """Mark media whose density is height fog or a grid as grey.
 
-    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), m the largest
-    density and d what is left of the way to the light, and takes 0 for it where the exponential
-    underflows: suns went out from far away.
+    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), with the largest
+    density m and the rest d of the way to the light, and by 0 where the exponential underflows:
+    distant suns would not shine.
     """
     for index in of_kind(state, "Medium"):
         props = properties(state, index)

@@ -54,7 +54,7 @@ class Draws:
         self._point = point(seed) if not part else {}
 
     def of(self, part: str) -> "Draws":
-        """Return the stream of a part of the scene: what one part draws does not move the others.
+        """Return the stream of a part of the scene: the draws of one part do not move the others.
 
         The name of the part is a seed: with another name, old seeds would be other scenes.
         """
@@ -80,9 +80,7 @@ class Draws:
         return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name=name) - 0.5), int(high))
 
     def few(self, low: float, high: float, *, name: str = "") -> int:
-        """Return a whole number from `low` to `high`, of which small ones come
-        more often than by `count`.
-        """
+        """Return a whole number from `low` to `high`; small ones are more frequent than by `count`."""
         # Evenly in the logarithm of the number would be `count`; the square of the fraction favours
         # small numbers.
         span = math.log((high + 1.5) / (low + 0.5))
@@ -149,7 +147,7 @@ def read_ranges(path: Path) -> Ranges:
 
 
 def ranges_from(table: Mapping[str, object], where: str = "ranges") -> Ranges:
-    """Return the usual ranges with what a table says in their place.
+    """Return the usual ranges, with those of a table in their place.
 
     Unknown names, ranges that are empty or beyond what can be drawn, and weights of which
     none is above 0 are refused.
