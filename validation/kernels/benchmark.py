@@ -192,8 +192,9 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
 
 
 def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], mi.Float]:
-    """Return work that evaluates a kernel on rays that lie on the device, and returns J [1/m]; it is
-    frozen after its first call.
+    """Return work that evaluates a kernel on rays that lie on the device, and returns J [1/m].
+
+    It is frozen after its first call.
     """
     part = slice(0, rays)
     name = cases.phase[0]

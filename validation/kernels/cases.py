@@ -25,7 +25,7 @@ from airlight.validation.arrays import Array, Index
 from airlight.validation.kernels.case_files import Cases
 from airlight.validation.study.configuration import find_kernel
 
-#: A kernel as a function of the ray's geometry, its ends, the medium and the light; returns J [1/m].
+#: A kernel: a function of the ray's geometry, its ends, the medium and the light that returns J.
 Kernel = Callable[[RayGeometry, "mi.Float", "mi.Float", Homogeneous, Light], "mi.Float"]
 
 #: Largest number of a case in a precision: its square must be one too [m, 1/m].
@@ -61,8 +61,8 @@ def evaluate_cases(
 def evaluate_accepted(
     cases: Cases, function: Kernel, precision: str, **options: Unpack[RowOptions]
 ) -> tuple[Array, dict[str, Exception]]:
-    """Return J of every case, (cases,) [1/m], and the errors of a kernel by the phase functions that
-    it refuses, where J is NaN.
+    """Return J of every case, (cases,) [1/m], and the errors of a kernel by the phase functions
+    that it refuses, where J is NaN.
     """
     names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
     refused: dict[str, Exception] = {}

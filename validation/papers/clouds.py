@@ -49,7 +49,7 @@ FRAMES = (*RESULTS, "cumulus-detail")  #: of section 9
 GAP, LOBES = "ring", "two-lobes"  #: of Fig. 11
 _METHOD = "cloud-collectors"
 
-#: What a frame hands on to the next: collectors by group of lights, light, and set of orders.
+#: The collectors that a frame hands on to the next, by group of lights, light, and set of orders.
 _Carried = Collector | tuple["_Carried", ...]
 
 

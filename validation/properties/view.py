@@ -70,7 +70,7 @@ def _host(vector: mi.Vector3f) -> Array:
 
 
 def _rays(origin: Array, direction: Array, longest: Array | None = None) -> mi.Ray3f:
-    """Return rays from points along unit vectors, (..., 3) each, of a largest length, (...,) [m]."""
+    """Return rays from points along unit vectors, (..., 3) each; `longest`: (...,) [m]."""
     o, d = (mi.Point3f(*origin.reshape(-1, 3).T), mi.Vector3f(*direction.reshape(-1, 3).T))
     limit = mi.Float(dr.largest(mi.Float)) if longest is None else mi.Float(longest.ravel())
     return mi.Ray3f(o, d, limit, mi.Float(0), mi.Color0f())

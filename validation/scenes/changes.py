@@ -173,7 +173,7 @@ def move_shapes(scene: mi.Scene, matrices: Mapping[str, Sequence[Sequence[float]
 
 
 def shift_film(scene: mi.Scene, right: float, down: float) -> None:
-    """Let the camera's rays pass right of and below the centres of its pixels [pixels], in place."""
+    """Let the camera's rays pass right of and below the centres of pixels [pixels], in place."""
     parameters = mi.traverse(scene.sensors()[0])
     for axis, size, shift in zip("xy", parameters["film.size"], (right, down), strict=True):
         parameters[f"principal_point_offset_{axis}"] = shift / int(size)

@@ -190,8 +190,8 @@ def _checked_largest(numbers: dict[str, float], clamped: bool, floor: float) -> 
     negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not numbers[name] >= 0]
     if negative:
         raise ValueError(
-            f"heightfog has {negative[0]} = {numbers[negative[0]]:g}; expected an extinction of 0 or "
-            "more"
+            f"heightfog has {negative[0]} = {numbers[negative[0]]:g}; expected an extinction of 0 "
+            "or more"
         )
     if not total < 1e9:
         raise ValueError(

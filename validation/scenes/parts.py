@@ -16,9 +16,9 @@ from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.validation.scenes.meshes import Mesh
 
-#: The dictionary of a Mitsuba plugin, as `mi.load_dict` takes it: 'type' has the name of the plugin,
-#: and other keys its properties (numbers, words, lists of numbers, transforms) and the plugins
-#: within it, as such dictionaries or as Mitsuba's own objects.
+#: The dictionary of a Mitsuba plugin, as `mi.load_dict` takes it: 'type' has the name of the
+#: plugin, and other keys its properties (numbers, words, lists of numbers, transforms) and the
+#: plugins within it, as such dictionaries or as Mitsuba's own objects.
 Plugin = dict[str, object]
 
 

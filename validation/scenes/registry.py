@@ -69,8 +69,8 @@ FILES = tuple(
     for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
 )
 
-#: A table of a scene's file, with the keys of the module: their values are numbers, words, lists and
-#: tables, which the functions take that a key belongs to.
+#: A table of a scene's file, with the keys of the module: their values are numbers, words, lists
+#: and tables, as the function of a key takes them.
 Table = dict[str, Any]
 
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
@@ -109,7 +109,7 @@ class SceneRecord:
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
     varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
-    #: whether light is scattered many times: then `cloud-paths` is its reference, and few methods fit
+    #: whether light is scattered many times: its reference is `cloud-paths`, and few methods fit
     clouds: bool = False
     digest: str = ""  #: of its description
     many: bool = False  #: whether it has many lights, among which methods choose

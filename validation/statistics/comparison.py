@@ -315,7 +315,7 @@ class _Bias:
 
 
 def _relative_bias(reference: _Side, test: _Side, pixels: int) -> _Bias:
-    """Pool the error of all pixels into one relative bias, unknown if the reference is not bright."""
+    """Pool the error of all pixels into one relative bias; unknown for a dark reference."""
     bright = float(reference.mean.sum())
     if not bright > 0:
         return _Bias()

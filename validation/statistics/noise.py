@@ -37,12 +37,11 @@ far the next run will be. Four rules:
    same machine when it was shared. A ratio counts from `(1 + tolerance) spread` on, with the larger
    spread of the two reports. That is the least slowdown that can be seen; on a busy machine little
    can be, and the comparison says so.
-2. *Drift.* All frames share the median ratio over all of them: it is the machine, or code that every
-   method uses. A method is slower only if it is slower as measured and after the drift is divided
-   out. The drift
-   itself is judged by rule 1, once. Between two machines ratios are compared after the drift is
-   divided out, with four times the tolerance: methods do not profit alike from wider vectors, larger
-   caches or more threads.
+2. *Drift.* All frames share the median ratio over all of them: it is the machine, or code that
+   every method uses. A method is slower only if it is slower as measured and after the drift is
+   divided out. The drift itself is judged by rule 1, once. Between two machines ratios are compared
+   after the drift is divided out, with four times the tolerance: methods do not profit alike from
+   wider vectors, larger caches or more threads.
 3. *Witnesses.* Each stage has timings, and is part of longer stages: surface and airlight are parts
    of the frame, the frame is a part of a frame after the light moved, and this of one after objects
    moved. If the work of a stage grew, the longer stages grew too; a burst hits one alone. Every

@@ -94,8 +94,8 @@ class RowInputs(Inputs):
 
 
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
-    """Return the key of the row of a cell that these versions compute; where an input has no digest,
-    a key that is never found again.
+    """Return the key of the row of a cell that these versions compute; a key that is never found
+    again where an input has no digest.
 
     `scenes` are digests of scenes that were read before, by name: anyone who has many cells
     of a file reads it once.

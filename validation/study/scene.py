@@ -534,7 +534,7 @@ def _flip(reference: Layer, test: Layer) -> tuple[Flip, Layer | None]:
 
 
 def _with_flip(judged: Judged) -> Judged:
-    """Return a row with its HDR-FLIP where it is asked for; its map is a grey layer of the image."""
+    """Return a row with HDR-FLIP where it is asked for; its map is a grey layer of the image."""
     if judged.whole is None or judged.image is None:
         return judged
     # FLIP is another program: its version is an input beside both images.

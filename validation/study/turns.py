@@ -55,8 +55,8 @@ Apart = Callable[..., Any]
 SLOW = 8.0
 _PATIENCE = 1.5  # approximate time for the turns of a slow method; one is the least [s]
 _BRIEF = 0.2  # on the turns of a method that is timed briefly [s]
-# A method with shorter frames has a first turn that does not count: the time of recording would be a
-# part of its times [s].
+# A method with shorter frames has a first turn that does not count: the time of recording would be
+# a part of its times [s].
 _RECORDED = 1.0
 
 
@@ -82,7 +82,7 @@ class Ready:
     device: str | None = None
 
 
-#: The turns of a method as a generator: `Ready` first, then the frames of a turn, as often as asked.
+#: The turns of a method as a generator: `Ready` first, then the frames of each turn.
 Turns = Generator[Ready | list[FrameSpent], None, None]
 
 

@@ -84,7 +84,7 @@ def in_words(error: Exception) -> str:
 
 
 def check_files(state: mi.parser.ParserState, path: Path) -> None:
-    """Refuse a scene that names a file that does not exist, or a grid that Mitsuba does not read."""
+    """Refuse a scene that names a missing file, or a grid that Mitsuba does not read."""
     for index in used(state):
         props = properties(state, index)
         if "filename" not in props:

@@ -35,18 +35,18 @@ def give_extinction(state: mi.parser.ParserState) -> list[str]:
         if "strategy" in props:  # of sampling, in version 0.6
             del props["strategy"]
         # Files of Mitsuba 3 give sigma_t: only a colour needs work, for its values above 1.
-        old_keys = [key for key in _OLD if key in props]
-        if not old_keys:
+        old = [key for key in _OLD if key in props]
+        if not old:
             if "sigma_t" in props and props.type("sigma_t") == mi.Properties.Type.Color:
                 _set_extinction(props, np.array(props["sigma_t"], dtype=np.float64))
             continue
         sigma_t, albedo = _extinction(props)
-        for key in old_keys:
+        for key in old:
             del props[key]
         _set_extinction(props, sigma_t)
         props["albedo"] = mi.ScalarColor3d(*albedo.tolist())
         notes.append(
-            f"medium '{props.id()}': {' and '.join(old_keys)} are read as sigma_t {_words(sigma_t)} "
+            f"medium '{props.id()}': {' and '.join(old)} are read as sigma_t {_words(sigma_t)} "
             "and albedo "
             f"{_words(albedo)}"
         )
@@ -94,9 +94,9 @@ def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> Non
 def grey_densities(state: mi.parser.ParserState) -> None:
     """Mark media whose density is height fog or a grid as grey.
 
-    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), with the largest
-    density m and the rest d of the way to the light, and by 0 where the exponential underflows:
-    distant suns would not shine.
+    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), with the
+    largest density m and the rest d of the way to the light, and by 0 where the exponential
+    underflows: distant suns would not shine.
     """
     for index in of_kind(state, "Medium"):
         props = properties(state, index)

@@ -150,7 +150,7 @@ class _Space:
         return [media[number] if met[number] else self._around for number in range(len(start))]
 
     def check(self, shape: mi.Shape) -> None:
-        """Refuse a shape that references another medium than the one at its place, on either side."""
+        """Refuse a shape that references another medium than the one at its place, on each side."""
         points, normals = samples(shape)
         box = shape.bbox()
         size = float(np.linalg.norm(np.ptp([np.ravel(box.min), np.ravel(box.max)], axis=0)))

@@ -29,8 +29,8 @@ from airlight.validation.readers import Reader, read_named, read_number, read_ta
 #: The ranges that are drawn from where a user gives no file.
 FILE = Path(__file__).with_name("ranges.toml")
 
-#: The distributions of a random scene by name, as a file has them: of a range its ends, two numbers;
-#: of a choice the weights by word; `meshes` is a folder, or empty.
+#: The distributions of a random scene by name, as a file has them: of a range its two ends; of a
+#: choice the weights by word; `meshes` is a folder, or empty.
 Ranges = dict[str, Any]
 
 PREFIX = "random:"
@@ -80,7 +80,7 @@ class Draws:
         return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name=name) - 0.5), int(high))
 
     def few(self, low: float, high: float, *, name: str = "") -> int:
-        """Return a whole number from `low` to `high`; small ones are more frequent than by `count`."""
+        """Return a whole number from `low` to `high`; small ones are likelier than by `count`."""
         # Evenly in the logarithm of the number would be `count`; the square of the fraction favours
         # small numbers.
         span = math.log((high + 1.5) / (low + 0.5))
