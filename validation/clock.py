@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def timed(work: Callable[[], T]) -> tuple[T, Spent]:
-    """Do some work and return what it gave, and what it took until its arrays are ready."""
+    """Do some work; return its result, and the time until its arrays are ready."""
     took = stopwatch()
     value = work()
     dr.sync_thread()
@@ -41,24 +41,19 @@ def timed(work: Callable[[], T]) -> tuple[T, Spent]:
 
 
 def time_repeated(
-    work: Callable[[], Any],
+    work: Callable[[], object],
     *,
     seconds: float = 0.6,
     least: int = 5,
     most: int = 200,
-    warm_up: int = 2,
 ) -> Timing:
-    """Time a piece of work repeatedly.
-
-    It takes about so many `seconds`, and `least` to `most` repetitions, after some runs of
-    `warm_up`: the first compiles and records, the second is the first replay.
-    """
-    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most, warm_up=warm_up)
+    """Time a piece of work repeatedly: for about so many `seconds`, and `least` to `most` times."""
+    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most)
     return timing
 
 
 def time_in_turns(
-    works: Sequence[Callable[[], Any]],
+    works: Sequence[Callable[[], object]],
     *,
     seconds: float = 3.0,
     least: int = 5,
@@ -68,8 +63,8 @@ def time_in_turns(
     """Time several pieces of work in turns, so that other load on the machine
     affects all of them alike.
 
-    Parameters are those of `time_repeated`; `seconds` are of all works together,
-    `least` and `most` of each.
+    `seconds` are of all works together, `least` and `most` the repetitions of each. The first
+    `warm_up` runs do not count: the first compiles and records, the second is the first replay.
     """
     for _ in range(warm_up):
         for work in works:
@@ -83,20 +78,20 @@ def time_in_turns(
 class Piece(Generic[T]):
     """A piece of work that takes turns with others."""
 
-    work: Callable[[], T]  #: does it once, and returns what it took
-    seconds: float  #: to spend on it in all rounds together; once a round is the least
-    rounds: int | None = None  #: in how many rounds it takes part, None for all
+    work: Callable[[], T]  #: does it once, and returns the time that it took
+    seconds: float  #: for all rounds together; it is done once a round at least
+    rounds: int | None = None  #: the number of rounds in which it takes part, None for all
 
 
 def in_turns(
     pieces: Sequence[Piece[T]], *, rounds: int = ROUNDS, most: int = 200
 ) -> list[list[list[T]]]:
-    """Do pieces of work in turns and return what they gave, by piece, by round in which it
+    """Do pieces of work in turns and return their results: by piece, by round in which the piece
     takes part, by repetition.
 
-    In each round every piece is repeated for its part of its seconds, so that what it left in the
-    caches of the machine is there as in an animation. A piece that takes part in few rounds has
-    them evenly among all. `most` is the largest number of repetitions in all rounds together.
+    In each round a piece is repeated until its part of its seconds is over: the caches of the
+    machine then hold its data, as in an animation. The rounds of a piece that takes part in few of
+    them are spread evenly. `most` is the largest number of repetitions in all rounds together.
     """
     results: list[list[list[T]]] = [[] for _ in pieces]
     for number in range(rounds):
@@ -113,19 +108,19 @@ def in_turns(
     return results
 
 
-def _spent(work: Callable[[], Any]) -> Spent:
+def _spent(work: Callable[[], object]) -> Spent:
     return timed(work)[1]
 
 
 def timing_of(spent: Sequence[Spent]) -> Timing:
-    """Return median and quartiles of what repetitions took, and their least processor time."""
+    """Return median and quartiles of the times of repetitions, and their least processor time."""
     low, median, high = (
         float(value) for value in np.percentile([each.ms for each in spent], [25, 50, 75])
     )
     return Timing(median, low, high, len(spent), min(each.cpu_ms for each in spent) or None)
 
 
-def peak_memory(work: Callable[[], Any]) -> float | None:
+def peak_memory(work: Callable[[], object]) -> float | None:
     """Return how much more memory the process holds at the peak of `work` than before it [MiB].
 
     Memory that `work` frees before it ends counts; memory that was freed before does not. None

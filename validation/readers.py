@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readers of values in files of users, TOML and JSON: each takes what a value is, for
-messages, and the value.
+"""Readers of values in files of users, TOML and JSON.
 
-A reader returns the value, or raises InputError with what was given and what is expected.
+A reader takes the place of a value in the file, for messages, and the value, which may be anything.
+It returns the value in the type that it stands for, or raises InputError with what was given and
+what is expected.
 """
 
 import csv
@@ -13,8 +14,11 @@ from typing import Any, TypeVar
 
 from airlight.errors import InputError, nearest
 
-Reader = Callable[[str, Any], Any]
 Value = TypeVar("Value")
+
+#: Returns a value in its type: takes the place of the value, for messages, and the value as the
+#: file has it.
+Reader = Callable[[str, object], Value]
 
 
 def read_toml(what: str, path: Path) -> dict[str, Any]:
@@ -30,8 +34,9 @@ def read_toml(what: str, path: Path) -> dict[str, Any]:
 
 
 def read_csv(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of a CSV file with the numbers of their lines; empty lines and
-    those that begin with # go.
+    """Return the rows of a CSV file with the numbers of their lines.
+
+    Empty lines and lines that begin with # are left out.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -51,14 +56,14 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     return rows
 
 
-def read_table(what: str, value: Any) -> Mapping[str, Any]:
+def read_table(what: str, value: object) -> Mapping[str, object]:
     """Return names and values."""
     if not isinstance(value, dict):
         raise InputError(f"{what}: got {value!r}, expected a table of names and values")
     return value
 
 
-def read_list(what: str, value: Any, least: int = 1) -> list[Any]:
+def read_list(what: str, value: object, least: int = 1) -> list[object]:
     """Return a list of at least so many entries."""
     if not isinstance(value, list) or len(value) < least:
         raise InputError(
@@ -68,30 +73,39 @@ def read_list(what: str, value: Any, least: int = 1) -> list[Any]:
     return value
 
 
-def read_word(what: str, value: Any) -> str:
+def read_word(what: str, value: object) -> str:
     """Return a word that is not empty."""
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{what}: got {value!r}, expected a word")
     return value
 
 
-def read_one_of(what: str, value: Any, *, names: Sequence[str]) -> str:
+def read_one_of(what: str, value: object, *, names: Sequence[str]) -> str:
     """Return one of some names."""
-    if value not in names:
+    if not isinstance(value, str) or value not in names:
         raise InputError(f"{what}: got {value!r}, expected one of {', '.join(names)}")
     return value
 
 
-def read_number(what: str, value: Any, least: float, most: float, whole: bool = True) -> Any:
-    """Return a number within bounds, `whole` or not."""
-    if type(value) not in ((int,) if whole else (int, float)) or not least <= value <= most:
-        kind = "a whole number" if whole else "a number"
-        raise InputError(f"{what}: got {value!r}, expected {kind} from {least:g} to {most:g}")
+def read_whole(what: str, value: object, least: float, most: float) -> int:
+    """Return a whole number within bounds."""
+    if type(value) is not int or not least <= value <= most:
+        raise InputError(
+            f"{what}: got {value!r}, expected a whole number from {least:g} to {most:g}"
+        )
     return value
 
 
-def each_once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return items of which none is there twice."""
+def read_number(what: str, value: object, least: float, most: float) -> float:
+    """Return a number within bounds, whole or not."""
+    # A truth value is an int to `isinstance`, and no number to a user.
+    if not (type(value) is int or type(value) is float) or not least <= value <= most:
+        raise InputError(f"{what}: got {value!r}, expected a number from {least:g} to {most:g}")
+    return value
+
+
+def each_once(what: str, items: tuple[Value, ...]) -> tuple[Value, ...]:
+    """Return items, of which no two may be equal."""
     for number, item in enumerate(items):
         if item in items[:number]:
             raise InputError(f"{what}: {item!r} is there twice; leave one out")
@@ -99,9 +113,13 @@ def each_once(what: str, items: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def read_named(
-    prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reader], *others: str
-) -> dict[str, Any]:
-    """Return the values that a table has of some names; it may have some others, and no more."""
+    prefix: str, data: Mapping[str, object], readers: Mapping[str, Reader[Value]], *others: str
+) -> dict[str, Value]:
+    """Return the values of a table by name, each by the reader of its name.
+
+    `prefix`: stands before a name in messages; `others`: names that the table may have beside
+    those of the readers. Raises InputError for a name that is neither.
+    """
     for name in data:
         if name not in (names := (*readers, *others)):
             raise InputError(
@@ -110,15 +128,15 @@ def read_named(
     return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
 
 
-def several(read: Reader, least: int = 1) -> Reader:
-    """Return a reader of a list, in which nothing is there twice."""
+def several(read: Reader[Value], least: int = 1) -> Reader[tuple[Value, ...]]:
+    """Return a reader of a list of at least so many values, of which no two may be equal."""
     return lambda what, value: each_once(
         what, tuple(read(what, item) for item in read_list(what, value, least))
     )
 
 
-def by_name(read: Reader) -> Reader:
-    """Return a reader of a table whose values are alike."""
+def by_name(read: Reader[Value]) -> Reader[dict[str, Value]]:
+    """Return a reader of a table whose values all have one type."""
     return lambda what, value: {
         name: read(f"{what}.{name}", each) for name, each in read_table(what, value).items()
     }

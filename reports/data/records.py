@@ -25,7 +25,8 @@ from airlight.validation.study.row import Row
 from airlight.validation.study.settings import Settings, Size
 from airlight.validation.timing import Scaling
 
-SCHEMA = "airlight-report/4"
+SCHEMA = "airlight-report/5"
+_BEFORE = "airlight-report/4"  # read too: one key has another name there
 
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
 
@@ -213,13 +214,13 @@ class Report:
 
 
 def read_report(path: Path | str) -> Report:
-    """Read a report.json of the current schema, by its path or its folder."""
+    """Read a report.json of this schema or of the one before, by its path or its folder."""
     file = _report_file(path)
     data = read_json(file, f"what `airlight report -o {file.parent}` writes")
     # Another schema is refused by its name: its values could fit these types and mean something
     # else.
     given = data.get("schema") if isinstance(data, dict) else None
-    if given != SCHEMA:
+    if given not in (SCHEMA, _BEFORE):
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(
             f"{file} has {got}, expected {SCHEMA!r}; make the report again with this version of "
@@ -241,7 +242,7 @@ def read_report(path: Path | str) -> Report:
 
 
 def rename_old_keys(data: dict[str, Any]) -> None:
-    """Give the error of a reference in a report of 1.0.0 the name that it has now."""
+    """Give the error of a reference in a report of the schema before the name that it has now."""
     scenes = data.get("scenes")
     for scene in scenes if isinstance(scenes, list) else ():
         reference = scene.get("reference") if isinstance(scene, dict) else None

@@ -78,7 +78,7 @@ def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
         test = np.asarray(judged.image.layers[judged.row.layer], dtype=np.float64)
         pictures = {
             "picture": tone_mapped(judged.light, factor),
-            "error": error_map(judged.expected, test),
+            "error": error_map(np.asarray(judged.expected, dtype=np.float64), test),
         }
         named = _written(report, stem, judged.image, pictures)
     return Method(

@@ -294,7 +294,7 @@ def stable(kernel: str, *broken: str) -> dict[str, Any]:
 def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
     """Return the content of a report."""
     made = {
-        "schema": "airlight-report/4",
+        "schema": "airlight-report/5",
         "created": "2026-11-21 12:00:01 +0000",
         "command": "airlight report",
     }

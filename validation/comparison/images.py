@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,9 @@ from airlight.validation.statistics.comparison import (
 )
 from airlight.validation.statistics.estimate import Answer, Estimate, Kind
 from airlight.validation.statistics.records import Statistics
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 
@@ -73,6 +76,7 @@ class Comparison:
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
+        # The errors, which every comparison has.
         m = self.metrics
         lines = [
             f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, "
@@ -87,17 +91,18 @@ class Comparison:
                 "  undefined      the mean of the reference is not above zero: nothing is relative "
                 "to it"
             )
+        # The errors of both images, and the numbers of other tools, where there are any.
         lines += [] if self.stated is None else _stated_lines(self.stated)
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
-        more: dict[str, Any] = {"other tools": self.errors, "over the mean": self.errors_normalised}
-        more |= {"colour": self.colour, "FLIP": self.flip}
-        lines += [
-            line
-            for name, record in more.items()
-            if record is not None
-            for line in record_lines(name, record)
-        ]
+        records: dict[str, DataclassInstance | None] = {
+            "other tools": self.errors,
+            "over the mean": self.errors_normalised,
+            "colour": self.colour,
+            "FLIP": self.flip,
+        }
+        for name, record in records.items():
+            lines += [] if record is None else record_lines(name, record)
         lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
         lines += [f"file             {note}" for note in self.notes]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
@@ -152,7 +157,7 @@ def compare_images(
 def _compared(
     named: Sequence[tuple[str, Image]],
     layer: str,
-    mask: Any,
+    mask: Bools | None,
     margin: float | None = None,
     *,
     all_metrics: bool = False,
@@ -180,6 +185,7 @@ def _compared(
             f"'{layer}_se' or "
             f"'{layer}_error'; leave the margin out, or make the reference by airlight reference"
         )
+    # Pixels that are wrong, and a bias that may be too large, are failures.
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
     ref, tst, chosen = compared(*images, mask)
     finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
@@ -241,10 +247,9 @@ def _estimate(path: str, image: Image, name: str) -> NoisyImage:
 
 
 def _stated_errors(
-    named: Sequence[tuple[str, Image]], layer: str, mask: Any
+    named: Sequence[tuple[str, Image]], layer: str, mask: Bools | None
 ) -> StatedErrors | None:
-    """Return what two images, each with its name, say of their own errors in the
-    pixels that are compared.
+    """Return the errors that two images, each with its name, state in the pixels that are compared.
 
     The true images are T +- t and R +- r in the mean: |T'/R' - T/R| is at most (t + r T/R) / (R -
     r). The rounding of a file to single precision, up to half an epsilon of each pixel, is a part
@@ -260,8 +265,8 @@ def _stated_errors(
         None if error is None else _stated(values[finite], error[0][finite], error[1])
         for values, error in zip(layers, errors)
     ]
-    # A file without a stated error is compared as it is; an error that is stated
-    # and no number is not known.
+    # A file without a stated error is compared as it is; a stated error that is no number is
+    # unknown.
     kinds = {side.kind for side in sides if side is not None}
     kind: Kind = "proven" if kinds == {"proven"} else "estimated"
     r, t = (
@@ -270,8 +275,8 @@ def _stated_errors(
     reference, test = (
         float(values[finite].mean()) if finite.any() else math.nan for values in images
     )
-    known = math.isfinite(t) and r < reference
-    change = (t + r * abs(test / reference)) / (reference - r) if known else None
+    bounded = math.isfinite(t) and r < reference
+    change = (t + r * abs(test / reference)) / (reference - r) if bounded else None
     return StatedErrors(sides[0], sides[1], change, kind)
 
 
@@ -283,7 +288,7 @@ def _error_layer(path: str, image: Image, layer: str) -> tuple[Array, Kind] | No
         return None
     kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
     said = image.attributes.get(BOUND, "estimated")
-    if said not in kinds:
+    if not isinstance(said, str) or said not in kinds:
         raise InputError(
             f"{path} has the attribute {BOUND} {said!r}; expected {' or '.join(kinds)}; correct it"
         )
@@ -366,7 +371,7 @@ def order_line(layer: str, m: Metrics, s: Statistics | None) -> str:
     return f"{layer:<17}relative bias {percent(m.relative_bias)}{interval}, relative rmse {percent(m.relative_rmse)}"
 
 
-def record_lines(name: str, record: Any) -> list[str]:
+def record_lines(name: str, record: "DataclassInstance") -> list[str]:
     """Return the known values of a record as text, by their headings and with their units."""
     values = shown_values(record)
     words = []

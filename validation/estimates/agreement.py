@@ -22,7 +22,7 @@ trust (DESIGN section 6.6). Lights with extent leave out none: their fluence is 
 
 import math
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
 from airlight.validation.estimates.quadrature import reference_error, reference_layer
 from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
-from airlight.validation.statistics.records import Agreement, Statistics
+from airlight.validation.statistics.records import Agreement, Estimator, Layer, Statistics
 
 MASK_PIXELS = 2.0
 
@@ -120,8 +120,8 @@ def agreement(
     results = {layer: compared(traced, layer) for layer in layers}
     return {
         layer: Agreement(
-            estimator=cast("Any", estimator),
-            layer=cast("Any", layer),
+            estimator=cast(Estimator, estimator),
+            layer=cast(Layer, layer),
             width=plain.distance.shape[1],
             height=plain.distance.shape[0],
             batches=len(traced.seeds),
@@ -154,12 +154,16 @@ def agreements(
     """
     by_name: dict[str, Agreement] = {}
     for estimator, margin in margins.items():
-        how: dict[str, Any] = {
-            "batches": batches,
-            "samples": (samples or {}).get(estimator, _SAMPLES),
-        }
-        how |= {"seconds": seconds, "points": points, "spread": spread}
-        by_layer = agreement(scene, estimator=estimator, margin=margin, **how)
+        by_layer = agreement(
+            scene,
+            estimator=estimator,
+            margin=margin,
+            batches=batches,
+            samples=(samples or {}).get(estimator, _SAMPLES),
+            seconds=seconds,
+            points=points,
+            spread=spread,
+        )
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 
@@ -229,8 +233,8 @@ def widest_interval(statistics: Statistics) -> tuple[float, float] | None:
     None where none is known.
     """
     intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches or (None, None)]
-    known = [(low, high) for low, high in intervals if low is not None and high is not None]
-    return max(known, key=lambda pair: pair[1] - pair[0], default=None)
+    finite = [(low, high) for low, high in intervals if low is not None and high is not None]
+    return max(finite, key=lambda pair: pair[1] - pair[0], default=None)
 
 
 def width_to_reach(statistics: Statistics, margin: float) -> float:

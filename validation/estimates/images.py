@@ -149,7 +149,7 @@ def monte_carlo_reference(
     see `cloud_orders`. Progress is called with (share done, what) after every batch; `elsewhere`
     traces batches in other processes.
     """
-    seen = None
+    first_clouds = None
     # Scenes with lights in fog: the airlight of pixels beside a light is left out of the error.
     if orders is None:
         reference = read_reference(loaded.scene)
@@ -159,11 +159,11 @@ def monte_carlo_reference(
     else:
         # Clouds have suns and a sky, which no ray passes near by: no pixel is left out.
         clouds = read_clouds(loaded.scene)
-        seen = seen_clouds(clouds)
-        distance, near = seen.distance, np.zeros(len(seen.distance), dtype=bool)
+        first_clouds = seen_clouds(clouds)
+        distance = first_clouds.distance
+        near = np.zeros(len(distance), dtype=bool)
         shape = clouds.height, clouds.width
-    # A run with a target or a time has no number of batches of its own: at most as many as there
-    # are seeds left.
+    # A run with a target or a time has no number of batches: at most as many as there are seeds.
     batches, samples = batch_plan(budget, len(near))
     watch = _Watch(budget, near, progress)
     run = monte_carlo_batches(
@@ -189,9 +189,9 @@ def monte_carlo_reference(
         else errors.pooled is not None and errors.pooled <= budget.error
     )
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
-    if seen is not None:
+    if first_clouds is not None:
         # Behind a cloud stands the sky, attenuated along the ray; surfaces have no sky behind them.
-        transmittance = seen.transmittance.reshape(*shape, 3)
+        transmittance = first_clouds.transmittance.reshape(*shape, 3)
         behind = np.isinf(distance).reshape(*shape, 1) * transmittance * clouds.sky
         image = replace(
             image, layers=dict(image.layers) | {"opacity": 1 - transmittance, "background": behind}

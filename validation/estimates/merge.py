@@ -53,8 +53,8 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     """Return the reference of all batches of several files.
 
     Each has a name and an image: one of `validation.estimates.images.monte_carlo_reference`, or a
-    merged one. Their order does not matter; those that were not made alike, or share a seed, are
-    refused.
+    merged one. Their order does not matter. Raises InputError for files that differ in how they
+    were made, or that share a seed.
     """
     if len(files) < 2:
         raise InputError(f"got {len(files)} file to merge; expected at least two")

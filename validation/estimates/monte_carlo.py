@@ -14,7 +14,6 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -317,7 +316,7 @@ def _name(folder: str | None, seeds: range) -> str | None:
 
 
 def _store(folder: str | None, batches: Batches, spent: Spent) -> None:
-    arrays: dict[str, Any] = {"mean": batches.mean, "totals": batches.totals}
+    arrays = {"mean": batches.mean, "totals": batches.totals}
     # One batch has no spread.
     arrays |= {"squares": batches.squares} if len(batches.seeds) > 1 else {}
     store(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays, spent)
@@ -327,15 +326,15 @@ def _load(
     folder: str | None, seeds: range, samples: int, layers: tuple[str, ...], tally: Counter[str]
 ) -> Batches | None:
     name = _name(folder, seeds)
-    kept = load(name)
-    if kept is None:
+    cached = load(name)
+    if cached is None:
         tally["damaged"] += is_damaged(name)
         return None
-    stored = kept.value
+    arrays = cached.value
     tally["cached"] += len(seeds)
     # One batch has no spread.
-    squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
-    return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"], layers)
+    squares = arrays["squares"] if len(seeds) > 1 else np.zeros_like(arrays["mean"])
+    return Batches(tuple(seeds), samples, arrays["mean"], squares, arrays["totals"], layers)
 
 
 def _kept(tally: Counter[str]) -> str:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much multiple scattering a scene has: the fraction of light that every
-single-scattering method leaves out.
+"""The multiple scattering of a scene: the fraction of light that every single-scattering method
+leaves out.
 
 volpath is run twice with the same seeds, with max_depth = 2 (one scattering) and with a large one.
 Over the batches b, with S_b and T_b the image means of the two, the fraction is
@@ -12,8 +12,6 @@ one seed begin alike, so that S and T rise and fall together: the smaller the fr
 the noise cancels in S - R T. The ratio is biased by about s_R^2, which is far below its interval.
 The interval is Student's, for K - 1 degrees of freedom.
 """
-
-from typing import Any
 
 import numpy as np
 
@@ -29,14 +27,16 @@ def multiple_scattering_fraction(
 ) -> MultipleScattering:
     """Return the fraction of multiple scattering in the image of a Mitsuba scene at its own size.
 
-    `max_depth` is the most edges of a path, 3 at least: of n scatterings by the medium at most albedo^n of the light is
-    left, so 64 lacks little but in a thick medium whose albedo is close to 1. Valid for scenes that volpath can trace.
-    A light close to a camera ray makes heavy tails, and the interval of few batches too narrow.
+    `max_depth` is the largest number of edges of a path, 3 at least. After n scatterings at most
+    albedo^n of the light remains: 64 edges lack little unless the medium is thick and its albedo
+    close to 1. Valid for scenes that volpath can trace. A light close to a camera ray makes heavy
+    tails, and the interval of few batches too narrow.
     """
-    how: dict[str, Any] = {"batches": batches, "samples": samples}
     # The same seeds for both depths: the noise of paths of one scattering is in both and cancels.
     single, whole = (
-        monte_carlo_batches(scene, "volpath", max_depth=depth, **how).batches.totals.mean(axis=2)
+        monte_carlo_batches(
+            scene, "volpath", max_depth=depth, batches=batches, samples=samples
+        ).batches.totals.mean(axis=2)
         for depth in (2, max_depth)
     )
     airlight = LAYERS.index("airlight")
@@ -44,7 +44,8 @@ def multiple_scattering_fraction(
         medium=left_out(single[:, airlight], whole[:, airlight]),
         everything=left_out(single.sum(axis=1), whole.sum(axis=1)),
         max_depth=max_depth,
-        **how,
+        batches=batches,
+        samples=samples,
     )
 
 

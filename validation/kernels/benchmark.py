@@ -8,11 +8,12 @@ of one phase function take turns. Errors are of float32 on the set W of
 `validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, product
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -92,7 +93,7 @@ class Tried:
     """A kernel with its errors, and the work that is to be timed; None where it refused."""
 
     cost: KernelCost
-    work: Callable[[], Any] | None = None
+    work: Callable[[], mi.Float] | None = None
 
 
 def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) -> Tried:
@@ -186,13 +187,14 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
         return record.name, None, (None,)
     parameter, default = next(iter(record.parameters.items()))
     # Parameters without a list of sizes are tried at fractions and multiples of the default.
-    known = SIZES.get(parameter, (default // 4, default // 2, default, 2 * default, 4 * default))
-    return record.name, default, tuple(sorted({size for size in (*known, default) if size > 0}))
+    sizes = SIZES.get(parameter, (default // 4, default // 2, default, 2 * default, 4 * default))
+    return record.name, default, tuple(sorted({each for each in (*sizes, default) if each > 0}))
 
 
-def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
-    """Return work that evaluates a kernel on rays that lie on the device,
-    frozen after its first call.
+def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], mi.Float]:
+    """Return work that evaluates a kernel on rays that lie on the device, and returns J [1/m].
+
+    It is frozen after its first call.
     """
     part = slice(0, rays)
     name = cases.phase[0]
@@ -225,9 +227,9 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
     return work
 
 
-def _wall_and_device(work: Callable[[], Any]) -> tuple[Spent, Spent]:
-    """Return what work takes by the wall clock, and what its compiled kernels alone do
-    when it is done once more.
+def _wall_and_device(work: Callable[[], object]) -> tuple[Spent, Spent]:
+    """Return the time of work by the wall clock, and the time of its compiled kernels alone in a
+    second run.
     """
     wall = timed(work)[1]
     # The history of kernels is recorded in a second run, so that the wall clock times a run without

@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments
@@ -81,7 +81,7 @@ def read_cases(path: str | Path) -> Cases:
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
 
-def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ...]]:
+def cases_from_columns(columns: Mapping[str, ArrayLike]) -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
     `columns`: by name the columns of this module, of any shapes that broadcast together; `origin`,
@@ -90,29 +90,29 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
     """
     # Vectors are split into the columns of a file, such as ox, oy, oz; both ways share all checks
     # from there on.
-    given: dict[str, Any] = {}
+    arrays: dict[str, NDArray[np.generic]] = {}
     for key, values in columns.items():
         column = np.asarray(values)
         if key not in _VECTORS:
-            given[key] = column
+            arrays[key] = column
         elif column.ndim == 0 or column.shape[-1] != 3:
             raise InputError(
                 f"cases, column '{key}': got an array of shape {column.shape}, expected (..., 3)"
             )
         else:
-            given |= {letter: column[..., number] for number, letter in enumerate(_VECTORS[key])}
+            arrays |= {letter: column[..., number] for number, letter in enumerate(_VECTORS[key])}
     # Columns with other names are left out: their shapes need not fit.
-    known = {key: values for key, values in given.items() if key in _KNOWN}
+    arrays = {key: values for key, values in arrays.items() if key in _KNOWN}
     try:
-        spread = np.broadcast_arrays(*known.values())
+        spread = np.broadcast_arrays(*arrays.values())
     except ValueError:
-        shapes = ", ".join(f"{key} {values.shape}" for key, values in known.items())
+        shapes = ", ".join(f"{key} {values.shape}" for key, values in arrays.items())
         raise InputError(
             f"cases: the columns have shapes that do not go together: {shapes}; give equal ones"
         ) from None
     # The common shape is returned so that the results can have it, too.
     shape = spread[0].shape if spread else ()
-    flat = {key: values.reshape(-1) for key, values in zip(known, spread)}
+    flat = {key: values.reshape(-1) for key, values in zip(arrays, spread)}
     if not all(len(values) for values in flat.values()):
         raise InputError("cases: the columns are empty; give at least one case")
     return _checked(_Table("cases", flat)), shape
@@ -218,7 +218,7 @@ class _Table:
     """Columns and where they came from, for messages."""
 
     name: str  #: path of the file, or what messages call the columns
-    columns: Mapping[str, Any]  #: by name text or numbers, (rows,)
+    columns: Mapping[str, Sequence[str] | NDArray[np.generic]]  #: by name text or numbers, (rows,)
     #: number of each row's line in the file; none for columns from memory
     lines: tuple[int, ...] = ()
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Values of a kernel on tables of cases, with the airlight integral of every row of a file."""
 
+from __future__ import annotations
+
 import csv
 import io
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, Unpack
 
 import mitsuba as mi
 import numpy as np
@@ -23,7 +25,8 @@ from airlight.validation.arrays import Array, Index
 from airlight.validation.kernels.case_files import Cases
 from airlight.validation.study.configuration import find_kernel
 
-Kernel = Callable[..., Any]
+#: A kernel: a function of the ray's geometry, its ends, the medium and the light that returns J.
+Kernel = Callable[[RayGeometry, "mi.Float", "mi.Float", Homogeneous, Light], "mi.Float"]
 
 #: Largest number of a case in a precision: its square must be one too [m, 1/m].
 LARGEST = {"single": 1e18, "double": 1e150}
@@ -35,9 +38,19 @@ TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
 TINY = {"single": 1e-37, "double": 1e-300}
 
 
-def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Array:
-    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does; what the
-    kernel refuses is raised.
+class RowOptions(TypedDict, total=False):
+    """The options of `evaluate_rows`."""
+
+    table: ArrayLike
+    intensity: float
+
+
+def evaluate_cases(
+    cases: Cases, function: Kernel, precision: str, **options: Unpack[RowOptions]
+) -> Array:
+    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does.
+
+    Raises InputError for a phase function that the kernel refuses.
     """
     results, refused = evaluate_accepted(cases, function, precision, **options)
     for reason in refused.values():
@@ -46,10 +59,10 @@ def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: An
 
 
 def evaluate_accepted(
-    cases: Cases, function: Kernel, precision: str, **options: Any
+    cases: Cases, function: Kernel, precision: str, **options: Unpack[RowOptions]
 ) -> tuple[Array, dict[str, Exception]]:
-    """Return J of every case, and what the kernel raises for the phase functions that it
-    refuses, where J is NaN.
+    """Return J of every case, (cases,) [1/m], and the errors of a kernel by the phase functions
+    that it refuses, where J is NaN.
     """
     names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
     refused: dict[str, Exception] = {}
@@ -153,11 +166,11 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
         )
 
 
-def summary(cases: Cases, results: Array, precision: str = "single") -> dict[str, Any]:
+def summary(cases: Cases, results: Array, precision: str = "single") -> dict[str, float]:
     """Return quantiles of the relative error of results, (n,) [1/m], of a kernel
     in a precision, where the cases have values.
     """
-    quantiles: dict[str, Any] = {
+    quantiles: dict[str, float] = {
         "rows": len(results),
         "compared": 0,
         "nonfinite": int(np.sum(~np.isfinite(results))),
@@ -186,10 +199,10 @@ def write_results(cases: Cases, results: Array, target: Path) -> None:
     `result`, whole or not at all.
     """
     # A file with results of an earlier run gets new ones in their place.
-    kept = [k for k, name in enumerate(cases.header) if name != "result"]
+    columns = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow([*(cases.header[k] for k in kept), "result"])
+    writer.writerow([*(cases.header[k] for k in columns), "result"])
     for row, result in zip(cases.rows, results):
-        writer.writerow([*(row[k] for k in kept), repr(float(result))])
+        writer.writerow([*(row[k] for k in columns), repr(float(result))])
     write_text(target, buffer.getvalue())

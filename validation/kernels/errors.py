@@ -15,19 +15,20 @@ A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, ove
 
 * The exponential is wrong by at most t, so f by t p/r^2. Summed up that is t V, V the
   integral without extinction.
-* A product w_k f_k is smaller than its factors, so it is the one that is flushed: by
-  at most t, and J by n t L.
+* A product w_k f_k is smaller than its factors and is flushed first: it is wrong by at most t, and
+  J by n t L.
 * J itself is wrong by at most t.
 
 A value is therefore right, on every processor, where
 
     |J - J_true| <= bar J_true + a,        a = t (n L + V + 1),
 
-with n = 8 nodes, those of the longest rule in x and of one panel, and upper bounds
-in the place of L and V:
+with n = 8 nodes, as many as the longest rule in x and one panel have, and upper bounds in the place
+of L and V:
 
 * L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by
-  e^-87 = t, and what is left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
+  e^-87 = t, and the rest of the integral is below t V. It ends at 2^63 m in any case: there p/r^2
+  itself is t.
 * V = int p/r^2 dx is at most the largest p times L/r^2, r the least distance to the light,
   and times pi/h, all angles.
 
@@ -104,20 +105,20 @@ def errors_by_group(
     assert cases.value is not None
     # One computation for all groups; each group then takes its rows.
     error = relative_error(values, cases.value, precision, underflow_allowance(cases, precision))
-    accepted, known = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
+    accepted, has_value = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
     return {
-        name: _errors(cases, values, error, known, group & accepted, group)
+        name: _errors(cases, values, error, has_value, group & accepted, group)
         for name, group in rows.items()
     }
 
 
 def _errors(
-    cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools
+    cases: Cases, values: Array, error: Array, has_value: Bools, tried: Bools, group: Bools
 ) -> KernelErrors:
     # Rows of refused phase functions count as refused, not as wrong; rows whose reference is not
     # finite have no error.
     J, finite = values[tried], np.isfinite(error) & tried
-    bad = tried & known & ~np.isfinite(values)
+    bad = tried & has_value & ~np.isfinite(values)
     median = p99 = largest = mean = worst = None
     if finite.any():
         median, p99, largest = (float(q) for q in np.percentile(error[finite], [50, 99, 100]))
@@ -134,7 +135,7 @@ def _errors(
         max=largest,
         mean=mean,
         nan=int(np.isnan(J).sum()),
-        infinite=int((np.isinf(values) & known & tried).sum()),
+        infinite=int((np.isinf(values) & has_value & tried).sum()),
         negative=int((J < 0).sum()),
         worst=None if worst is None else case_row(cases, worst),
     )

@@ -13,7 +13,6 @@ much as bright.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -97,26 +96,26 @@ def error_metrics(
     """
     ref, tst, chosen = compared(reference, test, mask)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
-    counts = {
-        "pixels": int(chosen.sum()),
-        "nonfinite": int(chosen.sum() - finite.sum()),
-        "negative": int((chosen & (tst < 0).any(axis=2)).sum()),
-    }
-    found: dict[str, Any] = dict.fromkeys(
+    errors: dict[str, float | None] = dict.fromkeys(
         ("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max")
     )
     if finite.any():
         r, d = ref[finite], tst[finite] - ref[finite]
-        mean, largest = float(r.mean()), float(np.abs(d).max())
+        mean, bias, largest = float(r.mean()), float(d.mean()), float(np.abs(d).max())
         # Scaled before squaring: the square of a very dim or bright error is out of range.
         rmse = largest * float(np.sqrt(np.mean((d / largest) ** 2))) if largest > 0 else 0.0
-        found |= {"bias": float(d.mean()), "rmse": rmse}
+        errors |= {"bias": bias, "rmse": rmse}
         if mean > 0:
             relative = np.abs(d) / np.maximum(r, FLOOR * mean)
             p50, p99 = (float(q) for q in np.quantile(relative, [0.5, 0.99]))
-            found |= {"relative_bias": found["bias"] / mean, "relative_rmse": rmse / mean}
-            found |= {"p50": p50, "p99": p99, "max": float(relative.max())}
-    return Metrics(**counts, **found)
+            errors |= {"relative_bias": bias / mean, "relative_rmse": rmse / mean}
+            errors |= {"p50": p50, "p99": p99, "max": float(relative.max())}
+    return Metrics(
+        pixels=int(chosen.sum()),
+        nonfinite=int(chosen.sum() - finite.sum()),
+        negative=int((chosen & (tst < 0).any(axis=2)).sum()),
+        **errors,
+    )
 
 
 def known(value: float | None) -> float:

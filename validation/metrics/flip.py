@@ -113,8 +113,14 @@ def flip_hdr(
     start, stop = exposure_range(scaled_reference[chosen])
     # For a single exposure it returns 0.
     count = max(2, int(np.ceil(stop - start)))
-    inputs = {"start": start, "stop": stop, "count": count, "ppd": PIXELS_PER_DEGREE}
-    answer = _in_child(inputs | {"reference": scaled_reference, "test": scaled_test})
+    answer = _in_child(
+        start=start,
+        stop=stop,
+        count=count,
+        ppd=PIXELS_PER_DEGREE,
+        reference=scaled_reference,
+        test=scaled_test,
+    )
     if isinstance(answer, str):
         return Flip(None, answer), None
     if answer.shape[:2] != chosen.shape or not ((answer >= 0) & (answer <= 1)).all():
@@ -153,8 +159,11 @@ def _unanswerable(ref: Array, tst: Array) -> str:
     return "" if ref.max() > 0 else "the reference is black: HDR-FLIP has no exposure for it"
 
 
-def _in_child(inputs: dict[str, Any]) -> NDArray[np.float32] | str:
-    """Run FLIP in a separate process; return its map, or what went wrong."""
+def _in_child(**inputs: Any) -> NDArray[np.float32] | str:
+    """Run FLIP in a separate process; return its map, or the reason why there is none.
+
+    `inputs`: numbers and images, (height, width, 3), by the names that the process reads.
+    """
     with temporary_folder() as folder:
         input_file, map_file = folder / "inputs.npz", folder / "map.npy"
         np.savez(input_file, **inputs)
@@ -172,6 +181,7 @@ def _in_child(inputs: dict[str, Any]) -> NDArray[np.float32] | str:
             return f"flip-evaluator did not answer within {TIMEOUT:g} s and was ended"
         except OSError as error:
             return f"no process for flip-evaluator could be started: {error}"
+        # The last line says why it ended; the map is in a file.
         said = (ran.stderr.strip() or ran.stdout.strip()).splitlines()
         last = said[-1] if said else "it said nothing"
         if ran.returncode == 1 and last.startswith("missing: "):

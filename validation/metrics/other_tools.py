@@ -40,7 +40,6 @@ finite are left out and counted.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,7 +128,7 @@ def published_errors(
         )
 
 
-def _errors(r: Array, t: Array) -> dict[str, Any]:
+def _errors(r: Array, t: Array) -> dict[str, float]:
     """Return the metrics of the table except for ours."""
     size = np.abs(t - r)
     square = size**2
@@ -137,7 +136,7 @@ def _errors(r: Array, t: Array) -> dict[str, Any]:
     relative_square = square / (r**2 + EPSILON)
     # SimpleImageIO cuts the number of outliers down to an integer: none of
     # fewer than a thousand values.
-    kept = np.sort(relative_square)[: r.size - int(r.size * TRIMMED)]
+    trimmed = np.sort(relative_square)[: r.size - int(r.size * TRIMMED)]
     peak = float(r.max()) if r.size else float("nan")
     return {
         "mse": mse,
@@ -147,7 +146,7 @@ def _errors(r: Array, t: Array) -> dict[str, Any]:
         "rse_tev": _mean(relative_square),
         "mrse_pbrt": _mean(square / (r + EPSILON) ** 2),
         "relmse": _mean(relative_square),
-        "relmse_trim": _mean(kept),
+        "relmse_trim": _mean(trimmed),
         "mape": _mean(size / (np.abs(r) + EPSILON)),
         "smape": _mean(2 * size / (np.abs(r) + np.abs(t) + 2 * EPSILON)),
         "mrse_jeri": _mean(square / (r**2 + EPSILON_JERI_SQUARED)),
@@ -155,7 +154,7 @@ def _errors(r: Array, t: Array) -> dict[str, Any]:
     }
 
 
-def _without_floor(r: Array, t: Array) -> dict[str, Any]:
+def _without_floor(r: Array, t: Array) -> dict[str, float]:
     """Return ours: relative where the reference is bright enough for that, absolute elsewhere."""
     nan = float("nan")
     mean = _mean(r)

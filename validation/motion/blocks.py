@@ -95,9 +95,9 @@ def held(sums: Array) -> Array:
     return some if len(some) > 1 else some[:0]
 
 
-def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
-    """Return numbers with the errors of the jackknife, from the numbers without each
-    group, (groups, numbers).
+def estimates(numbers: Array, left_out: Array) -> tuple[Estimate, ...]:
+    """Return numbers, (numbers,), with the errors of the jackknife; `left_out`: the numbers without
+    each group, (groups, numbers).
 
     Groups that change nothing, such as dark ones, are no samples. With deviations d of the numbers
     without a group from their mean, pi/2 (sum |d|)^2 / sum d^2 groups count: all of them where d is
@@ -106,7 +106,7 @@ def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
     """
     groups = len(left_out)
     if groups < 2:
-        return tuple(Estimate(float(value)) for value in found)
+        return tuple(Estimate(float(value)) for value in numbers)
     apart = np.abs(left_out - left_out.mean(axis=0))
     square = (apart**2).sum(axis=0)
     # A number that no group changes has no deviations, and an error of zero.
@@ -115,7 +115,7 @@ def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
         np.sqrt(square * (groups - 1) / groups), np.clip(counting - 1, 1.0, groups - 1)
     )
     return tuple(
-        Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True)
+        Estimate(float(value), float(error)) for value, error in zip(numbers, errors, strict=True)
     )
 
 

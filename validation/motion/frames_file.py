@@ -20,19 +20,29 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from airlight.errors import InputError, nearest
-from airlight.validation.readers import Reader, by_name, read_list, read_number, read_word
+from airlight.validation.readers import (
+    Reader,
+    by_name,
+    read_list,
+    read_number,
+    read_whole,
+    read_word,
+)
 
 SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
-_number = partial(read_number, least=-1e30, most=1e30, whole=False)
+_number = partial(read_number, least=-1e30, most=1e30)
 # A factor of 2^100 is 1e30; float64 has no number for some thousand stops.
-_stop = partial(read_number, least=-100, most=100, whole=False)
+_stop = partial(read_number, least=-100, most=100)
+
+_Value = TypeVar("_Value")
+Matrix = tuple[tuple[float, ...], ...]  #: 4 x 4, by rows: from the place in the scene [m]
 
 
 @dataclass(frozen=True)
@@ -49,20 +59,20 @@ class FramesRecord:
     resets: tuple[int, ...] = (0,)
     jitter: tuple[tuple[float, ...], ...] | None = None  #: right and down [pixels]
     changes: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
-    objects: Mapping[str, tuple[tuple[tuple[float, ...], ...], ...]] = field(default_factory=dict)
+    objects: Mapping[str, tuple[Matrix, ...]] = field(default_factory=dict)
 
     def stops(self, frame: int) -> float:
         """Return the exposure of a frame [stops]."""
         return self.exposure[frame] if isinstance(self.exposure, tuple) else self.exposure
 
-    def shown(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], tuple[float, ...]]:
+    def shown(
+        self, frame: int
+    ) -> tuple[dict[str, tuple[float, ...]], dict[str, Matrix], tuple[float, ...]]:
         """Return the state of a frame: changes and matrices of moving shapes by name, and
         the jitter of its pixels.
         """
-        changes, moves = (
-            {name: values[frame] for name, values in each.items()}
-            for each in (self.changes, self.objects)
-        )
+        changes = {name: values[frame] for name, values in self.changes.items()}
+        moves = {name: matrices[frame] for name, matrices in self.objects.items()}
         return changes, moves, self.jitter[frame] if self.jitter else (0.0, 0.0)
 
     def text(self) -> str:
@@ -85,6 +95,7 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
         raise InputError(
             f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example"
         ) from error
+    # An object with known names, of which the number of frames is needed.
     if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
         raise InputError(f'{path}: expected an object with "schema": "{SCHEMA}"')
     for name in given.keys() - _KINDS.keys():
@@ -101,7 +112,7 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     }
     record = FramesRecord(**read)
     # Every list by frame must have a value for each frame: a shorter one would shift the rest.
-    lists: dict[str, Any] = {**record.changes, **record.objects}
+    lists: dict[str, tuple[object, ...]] = {**record.changes, **record.objects}
     lists |= {"exposure": record.exposure} if isinstance(record.exposure, tuple) else {}
     lists |= {"jitter": record.jitter} if record.jitter is not None else {}
     for name, values in lists.items():
@@ -148,29 +159,30 @@ def frame_paths(
     return tuple(paths)
 
 
-def _by_frame(read: Reader) -> Reader:
+def _by_frame(read: Reader[_Value]) -> Reader[tuple[_Value, ...]]:
+    """Return a reader of a list with a value for each frame."""
     return lambda what, value: tuple(
         read(f"{what}[{n}]", each) for n, each in enumerate(read_list(what, value, 0))
     )
 
 
-def _stops(what: str, value: Any) -> float | tuple[float, ...]:
+def _stops(what: str, value: object) -> float | tuple[float, ...]:
     return _by_frame(_stop)(what, value) if isinstance(value, list) else _stop(what, value)
 
 
-def _values(what: str, value: Any) -> tuple[float, ...]:
+def _values(what: str, value: object) -> tuple[float, ...]:
     return _by_frame(_number)(what, value) if isinstance(value, list) else (_number(what, value),)
 
 
-def _offset(what: str, value: Any) -> tuple[float, ...]:
+def _offset(what: str, value: object) -> tuple[float, ...]:
     offset = _by_frame(_number)(what, value)
     # A jitter of more than a pixel is in other units: of the film, or of half of it.
     if len(offset) != 2 or max(map(abs, offset)) > 1.0:
         raise InputError(f"{what}: got {value!r}, expected right and down [pixels], each at most 1")
-    return tuple(offset)
+    return offset
 
 
-def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
+def _matrix(what: str, value: object) -> Matrix:
     expected = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
     rows = [
         [_number(what, each) for each in read_list(what, row, 0)]
@@ -190,15 +202,15 @@ def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
     return tuple(map(tuple, rows))
 
 
-_KINDS: dict[str, Reader] = {
-    "frames": partial(read_number, least=2, most=_MOST),
+_KINDS: dict[str, Reader[Any]] = {
+    "frames": partial(read_whole, least=2, most=_MOST),
     "scene": read_word,
-    "first": partial(read_number, least=0, most=_MOST),
-    "fps": partial(read_number, least=1e-6, most=_MOST, whole=False),
+    "first": partial(read_whole, least=0, most=_MOST),
+    "fps": partial(read_number, least=1e-6, most=_MOST),
     "exposure": _stops,
     "layer": read_word,
     "pixel": read_word,
-    "resets": _by_frame(partial(read_number, least=0, most=_MOST)),
+    "resets": _by_frame(partial(read_whole, least=0, most=_MOST)),
     "jitter": _by_frame(_offset),
     "changes": by_name(_by_frame(_values)),
     "objects": by_name(_by_frame(_matrix)),

@@ -305,9 +305,9 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
     return fitted[0], fitted[1], fitted[2] if moves else UNKNOWN
 
 
-def _impulse_response(cells: Cells, left: float) -> tuple[tuple[Estimate, ...], float | None]:
-    """Return the response to a flash, and the fraction that a filter with a given sum
-    of squares explains of it.
+def _impulse_response(cells: Cells, residual: float) -> tuple[tuple[Estimate, ...], float | None]:
+    """Return the response to a flash, and the fraction of it that a filter explains, which leaves
+    the sum of squares `residual`.
 
     Light from before a history began counts as that of its first frame, and what is older
     than all taps as the last.
@@ -329,7 +329,9 @@ def _impulse_response(cells: Cells, left: float) -> tuple[tuple[Estimate, ...], 
     )
     # The fraction is undefined where no response is better than no filter, rounding apart.
     described = (
-        min((none - left) / (none - least), 1.0) if none - least > _MOVES * total[-1, -1] else None
+        min((none - residual) / (none - least), 1.0)
+        if none - least > _MOVES * total[-1, -1]
+        else None
     )
     without = np.array([_positive_response(total - each)[0] for each in held(sums)])
     return estimates(response, without), described

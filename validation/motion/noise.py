@@ -224,9 +224,9 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     )
 
 
-def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
-    """Return the noise with all numbers that need several runs, from their relative errors as
-    they are and blurred.
+def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
+    """Return the noise of one run with all numbers that need several runs, from their relative
+    errors, (runs, height, width, 3), and the same blurred.
     """
     count = len(errors)
     # G_ij of the module, the mean products of the errors of two runs.
@@ -246,7 +246,7 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
         apart = (values - values.mean(axis=0)) * math.sqrt(count / (count - 1))
         gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
     return replace(
-        known,
+        single,
         bias=mean_of_runs(biases),
         bias_ci=(bias - half, bias + half),
         detectable_bias=detectable(count) * deviation,

@@ -12,9 +12,12 @@ marcher evaluates the airlight where the visibility changes.
 Errors are against the quadrature, at one pixel in `stride` along both axes.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import mitsuba as mi
 import numpy as np
@@ -27,12 +30,12 @@ from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.reference import reference_of_pixels
 from airlight.validation.arrays import Array
 from airlight.validation.clock import time_repeated, timed
-from airlight.validation.metrics.errors import error_metrics
-from airlight.validation.papers.claims import Figure, quartiles
+from airlight.validation.metrics.errors import error_metrics, known
+from airlight.validation.papers.claims import Figure, Figures, Result, quartiles
 from airlight.validation.scenes.loading import load_scene, resize
-from airlight.validation.scenes.parts import light
+from airlight.validation.scenes.parts import spot_light
 from airlight.validation.scenes.registry import SCENES
-from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.study.configuration import Parameters, configuration, prepared
 from airlight.validation.study.frame_times import moved_light
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
@@ -40,66 +43,83 @@ MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]
 _SECONDS = 0.1  # for each timing [s]
 _LONGEST = 30.0  # frames that take longer are not measured [s]
 _MESH = "light-volumes-2010"
-_MARCH: dict[str, Any] = {"sum": "transitions", "spacing": "uniform", "shadow": "map"}
-#: Scene, method and parameters of the images, by the names of their figures.
-IMAGES: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
-    "Fig. 6a": ("omni-box", _MESH, {"map": 32}),
-    "Fig. 6b": ("omni-box", _MESH, {"map": 128}),
-    "Fig. 6c": ("omni-box", _MESH, {"map": 512}),
-    "Fig. 7a": ("colonnade", "ray-march", _MARCH | {"map": 512, "steps": 150}),
-    "Fig. 7b": ("colonnade", "ray-march", _MARCH | {"map": 512, "steps": 400}),
-    "Fig. 7c": ("colonnade", _MESH, {"map": 512}),
-    "walk": ("colonnade", "light-volumes", {"walls": "slanted", "map": 512}),
-    "epipolar": ("colonnade", "min-max", {"map": 512}),
+
+_Number = TypeVar("_Number", bound=np.generic)
+
+
+@dataclass(frozen=True)
+class PublishedImage:
+    """A scene that stands for one of the paper, and how its image is made."""
+
+    scene: str
+    method: str
+    parameters: Parameters
+
+
+def _marched(steps: int) -> PublishedImage:
+    """Return an image of the paper's marcher, which adds up what lies between transitions."""
+    march = {"sum": "transitions", "spacing": "uniform", "shadow": "map"}
+    return PublishedImage("colonnade", "ray-march", {**march, "map": 512, "steps": steps})
+
+
+#: The images by the names of their figures.
+IMAGES: Mapping[str, PublishedImage] = {
+    "Fig. 6a": PublishedImage("omni-box", _MESH, {"map": 32}),
+    "Fig. 6b": PublishedImage("omni-box", _MESH, {"map": 128}),
+    "Fig. 6c": PublishedImage("omni-box", _MESH, {"map": 512}),
+    "Fig. 7a": _marched(150),
+    "Fig. 7b": _marched(400),
+    "Fig. 7c": PublishedImage("colonnade", _MESH, {"map": 512}),
+    "walk": PublishedImage("colonnade", "light-volumes", {"walls": "slanted", "map": 512}),
+    "epipolar": PublishedImage("colonnade", "min-max", {"map": 512}),
 }
 
 
-def billeter_tables(size: tuple[int, int] = SIZE, maps: tuple[int, ...] = MAPS) -> dict[str, Any]:
-    """Return rates and errors, at a size of the frames and of the maps of Table 1."""
-    return _images(size) | _table(size, maps)
+def billeter_tables(size: tuple[int, int] = SIZE, maps: tuple[int, ...] = MAPS) -> Figures:
+    """Return rates and errors, at a size of the frames [pixels] and of the maps of Table 1."""
+    return {**_images(size), **_table(size, maps)}
 
 
-def _images(size: tuple[int, int]) -> dict[str, Any]:
-    figures: dict[str, Any] = {}
+def _images(size: tuple[int, int]) -> Figures:
+    figures: dict[str, Result] = {}
     # An odd stride: then every position in tiles of 4 x 4 pixels is compared somewhere.
     stride = 2 * (max(size) // 256) + 1
-    for scene_name in dict.fromkeys(scene_name for scene_name, *_ in IMAGES.values()):
+    for scene_name in dict.fromkeys(image.scene for image in IMAGES.values()):
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
-        chosen = sampled(np.arange(size[0] * size[1]).reshape(size[::-1]), stride)
+        pixels = sampled(np.arange(size[0] * size[1]).reshape(size[::-1]), stride)
         # The reference is computed for the compared pixels alone.
-        true = reference_of_pixels(loaded, chosen.ravel()).airlight.reshape(*chosen.shape, 3)
-        for name, (where, method, values) in IMAGES.items():
-            if where == scene_name:
-                renderer = partial(prepared, scene, configuration(method, "exact", values))
+        true = reference_of_pixels(loaded, pixels.ravel()).airlight.reshape(*pixels.shape, 3)
+        for name, image in IMAGES.items():
+            if image.scene == scene_name:
+                chosen = configuration(image.method, "exact", image.parameters)
                 figures |= attempted(
-                    (f"{name} fps", f"{name} error"), partial(_image, name, renderer, true, stride)
+                    (f"{name} fps", f"{name} error"),
+                    partial(_image, name, partial(prepared, scene, chosen), true, stride),
                 )
     return figures
 
 
-def _image(
-    name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int
-) -> dict[str, Any]:
+def _image(name: str, renderer: Callable[[], FrameRenderer], true: Array, stride: int) -> Figures:
     ready = renderer()
     # The error comes first: a frame that takes too long is not timed.
     error = error_metrics(true, sampled(frame_within(ready).airlight, stride)).relative_rmse
-    return {f"{name} error": error, f"{name} fps": _rate(ready)}
+    return {f"{name} error": known(error), f"{name} fps": _rate(ready)}
 
 
 def _rate(renderer: FrameRenderer) -> Figure:
     return quartiles(time_repeated(moved_light(renderer), seconds=_SECONDS, least=3).rate)
 
 
-def sampled(image: NDArray[Any], stride: int) -> NDArray[Any]:
+def sampled(image: NDArray[_Number], stride: int) -> NDArray[_Number]:
     """Return one pixel in `stride` along both axes of an image, beginning at the
     middle of the first block.
     """
     return image[stride // 2 :: stride, stride // 2 :: stride]
 
 
-def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
-    figures: dict[str, Any] = {}
+def _table(size: tuple[int, int], maps: tuple[int, ...]) -> Figures:
+    figures: dict[str, Result] = {}
     for name in ("colonnade", "tangle"):
         scene = read_scene(table_scene(name, size))
         for texels in maps:
@@ -108,39 +128,38 @@ def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
     last = maps[-1]
     static, adaptive = (figures[f"colonnade {last} {how} fps"] for how in ("static", "adaptive"))
     # Where one of both rates was not measured, the reason stands in place of the gain.
-    gain: Any = next((each for each in (static, adaptive) if isinstance(each, str)), None)
-    if gain is None:
-        gain = adaptive.over(static)
+    if isinstance(static, Figure) and isinstance(adaptive, Figure):
+        gain: Result = adaptive.over(static)
+    else:
+        gain = static if isinstance(static, str) else adaptive
     return figures | {f"colonnade {last} gain": gain}
 
 
-def table_scene(name: str, size: tuple[int, int]) -> Any:
-    """Return the `mi.Scene` of a view: a built-in scene, the hall with a
-    spot in place of its lamp.
-    """
+def table_scene(name: str, size: tuple[int, int]) -> mi.Scene:
+    """Return the scene of a view: a built-in scene, the hall with a spot in place of its lamp."""
     if name != "colonnade":
         return load_scene(name, size).scene
     described = SCENES["colonnade"].build()
-    lamp = described["lamp"]
-    cone = {
-        "position": lamp["position"],
-        "target": [-1.13, 0.97, 1.67],
-        "cutoff": 56.7,
-        "beam": 56.7,
-    }
-    described["lamp"] = light("spot", lamp["intensity"]["value"], **cone)
+    lamp: Any = described["lamp"]
+    described["lamp"] = spot_light(
+        lamp["intensity"]["value"],
+        position=lamp["position"],
+        target=[-1.13, 0.97, 1.67],
+        cutoff=56.7,
+        beam=56.7,
+    )
     scene = mi.load_dict(described)
     resize(scene, size)
     return scene
 
 
-def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, Any]:
+def _view(scene: Scene, view: str, texels: int, tessellation: str) -> Figures:
     """Return the rate of a view of Table 1."""
     rate = f"{view} {tessellation} fps"
-    values = {"tessellation": tessellation, "map": texels}
+    chosen = configuration(_MESH, "exact", {"tessellation": tessellation, "map": texels})
 
-    def measured() -> dict[str, Any]:
-        renderer = prepared(scene, configuration(_MESH, "exact", values))
+    def measured() -> Figures:
+        renderer = prepared(scene, chosen)
         # One frame before the timing, which compiles and says whether frames are fast enough to
         # time.
         frame_within(renderer)
@@ -159,7 +178,7 @@ def frame_within(renderer: FrameRenderer) -> Frame:
     return frame
 
 
-def attempted(names: tuple[str, ...], work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+def attempted(names: tuple[str, ...], work: Callable[[], Figures]) -> Figures:
     """Return the results of a piece of work; where it failed, the reason under each of `names`."""
     try:
         return work()

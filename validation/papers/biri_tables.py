@@ -9,7 +9,7 @@ but one in a thousand pixels of the true frame stay below.
 """
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,45 +18,51 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.clock import time_in_turns
 from airlight.validation.metrics.errors import error_metrics, known
-from airlight.validation.papers.claims import quartiles
+from airlight.validation.papers.claims import Figures, Result, quartiles
 from airlight.validation.scenes.loading import load_scene, resize
-from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.study.configuration import Parameters, configuration, prepared
 from airlight.validation.study.frame_times import moved_light
 
 _SECONDS = 0.1  # for each timing [s]
 
 #: All that the paper has at once, beside its polynomial and the cone of a spot.
-AS_PUBLISHED: Mapping[str, Any] = {
+AS_PUBLISHED: Parameters = {
     "order": "paper",
     "evaluation": "vertex",
     "buffer": "8bit",
     "media": "paper",
 }
 
-#: By the name of its figures a scene that stands for one of the paper, its size [pixels], and the
-#: edges of the paper's cone over the spot, 0 where there is none.
-ENTRIES: Mapping[str, tuple[str, tuple[int, int], int]] = {
-    "sphere-spot 800": ("sphere-spot", (800, 600), 32),
-    "sphere-spot 1024": ("sphere-spot", (1024, 768), 32),
-    "two-pens": ("two-pens", (800, 600), 0),
-    "three-media": ("three-media", (800, 600), 0),
-    "clutter": ("clutter", (800, 600), 0),
-    "hall": ("hall", (800, 600), 0),
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the table: a scene that stands for one of the paper."""
+
+    scene: str
+    size: tuple[int, int] = (800, 600)  #: [pixels]
+    cone: int = 0  #: edges of the paper's cone over the spot; 0 without one
+
+
+#: The lines of the table by the names of their figures.
+ENTRIES: Mapping[str, Entry] = {
+    "sphere-spot 800": Entry("sphere-spot", cone=32),
+    "sphere-spot 1024": Entry("sphere-spot", (1024, 768), cone=32),
+    **{name: Entry(name) for name in ("two-pens", "three-media", "clutter", "hall")},
 }
 
 
-def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, Any]:
+def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> Figures:
     """Return rates as published and by our exact form, and the largest median error.
 
     All images have the published width and height times `scale`; each timing takes
     about so many `seconds`.
     """
-    figures: dict[str, Any] = {}
+    figures: dict[str, Result] = {}
     errors = []
-    for name, (scene_name, full, cone) in ENTRIES.items():
-        # Frames of 320 x 240 are compared: the default report keeps these references.
-        size, compared = _scaled(full, scale), _scaled((320, 240), scale)
-        loaded = load_scene(scene_name, size).scene
+    for name, entry in ENTRIES.items():
+        # Frames of 320 x 240 are compared: the cache of the default report has these references.
+        size, compared = _scaled(entry.size, scale), _scaled((320, 240), scale)
+        loaded = load_scene(entry.scene, size).scene
         scene = read_scene(loaded)
         # From here on the scene has the smaller size, for the reference.
         resize(loaded, compared)
@@ -64,7 +70,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         whole = reference.airlight + reference.surface
         white = float(np.quantile(whole.max(axis=-1), 0.999))
         chosen = configuration(
-            "shadow-planes-2006", "taylor", {**AS_PUBLISHED, "cone": cone, "white": white}
+            "shadow-planes-2006", "taylor", {**AS_PUBLISHED, "cone": entry.cone, "white": white}
         )
         frame = render_frame(prepared(read_scene(loaded), chosen))
         errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))

@@ -35,8 +35,6 @@ VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = (
 EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
-#: Results of an experiment: by name a number, a `Figure`, or why there is none.
-Figures = Mapping[str, Any]
 QUARTILES, INTERVAL = "quartiles", "95 % interval"
 
 
@@ -58,6 +56,12 @@ class Figure(NamedTuple):
             self.high / other.low,
             " over ".join(names),
         )
+
+
+#: A result of an experiment: a number, a number with an interval, or words that say why it could
+#: not be measured.
+Result = float | Figure | str
+Figures = Mapping[str, Result]  #: results by name
 
 
 def quartiles(values: Sequence[float]) -> Figure:
@@ -94,7 +98,8 @@ class Claim:
     @property
     def goal(self) -> float:
         """The number of the claim, printed or read out of its words; of a range its middle."""
-        number: Any = self.published if self.limit is None else self.limit
+        number = self.published if self.limit is None else self.limit
+        assert number is not None, f"{self.paper}, {self.item} has no number"
         return sum(number) / len(number) if isinstance(number, Sequence) else float(number)
 
     @property
@@ -137,10 +142,12 @@ class Experiment:
     #: the least of `EFFORTS` whose reports have it; 'paper': only the command
     effort: str = EFFORTS[-1]
 
-    def run(self) -> dict[str, Any]:
-        """Return the `Figures`."""
-        module, function = self.function.split(":")
-        return getattr(importlib.import_module(f"airlight.validation.papers.{module}"), function)()
+    def run(self) -> dict[str, Result]:
+        """Return the results by name."""
+        name, function = self.function.split(":")
+        module = importlib.import_module(f"airlight.validation.papers.{name}")
+        figures: Figures = getattr(module, function)()
+        return dict(figures)
 
 
 @cache
@@ -164,34 +171,31 @@ def claims() -> tuple[Claim, ...]:
     """Return every claim, in the order of the file; a block with `rows` is as many
     claims that share its keys.
     """
-    found = []
+    rows = []
     for block in _data()["claims"]:
         shared = {key: value for key, value in block.items() if key != "rows"}
-        found += [Claim(**(shared | row)) for row in block.get("rows", [{}])]
-    return tuple(found)
+        rows += [Claim(**(shared | row)) for row in block.get("rows", [{}])]
+    return tuple(rows)
 
 
 def taken(claim: Claim, figures: Figures) -> Figure | str:
     """Return the figure of a claim, or why there is none."""
     # The name of a figure may be 'a / b', a quotient of two results; a result may be text that says
-    # why there is none.
-    parts = [figures[name] for name in claim.figure.split(" / ")]
-    for part in parts:
+    # why there is none, and a list where it is read from a file.
+    parts = []
+    for name in claim.figure.split(" / "):
+        part = figures[name]
         if isinstance(part, str):
             return part
-    figures_of = [
-        Figure(*part) if isinstance(part, Sequence) else Figure(part, part, part) for part in parts
-    ]
-    figure = reduce(Figure.over, figures_of)
+        parts.append(Figure(*part) if isinstance(part, Sequence) else Figure(part, part, part))
+    figure = reduce(Figure.over, parts)
     if not all(map(math.isfinite, figure[:3])):
         return "the measured figure is not finite"
     return Figure(float(figure.value), float(figure.low), float(figure.high), figure.interval)
 
 
 def verdict(claim: Claim, figure: Figure) -> str:
-    """Return the verdict on a claim. Where the interval reaches into both
-    answers, nothing can be told.
-    """
+    """Return the verdict on a claim: impossible where the interval reaches into both answers."""
     answer = claim.holds(figure.low, figure.high)
     if answer is Answer.UNKNOWN:
         return IMPOSSIBLE
@@ -216,11 +220,11 @@ def judged(claim: Claim, figures: Figures) -> Claim:
     )
     if not claim.direction:
         return claim
-    found = verdict(claim, figure)
-    if found == IMPOSSIBLE:
+    judgement = verdict(claim, figure)
+    if judgement == IMPOSSIBLE:
         interval = f"from {figure.low:.3g} to {figure.high:.3g}"
         ends = f"{figure.interval or 'the interval'} {interval}, both answers lie between"
         return replace(
-            claim, verdict=found, why=f"cannot be told: {ends}; {claim.rule}: {claim.why}"
+            claim, verdict=judgement, why=f"cannot be told: {ends}; {claim.rule}: {claim.why}"
         )
-    return replace(claim, verdict=found, why=f"{claim.rule}: {claim.why}")
+    return replace(claim, verdict=judgement, why=f"{claim.rule}: {claim.why}")

@@ -14,9 +14,10 @@ again, against light paths.
   distances in 512^3.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
@@ -33,7 +34,7 @@ from airlight.reference.scene.clouds import CloudScene, read_clouds
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.clock import time_repeated
 from airlight.validation.estimates.images import Budget, monte_carlo_reference
-from airlight.validation.papers.claims import INTERVAL, Figure, quartiles
+from airlight.validation.papers.claims import INTERVAL, Figure, Figures, Result, quartiles
 from airlight.validation.scenes.loading import LoadedScene, load_scene, resize
 from airlight.validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from airlight.validation.scenes.registry import SCENES
@@ -48,25 +49,26 @@ FRAMES = (*RESULTS, "cumulus-detail")  #: of section 9
 GAP, LOBES = "ring", "two-lobes"  #: of Fig. 11
 _METHOD = "cloud-collectors"
 
+#: The collectors that a frame hands on to the next, by group of lights, light, and set of orders.
+_Carried = Collector | tuple["_Carried", ...]
 
-def clouds_figures() -> dict[str, Any]:
+
+def clouds_figures() -> Figures:
     """Return light over that of the reference in Figs 11 and 12, and what shaded
     surfaces of Fig. 11a lack [%].
     """
     every = np.ones(SIZE[::-1], dtype=bool)
-    figures: dict[str, Any] = {
+    figures: dict[str, Result] = {
         name: _ratio(*pair_of(shown(name, SIZE), SAMPLES), every) for name in RESULTS
     }
     fewer = SAMPLES // 4  # in Fig. 11, where means over pixels are compared
     # Fig. 11a: only the pixels in which another part of the cloud shades the surface are compared.
     loaded = shown(GAP, SIZE)
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
-    figures["gap, shaded"] = _ratio(*pair, shaded)
-    # The light of these pixels as a fraction of all light, by light paths [%]; the lost light is
-    # that part times what the ratio lacks of 1. A larger ratio loses less, hence the exchanged
-    # ends.
+    shaded_ratio = figures["gap, shaded"] = _ratio(*pair, shaded)
+    # The light of these pixels as a fraction of all light, by light paths [%]. The lost light is
+    # this fraction times (1 - ratio). A larger ratio loses less: the ends change places.
     part = 100 * float(pair[1][shaded].sum() / pair[1].sum())
-    shaded_ratio = figures["gap, shaded"]
     value, most, least = (part * (1 - ratio) for ratio in shaded_ratio[:3])
     figures["gap, lost"] = Figure(value, least, most, INTERVAL)
     loaded = shown(LOBES, SIZE)
@@ -89,7 +91,7 @@ def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> Figure
     return Figure(value, low, high, INTERVAL)
 
 
-def cloud_frames() -> dict[str, Any]:
+def cloud_frames() -> Figures:
     """Return the frames a second of section 9: after the light moved, with the
     collectors of the last frame.
     """
@@ -102,8 +104,9 @@ def cloud_frames() -> dict[str, Any]:
 def _light_moved(scene: Scene) -> Timing:
     # Three steps at most, one where the collector of the last frame still is one (within 0.05 of
     # its spread).
-    warm: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
-    renderer = frame_renderer(scene, METHODS["cloud-collectors"], **warm)
+    renderer = frame_renderer(
+        scene, METHODS["cloud-collectors"], start="previous", iterations=3, settled=0.05
+    )
     # The first frame searches from the start; timed are the frames after it.
     cache = first_frame(renderer)
 
@@ -115,7 +118,8 @@ def _light_moved(scene: Scene) -> Timing:
     frame = time_repeated(work, seconds=1.0)
     # When the light moves, its maps are made again and a frame is rendered: both times add up.
     median, low, high = (
-        own + more for own, more in zip(maps.quartiles, frame.quartiles, strict=True)
+        of_maps + of_frame
+        for of_maps, of_frame in zip(maps.quartiles, frame.quartiles, strict=True)
     )
     return Timing(median, low, high, min(maps.repetitions, frame.repetitions))
 
@@ -142,8 +146,10 @@ def shown(name: str, size: tuple[int, int]) -> LoadedScene:
 def pair_of(
     loaded: LoadedScene, samples: int, progress: Progress | None = None
 ) -> tuple[Array, Array, Array]:
-    """Return a scene by the method, by light paths, so many a pixel, and their
-    standard error [W/(m^2 sr)].
+    """Return the image of a scene by the method, the image by light paths, and the standard error
+    of the second, (height, width, 3) each [W/(m^2 sr)].
+
+    `samples`: light paths a pixel.
     """
     frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
     # The batches of light paths give the standard error.
@@ -184,7 +190,7 @@ def _shaded(clouds: CloudScene) -> Bools:
     return enters
 
 
-def _rays(origin: Array, direction: Array) -> Any:
+def _rays(origin: Array, direction: Array) -> mi.Ray3f:
     return mi.Ray3f(
         mi.Point3f(np.ascontiguousarray(origin.T)), mi.Vector3f(np.ascontiguousarray(direction.T))
     )
@@ -196,18 +202,18 @@ def _two_collectors(loaded: LoadedScene) -> Bools:
     """
     # Searches start 250 m on either side of a point.
     sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-250.0, 250.0)]
-    found = []
+    apart = []
     # By set of orders: both searches must have ended with light, and farther apart than one width
     # of the collector.
-    for (left, light_left, width), (right, light_right, _) in zip(*sides, strict=True):
-        far = np.linalg.norm(left - right, axis=-1) > width
-        found.append(far & (width > 0) & (light_left > 0) & (light_right > 0))
-    return np.any(found, axis=0)
+    for (first, first_light, width), (second, second_light, _) in zip(*sides, strict=True):
+        far = np.linalg.norm(first - second, axis=-1) > width
+        apart.append(far & (width > 0) & (first_light > 0) & (second_light > 0))
+    return np.any(apart, axis=0)
 
 
 def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array]]:
-    """Return by set places, light and widths of the collectors that searches end with
-    which start beside points.
+    """Return the collectors of searches that start so far beside points [m]: by set of orders their
+    places, (height, width, 3), light and widths, (height, width) each.
     """
     renderer = frame_renderer(
         scene, METHODS[_METHOD], extra_layers=True, start="previous", iterations=40
@@ -222,15 +228,16 @@ def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array
     assert extra is not None
     dr.eval(extra, carried)
     shape = scene.camera.height, scene.camera.width
-    found = []
+    collectors = []
     for (first, _), collector in zip(SETS, carried[0][0][0], strict=True):
         centre = np.array(collector.centre, dtype=np.float64).T.reshape(*shape, 3)
         light = np.array(extra[order_layer(int(first))], dtype=np.float64).sum(0).reshape(shape)
-        found.append((centre, light, np.array(collector.width, dtype=np.float64).reshape(shape)))
-    return found
+        width = np.array(collector.width, dtype=np.float64).reshape(shape)
+        collectors.append((centre, light, width))
+    return collectors
 
 
-def _each(carried: Any, change: Callable[[Collector], Collector]) -> Any:
+def _each(carried: _Carried, change: Callable[[Collector], Collector]) -> _Carried:
     """Return the state that frames hand on, with every collector changed."""
     if isinstance(carried, tuple):
         return tuple(_each(part, change) for part in carried)

@@ -17,7 +17,6 @@ angle of the direction and in the coordinate of the sun.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -153,15 +152,15 @@ def _direction_place(mu: Array) -> Array:
     return np.sign(mu) * np.arccos(1 - 2 * np.abs(mu)) / np.pi
 
 
-def _thickness_place(t: Any) -> Any:
-    return np.log(t + coordinates.THICKNESS_SHIFT)
+def _thickness_place(t: float | Array) -> Array:
+    return np.asarray(np.log(t + coordinates.THICKNESS_SHIFT))
 
 
-def _sun_place(mu_l: Any) -> Any:
-    return np.sqrt(np.arcsin(mu_l) * 2 / np.pi)
+def _sun_place(mu_l: float | Array) -> Array:
+    return np.asarray(np.sqrt(np.arcsin(mu_l) * 2 / np.pi))
 
 
-def _scattering_angles(mu: Array, mu_l: Any, phi: Any) -> Array:
+def _scattering_angles(mu: Array, mu_l: float | Array, phi: float | Array) -> Array:
     # The sun's light travels down and the view leaves upwards: mu and mu_l enter the product with
     # opposite signs.
     sines = np.sqrt((1 - mu**2) * (1 - mu_l**2))
@@ -189,7 +188,7 @@ def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
         if isotropic:
             break
 
-        # P takes what is left at each angle, weighted as T is fitted.
+        # P is multiplied by the ratio of T to the model at each angle, weighted as T is fitted.
         model = np.stack([fit.model for fit in fits])
         # Least squares for a factor f of each angle: sum w (T - f M)^2 is least at f = sum w T M /
         # sum w M^2.

@@ -103,28 +103,28 @@ def _annex() -> dict[str, float]:
     lobes that the annex expands.
     """
     a = np.linspace(0.13, 2.97, 30)  # sigma_t h
-    found = {}
+    ratios = {}
     for name in PRINTED_PHASES:
         derived = taylor_coefficients(a, phase_from_words(name), 4).T
         for number, (printed, true) in enumerate(zip(printed_coefficients(a, name), derived)):
-            found[f"{name} c{number}"] = _compared(printed, true)
+            ratios[f"{name} c{number}"] = _compared(printed, true)
     for name, factor, power in (("hazy", 9, 8), ("murky", 50, 32)):
-        found[f"{name} mean"] = (
+        ratios[f"{name} mean"] = (
             quad(lambda c, f=factor, n=power: 1 + f * ((1 + c) / 2) ** n, -1, 1)[0] / 2
         )
-    return found
+    return ratios
 
 
 def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
-    cases, found = wide_rays(_WIDE_RAYS), {}
+    cases, fractions = wide_rays(_WIDE_RAYS), {}
     for name, kernel in (("printed", taylor_printed), ("derived", taylor)):
         # In double precision: rounding adds nothing to the polynomial's error.
         error = relative_error(
             evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double"
         )
-        found[f"within 10 %, {name}"] = float(np.mean(error[_moderate(cases)] <= 0.1))
-    return found
+        fractions[f"within 10 %, {name}"] = float(np.mean(error[_moderate(cases)] <= 0.1))
+    return fractions
 
 
 def _cloud_equations() -> dict[str, float]:

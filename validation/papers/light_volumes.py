@@ -17,9 +17,10 @@ planes after the light moved, and of light volumes what is not the rendering of 
 shadow map, that is the volume.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -35,6 +36,7 @@ from airlight.realtime.frame.renderer import (
     run_cast_and_shade,
     run_method,
 )
+from airlight.realtime.frame.surface import Cast
 from airlight.realtime.methods.published.billeter2010.mesh import (
     THRESHOLD,
     VolumeMesh,
@@ -48,6 +50,7 @@ from airlight.realtime.methods.published.billeter2010.tessellation import (
     quads,
     triangles,
 )
+from airlight.realtime.numerics.array_types import PerRay
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
@@ -56,7 +59,7 @@ from airlight.reference.scene.read import read_reference
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.clock import time_in_turns
 from airlight.validation.metrics.errors import error_metrics, known
-from airlight.validation.papers.claims import quartiles
+from airlight.validation.papers.claims import Figure, Figures, quartiles
 from airlight.validation.scenes.loading import load_scene, resize
 from airlight.validation.scenes.meshes import lathe, placed
 from airlight.validation.scenes.parts import mitsuba_mesh
@@ -70,6 +73,10 @@ SIZE = (160, 120)  #: of images [pixels]
 BIASES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
 _MESH = "light-volumes-2010"
+
+#: Marks of the nodes of a quadtree over each face of a map, by level, the whole face first:
+#: (faces, 2^level, 2^level) each, as `divide` and `edges` return them.
+Levels = list[Bools]
 
 
 def maps() -> dict[str, float]:
@@ -91,11 +98,11 @@ def _renderer(scene: Scene, method: str, size: int, **values: str) -> FrameRende
     return methods.prepared(scene, methods.configuration(method, "exact", {"map": size, **values}))
 
 
-def triangle_times() -> dict[str, Any]:
+def triangle_times() -> Figures:
     """Return the times of the volume and of a frame of shadow planes with few and
     with many triangles [ms].
     """
-    times: dict[str, Any] = {}
+    times: dict[str, Figure] = {}
     # Facets of a ring of the sphere: 514 triangles, and half a million.
     for name, facets in {"few": 16, "many": 512}.items():
         scene = _sphere(facets)
@@ -106,16 +113,19 @@ def triangle_times() -> dict[str, Any]:
         cast, lit = run_cast_and_shade(volumes)
         dr.eval(cast, lit)
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
-        works = [_evaluation(volumes, state, cast, lit), moved_light(planes)]
+        works: list[Callable[[], object]] = [
+            partial(_evaluate, volumes, state, cast, lit),
+            moved_light(planes),
+        ]
         # In turns: both share whatever slows the machine meanwhile.
         volume, frame = time_in_turns(works, seconds=0.3 * len(works))  # for each timing [s]
         medians = {"volume": volume.quartiles, "planes": frame.quartiles}
-        times |= {f"{what}, {name}": quartiles(found) for what, found in medians.items()}
+        times |= {f"{what}, {name}": quartiles(ms) for what, ms in medians.items()}
     return times
 
 
-def _evaluation(volumes: FrameRenderer, *given: Any) -> Callable[[], None]:
-    return lambda: dr.eval(run_method(volumes, *given))
+def _evaluate(volumes: FrameRenderer, state: object, cast: Cast, lit: PerRay | None) -> None:
+    dr.eval(run_method(volumes, state, cast, lit))
 
 
 def _sphere(facets: int) -> Scene:
@@ -130,7 +140,7 @@ def _sphere(facets: int) -> Scene:
     return read_scene(scene)
 
 
-def tessellation() -> dict[str, Any]:
+def tessellation() -> Figures:
     """Return facts on the mesh of the colonnade, and the errors of two filters and
     two treatments of depths.
 
@@ -161,7 +171,7 @@ def corner_heights(shadow_map: ShadowMap) -> Array:
     return np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
 
 
-def quad_levels(divided: list[Any]) -> Index:
+def quad_levels(divided: Levels) -> Index:
     """Return the level of the quad in which each texel lies, (faces, size,
     size); 0 is a whole face.
     """
@@ -186,12 +196,12 @@ def _jumps(heights: Array) -> Bools:
     return np.ptp(corners, axis=0) > 0.1 * corners.max(axis=0)
 
 
-def plain_edges(heights: Array, wanted: int) -> list[Any]:
+def plain_edges(heights: Array, wanted: int) -> Levels:
     """Return the nodes of each level that hold a texel beyond the threshold of the
     plain Laplacian of the depth.
 
     The `heights` are inverse depths, (faces, N + 1, N + 1) [1/m]. The threshold is found by
-    bisection, so that the mesh has about as many triangles as are `wanted`.
+    bisection: the mesh has about `wanted` triangles.
     """
     # Bisection in the logarithm of the threshold, from e^-20 to above the largest response, which
     # no texel exceeds. A higher threshold marks fewer texels, and the mesh has fewer triangles.
@@ -220,7 +230,7 @@ def laplacian(heights: Array) -> Array:
     return np.abs(around - 4 * depth)
 
 
-def _marked(corners: Bools) -> list[Any]:
+def _marked(corners: Bools) -> Levels:
     """Return the nodes of each level that have a marked corner."""
     marked = corners[:, :-1, :-1] | corners[:, 1:, :-1] | corners[:, :-1, 1:] | corners[:, 1:, 1:]
     levels = []
@@ -238,7 +248,7 @@ def _marked(corners: Bools) -> list[Any]:
 
 
 def _filter_errors(
-    renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, ours: Any
+    renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, ours: Levels
 ) -> dict[str, float]:
     """Return the error of the airlight of both filters, with as many triangles."""
     light = renderer.scene.lights[0]
@@ -250,7 +260,7 @@ def _filter_errors(
             renderer, evaluated(cast, run_method(renderer, ((mesh,),), cast, lit))
         ).airlight
 
-    def adaptive(divided: list[Any]) -> VolumeMesh:
+    def adaptive(divided: Levels) -> VolumeMesh:
         return adaptive_mesh(shadow_map, light, heights, triangles(divided))
 
     # Both adaptive meshes are compared with the static mesh of the same map, so the map's own error
@@ -279,14 +289,14 @@ def _biased() -> list[float]:
     return [known(error_metrics(clamped, image).relative_rmse) for image in pushed]
 
 
-def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -> Array:
+def crossings_sum(scene: mi.Scene, depth: Array, mesh: VolumeMesh, *, clamp: bool) -> Array:
     """Return the airlight integral of the first light from the crossings of a
     mesh, (height, width) [1/m].
 
-    `loaded`: the `mi.Scene`; `depth`: of the visible surface in each pixel, row by row [m];
-    `clamp`: whether a crossing behind it counts as one at the surface, otherwise it does not count.
+    `depth`: of the visible surface in each pixel, row by row, (pixels,) [m]; `clamp`: whether a
+    crossing behind the surface counts as one at the surface; otherwise it does not count.
     """
-    camera, reference = read_scene(loaded).camera, read_reference(loaded)
+    camera, reference = read_scene(scene).camera, read_reference(scene)
     foot, height = foot_and_height(
         reference.origin, reference.direction, reference.lights[0].position
     )

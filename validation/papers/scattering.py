@@ -16,6 +16,8 @@ within the sphere (the mean of half a chord over the volume): R is 60 % too long
 too dark by about exp(-0.45 sigma_t radius).
 """
 
+from __future__ import annotations
+
 from itertools import product
 from statistics import median
 from typing import Any
@@ -30,9 +32,9 @@ from airlight.validation.arrays import Array
 from airlight.validation.estimates.monte_carlo import monte_carlo_batches
 from airlight.validation.estimates.multiple_scattering import multiple_scattering_fraction
 from airlight.validation.metrics.errors import error_metrics, known
-from airlight.validation.papers.claims import INTERVAL, Figure
+from airlight.validation.papers.claims import INTERVAL, Figure, Figures
 from airlight.validation.scenes.loading import load_scene, resize
-from airlight.validation.scenes.parts import camera, fog, point_light
+from airlight.validation.scenes.parts import Plugin, camera, fog, point_light
 from airlight.validation.scenes.registry import SCENES
 from airlight.validation.study.configuration import configuration, prepared
 
@@ -45,13 +47,14 @@ SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to t
 OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
 
 
-def multiple_scattering() -> dict[str, Any]:
+def multiple_scattering() -> Figures:
     """Return the multiple scattering that a constant misses, worst of three scenes, and
     its fraction in thin fog.
     """
     described = SCENES["open-fog"].build()
     # `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
-    described["fog"]["scale"] = 0.00173
+    medium: Any = described["fog"]
+    medium["scale"] = 0.00173
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
     thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
@@ -80,15 +83,15 @@ def fitted_constant(fog: Array, multiple: Array) -> float:
 
 
 def left_over(first: Array, second: Array, model: Array) -> float:
-    """Return the relative RMSE of a model to the mean of two images with independent
-    noise, without it; 0 at least.
+    """Return the relative RMSE of a model to the mean of two images with independent noise, without
+    the part of the noise; 0 at least.
     """
     # Noise can make the estimate of a square negative.
     squares = float(np.mean((first - model) * (second - model)) / np.mean(first * second))
     return max(0.0, squares) ** 0.5
 
 
-def _multiple(scene: Any, seed: int) -> Array:
+def _multiple(scene: mi.Scene, seed: int) -> Array:
     """Return the airlight of two and more scatterings, (pixels, 3)."""
     # The same seeds: most of the noise of the first scattering cancels in the difference.
     whole, single = (
@@ -143,8 +146,10 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
     }
 
 
-def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
-    """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
+def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) -> Plugin:
+    """Return a scene of a sphere of fog as high as the view, and a lamp at radius/size from its
+    centre; the `image` has a width and a height [pixels].
+    """
     above, radius = np.array([0.37, -0.31, 3.07]), 0.97  # direction to the lamp; of the sphere [m]
     lamp = above / np.linalg.norm(above) * (radius / size)
     # `optical_depth` belongs to the diameter

@@ -13,7 +13,7 @@ subtracts Gamma(b) where it is 0. In section 5, stage 5, planes that face the ca
 the stencil; in 5.1.5 they decrement it. Any increasing function serves as Gamma; x does.
 """
 
-from typing import Any
+from __future__ import annotations
 
 import mitsuba as mi
 import numpy as np
@@ -26,7 +26,7 @@ from airlight.reference.scene.read import read_reference
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.metrics.errors import Metrics, error_metrics, known
 from airlight.validation.scenes.loading import load_scene, resize
-from airlight.validation.scenes.parts import camera, fog, point_light
+from airlight.validation.scenes.parts import Plugin, camera, fog, point_light
 from airlight.validation.study.configuration import configuration, prepared
 
 SIZE = (160, 120)  #: of the images [pixels]
@@ -93,7 +93,7 @@ def _steps() -> float:
     return float(np.percentile(np.abs(on_screen[1] - on_screen[0]).max(axis=1), 99))
 
 
-def _lamp_in_fog(depth: float) -> dict[str, Any]:
+def _lamp_in_fog(depth: float) -> Plugin:
     distance = 5.3
     return {
         "type": "scene",
@@ -103,7 +103,7 @@ def _lamp_in_fog(depth: float) -> dict[str, Any]:
     }
 
 
-def _close_to_lamp(scene: Any) -> Bools:
+def _close_to_lamp(scene: mi.Scene) -> Bools:
     reference = read_reference(scene)
     foot, height = foot_and_height(
         reference.origin, reference.direction, reference.lights[0].position
@@ -119,14 +119,14 @@ def _opened(name: str) -> tuple[Scene, Array]:
 
 
 def _rendered(
-    scene: Scene, method: str = "shadow-planes-2006", kernel: str = "exact", **values: Any
+    scene: Scene, method: str = "shadow-planes-2006", kernel: str = "exact", **values: str | float
 ) -> Array:
     frame = render_frame(prepared(scene, configuration(method, kernel, values)))
     return np.asarray(frame.airlight, dtype=np.float64)
 
 
-def _error(scene: Scene, true: Array, **how: Any) -> Metrics:
-    return error_metrics(true, _rendered(scene, **how))
+def _error(scene: Scene, true: Array, **values: str) -> Metrics:
+    return error_metrics(true, _rendered(scene, **values))
 
 
 def stencil() -> dict[str, float]:
@@ -151,8 +151,8 @@ def _shadows(random: np.random.Generator) -> list[tuple[float, float]]:
 
 
 def drawn(shadows: list[tuple[float, float]], step: int) -> float:
-    """Return the sum that is drawn; `step` is what planes that face the camera add to the
-    stencil, others take it.
+    """Return the sum that is drawn; planes that face the camera add `step` to the stencil, and
+    planes that face away subtract it.
     """
     # The stencil begins with the number of shadows that the surface lies in.
     level = sum(a < 1 < b for a, b in shadows)
@@ -174,7 +174,7 @@ def drawn(shadows: list[tuple[float, float]], step: int) -> float:
 
 
 def _lit_length(shadows: list[tuple[float, float]]) -> float:
-    """Return how much of the ray lies in no shadow, by cutting it at all ends."""
+    """Return the length of the ray that lies in no shadow, by cutting it at all ends."""
     cuts = np.unique(np.clip([0.0, 1.0, *(end for pair in shadows for end in pair)], 0, 1))
     middles = 0.5 * (cuts[1:] + cuts[:-1])
     lit = [not any(a < x < b for a, b in shadows) for x in middles]

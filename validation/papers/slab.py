@@ -12,7 +12,6 @@ functions, fitted to the grid (`fitted_transport.py`).
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -28,6 +27,7 @@ from airlight.realtime.clouds.canonical.transport_grid import (
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from airlight.realtime.numerics.array_types import ArrayTypes, array_types
 from airlight.validation.arrays import Array
+from airlight.validation.papers.claims import Figures
 from airlight.validation.papers.fitted_transport import fit_radiance
 from airlight.validation.slab.moments import DOWN, UP, SlabOrders, order_sets
 from airlight.validation.slab.phases import droplet_phase, phase_pair
@@ -52,7 +52,7 @@ PANELS: tuple[tuple[float, tuple[float, ...]], ...] = (
 )
 
 
-def slab_figures() -> dict[str, Any]:
+def slab_figures() -> Figures:
     """Return reflectances over those of the droplets, fractions of orders [%] and how
     radiance changes by azimuth.
     """
@@ -142,9 +142,9 @@ def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
     return {set_name(number): float(ratios[number].max()) for number in range(len(SETS))}
 
 
-def transport_figures() -> dict[str, Any]:
-    """Return by how much the paper's functions are off in half of the directions, the
-    median over the curves [%].
+def transport_figures() -> Figures:
+    """Return the median error of the paper's functions over directions, the median of these over
+    the curves [%].
     """
     medians = []
     for curve in transport_curves():

@@ -25,7 +25,6 @@ exact sum over the points for the same frames, in the penumbra of the first.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -36,10 +35,15 @@ from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.clock import time_in_turns
-from airlight.validation.papers.claims import INTERVAL, Figure, quartiles
+from airlight.validation.papers.claims import INTERVAL, Figure, Figures, quartiles
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.samples import LEVEL, student_quantile
-from airlight.validation.study.configuration import SHARED_POINTS, Configuration, prepared
+from airlight.validation.study.configuration import (
+    SHARED_POINTS,
+    Configuration,
+    Parameters,
+    prepared,
+)
 from airlight.validation.study.frame_times import moved_light
 from airlight.validation.timing import Timing
 
@@ -53,18 +57,18 @@ _STRIPS = 16  # of the jackknife
 
 #: Names and values of parameters, beside the defaults: 5 points on a ring, uniform
 #: steps, hd = 5, hr = 0.5.
-RENDERINGS: Mapping[str, dict[str, Any]] = {
+RENDERINGS: Mapping[str, Parameters] = {
     "R1": {"steps": MANY, "filter": "none"},
     "R2": {"steps": STEPS, "filter": "none"},
     "R3": {"steps": STEPS, "filter": "gauss"},
     "R4": {"steps": STEPS},
 }
-VARIANTS: Mapping[str, dict[str, Any]] = {
+VARIANTS: Mapping[str, Parameters] = {
     "3 points": {"points": 3, "hd": "3"},
     "16 points": {"points": 16},
     "scale 2": {"scale": 2},
     "hd auto": {"guide": "depth", "hd": "auto", "surfaces": "ray"},
-    "shared points": {**SHARED_POINTS},
+    "shared points": SHARED_POINTS,
 }
 
 
@@ -76,8 +80,8 @@ class Reference:
     penumbra: Bools  #: (height, width)
 
     def error(self, image: Array, left_out: int | None = None) -> float:
-        """Return the relative RMSE of an image in the penumbra, if wanted
-        without one of the strips.
+        """Return the relative RMSE of an image in the penumbra; without the strip `left_out`, if
+        one is given.
         """
         where = self.penumbra
         if left_out is not None:
@@ -108,12 +112,12 @@ class Reference:
         return float(np.median(shown[steep] / true[steep]))
 
 
-def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[str, Any]:
+def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> Figures:
     """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings."""
     scene, reference = shafts_scene(size)
     times = timings(scene, RENDERINGS, seconds)
     # The renderings of Fig. 4.19; the best of the smaller counts is compared with the largest.
-    taps = {f"{count} taps": {"steps": count} for count in TAPS}
+    taps: dict[str, Parameters] = {f"{count} taps": {"steps": count} for count in TAPS}
     chosen = {**RENDERINGS, **_at_equal_time(times), **VARIANTS, **taps}
     images = {name: rendered(scene, values) for name, values in chosen.items()}
     errors = {name: reference.error(image) for name, image in images.items()}
@@ -174,19 +178,17 @@ def _exact(points: int = POINTS) -> Configuration:
     return Configuration("shadow-planes", "exact", (("points", points), ("pattern", "sobol")))
 
 
-def _configuration(values: Mapping[str, Any]) -> Configuration:
+def _configuration(values: Parameters) -> Configuration:
     return Configuration("soft-shafts", None, tuple(values.items()))
 
 
-def rendered(scene: Scene, values: Mapping[str, Any]) -> Array:
+def rendered(scene: Scene, values: Parameters) -> Array:
     """Return airlight plus surface of a rendering [W/(m^2 sr)]."""
     frame = render_frame(prepared(scene, _configuration(values)))
     return np.asarray(frame.airlight + frame.surface, dtype=np.float64)
 
 
-def timings(
-    scene: Scene, chosen: Mapping[str, Mapping[str, Any]], seconds: float
-) -> dict[str, Timing]:
+def timings(scene: Scene, chosen: Mapping[str, Parameters], seconds: float) -> dict[str, Timing]:
     """Return the times of renderings after the light moved, measured in turns, by name."""
     works = [moved_light(prepared(scene, _configuration(values))) for values in chosen.values()]
     return dict(
@@ -194,22 +196,20 @@ def timings(
     )
 
 
-def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, dict[str, Any]]:
-    """Return R2 and R3 with as many steps as take the time of R4."""
+def _at_equal_time(times: Mapping[str, Timing]) -> dict[str, Parameters]:
+    """Return R2 and R3 with so many steps that they take the time of R4."""
     ms = {name: timing.median_ms for name, timing in times.items()}
     # The time is linear in the steps: what one more step costs is the difference of R1 and R2 over
     # that of their steps.
     a_step = max((ms["R1"] - ms["R2"]) / (MANY - STEPS), 1e-6)
     more = {name: round(max(ms["R4"] - ms[name], 0.0) / a_step) for name in ("R2", "R3")}
     return {
-        f"{name}, equal time": RENDERINGS[name] | {"steps": STEPS + more[name]} for name in more
+        f"{name}, equal time": {**RENDERINGS[name], "steps": STEPS + more[name]} for name in more
     }
 
 
 def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
-    """Return the flicker of R2, R4 and the shared points over that of the
-    exact sum over the points.
-    """
+    """Return the flicker of R2 and R4 over that of the exact sum over the points."""
     (light,) = scene.area_lights
     across = light.across / np.linalg.norm(light.across)
     # The light moves along its first edge, by equal steps.
@@ -231,11 +231,6 @@ def _flicker(scene: Scene, reference: Reference) -> dict[str, float]:
 
     # A light that moves evenly has a second difference of its own, which the exact sum shows.
     smooth = second_difference(_exact())
-    chosen = {
-        "R2": RENDERINGS["R2"],
-        "R4": RENDERINGS["R4"],
-        "shared points": VARIANTS["shared points"],
-    }
     return {
-        name: second_difference(_configuration(values)) / smooth for name, values in chosen.items()
+        name: second_difference(_configuration(RENDERINGS[name])) / smooth for name in ("R2", "R4")
     }

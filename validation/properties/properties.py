@@ -7,13 +7,15 @@ on a grid of camera rays.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from airlight.errors import InputError
 from airlight.realtime.scene.camera import read_camera, resized_camera
+from airlight.realtime.scene.media.light_paths import BoundedMedium
+from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.arrays import Array
@@ -37,10 +39,17 @@ PROPERTIES: Mapping[str, str] = {
 
 
 def scene_properties(scene: Scene) -> dict[str, float]:
-    """Return the properties of a scene by name, as
-    `realtime.scene.read_scene.read_scene` returned it.
+    """Return the properties of a scene by name.
+
+    Raises InputError for fog that differs from place to place: it has no extinction.
     """
-    lights, (origin, ends, depth) = light_places(scene), _seen(scene)
+    medium = scene.medium
+    if not isinstance(medium, Homogeneous):
+        raise InputError(
+            "properties: the fog of this scene differs from place to place; expected a scene of "
+            "homogeneous media"
+        )
+    lights, (origin, ends, depth) = light_places(scene), _view_rays(scene)
     # The middles of equal parts of each ray from the camera to its end.
     steps = 8  # points on each ray
     fraction = (np.arange(steps) + 0.5) / steps
@@ -48,28 +57,29 @@ def scene_properties(scene: Scene) -> dict[str, float]:
     kinds = [light.kind for light in lights]
     # Shapes of area lights are lights, not occluders, and their triangles do not count.
     lamps = {light.name for light in scene.area_lights}
-    balls = [(*_ball(each), _extinction(each.medium)) for each in scene.medium.bounded_media]
+    balls = [(*_ball(each), _extinction(each.medium)) for each in medium.bounded_media]
     meshes = [
         shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps
     ]
-    found = {
+    values = {
         "lights": len(lights),
         **{f"{kind}s": kinds.count(kind) for kind in ("point", "spot", "directional", "area")},
-        "bounded": len(scene.medium.bounded_media),
-        "optical_depth": optical_depths(balls, _extinction(scene.medium), origin, ends).mean(),
+        "bounded": len(medium.bounded_media),
+        "optical_depth": optical_depths(balls, _extinction(medium), origin, ends).mean(),
         "mean_cosine": _mean_cosine(scene),
         "surface_fraction": np.isfinite(depth).mean(),
         "lit_fraction": np.mean([lit_points(scene.geometry, light, points) for light in lights]),
         "triangles": sum(shape.face_count() for shape in meshes),
         "pixels": scene.camera.width * scene.camera.height,
     }
-    return {name: float(found[name]) for name in sorted(PROPERTIES)}
+    return {name: float(values[name]) for name in sorted(PROPERTIES)}
 
 
-def _seen(scene: Scene) -> tuple[Array, Array, Array]:
-    """Return the camera's place, the ends of a grid of its rays, and the depth there.
+def _view_rays(scene: Scene) -> tuple[Array, Array, Array]:
+    """Return the camera's place, (3,), the ends of a grid of its rays, (rows, columns, 3), and the
+    distances of surfaces along these, (rows, columns) [m].
 
-    Rays that meet nothing end as far away as all lights and bounds lie.
+    Rays that meet nothing end beyond all lights and bounds.
     """
     # 32 x 24 rays, or one for each pixel of a smaller image
     grid = min(32, scene.camera.width), min(24, scene.camera.height)
@@ -94,11 +104,13 @@ def _seen(scene: Scene) -> tuple[Array, Array, Array]:
     return camera.origin, camera.origin + length[..., None] * directions, depth
 
 
-def _ball(bounded: Any) -> tuple[Array, float]:
+def _ball(bounded: BoundedMedium) -> tuple[Array, float]:
+    """Return centre, (3,), and radius of the ball around a bounded medium [m]."""
     return np.array(bounded.centre, dtype=np.float64).ravel(), float(bounded.radius[0])
 
 
-def _extinction(medium: Any) -> Array:
+def _extinction(medium: Homogeneous) -> Array:
+    """Return the extinction of a medium by channel [1/m]."""
     return np.array([float(sigma_t[0]) for sigma_t in medium.sigma_t])
 
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far rays of a scene go, which points its lights reach, and optical depths, for
-properties and random scenes.
+"""The lengths of rays, the points that lights reach, and optical depths, for properties and
+random scenes.
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -64,40 +65,44 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
     return tuple(places)
 
 
-def _host(vector: Any) -> Array:
+def _host(vector: mi.Vector3f) -> Array:
     return np.array(vector, dtype=np.float64).ravel()
 
 
-def _rays(origin: Array, direction: Array, longest: Array | None = None) -> Any:
+def _rays(origin: Array, direction: Array, longest: Array | None = None) -> mi.Ray3f:
+    """Return rays from points along unit vectors, (..., 3) each; `longest`: (...,) [m]."""
     o, d = (mi.Point3f(*origin.reshape(-1, 3).T), mi.Vector3f(*direction.reshape(-1, 3).T))
     limit = mi.Float(dr.largest(mi.Float)) if longest is None else mi.Float(longest.ravel())
     return mi.Ray3f(o, d, limit, mi.Float(0), mi.Color0f())
 
 
-def distance(geometry: Any, origin: Array, direction: Array) -> Array:
-    """Return the distance of the nearest surface, infinity where there is none [m]."""
+def distance(geometry: mi.Scene, origin: Array, direction: Array) -> Array:
+    """Return the distance of the nearest surface along rays, (...,) [m]; infinity for none.
+
+    `origin`, `direction`: of the rays, (..., 3) each.
+    """
     # Without shapes there is no surface to meet.
     if not geometry.shapes():
         return np.full(direction.shape[:-1], np.inf)
     hit = geometry.ray_intersect_preliminary(_rays(origin, direction), coherent=True)
-    found = np.array(dr.select(hit.is_valid(), hit.t, dr.inf), dtype=np.float64)
-    return found.reshape(direction.shape[:-1])
+    lengths = np.array(dr.select(hit.is_valid(), hit.t, dr.inf), dtype=np.float64)
+    return lengths.reshape(direction.shape[:-1])
 
 
-def lit_points(geometry: Any, light: LightPlace, points: Array) -> Bools:
-    """Return which points a light reaches, the middle of one with extent; points (..., 3) [m]."""
+def lit_points(geometry: mi.Scene, light: LightPlace, points: Array) -> Bools:
+    """Return which points, (..., 3) [m], a light reaches, (...,); of an area light its middle."""
     unit, distance = light.toward(points)
     lit = np.ones(points.shape[:-1], dtype=bool)
     # Within a spot's cone, or before a flat light, where the cosine is above 0.
     if light.axis is not None:
         lit &= -(unit @ light.axis) > light.cos_cutoff
     if geometry.shapes():
-        before = 1e-3  # of its way a shadow ray leaves out at either end
+        margin = 1e-3  # fraction of its way that a shadow ray leaves out at either end
         # A shadow ray ends before the ball around an area light, whose own shape would block it.
         longest = np.where(
-            np.isfinite(distance), distance * (1 - before) - light.radius, np.finfo(np.float32).max
+            np.isfinite(distance), distance * (1 - margin) - light.radius, np.finfo(np.float32).max
         )
-        start = points + unit * np.where(np.isfinite(distance), distance * before, 0.0)[..., None]
+        start = points + unit * np.where(np.isfinite(distance), distance * margin, 0.0)[..., None]
         blocked = geometry.ray_test(_rays(start, unit, np.maximum(longest, 0)))
         lit &= ~np.array(blocked, dtype=bool).reshape(lit.shape)
     return lit
@@ -116,8 +121,8 @@ def optical_depths(
     depth = np.zeros((*length.shape, 3))
     for centre, radius, sigma_t in balls:
         inside = _chord(centre, radius, start, way, length)
-        # The balls are disjoint: the medium between them has what the balls leave of the segment.
-        # Rounding may leave a little less than nothing.
+        # The balls are disjoint: the rest of the segment lies in the medium between them. By
+        # rounding the rest may be a little below 0.
         outside = outside - inside
         depth += inside[..., None] * sigma_t
     return np.asarray(depth + np.maximum(outside, 0)[..., None] * around)

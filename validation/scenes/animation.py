@@ -14,9 +14,8 @@ The frame renderer recomputes only what moves (`moved_parts`, `realtime.frame.in
 reuses the kernels of the first frame.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -79,7 +78,7 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, ...]] | None:
     """Return the changes of a frame in its scene, by the names of `validation.scenes.changes`.
 
-    None where these names cannot say it: area lights, media that are not the same everywhere.
+    None where there is no name for a change: area lights, media that are not the same everywhere.
     """
     moves = set(animation.moves)
     homogeneous = moved.medium if isinstance(moved.medium, Homogeneous) else None
@@ -88,7 +87,7 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
     # The names follow `validation.scenes.changes`: the first light has no number, the second is
     # `light-2`. A light at a place (w = 1) has a position and an intensity, a light at infinity an
     # irradiance; spots and directional lights have an axis.
-    changes: dict[str, Any] = {}
+    changes: dict[str, Sequence[float]] = {}
     for number, light in enumerate(moved.lights, 1):
         prefix = "light" if number == 1 else f"light-{number}"
         if "light" in moves:
@@ -98,26 +97,28 @@ def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, 
             changes[f"{prefix}.{'intensity' if light.w else 'irradiance'}"] = light.intensity
     if homogeneous is not None and "medium" in moves:
         # One value a channel: the extinction of each channel is an array of one element.
-        changes["medium.sigma_t"] = [float(own[0]) for own in homogeneous.sigma_t]
+        changes["medium.sigma_t"] = [float(channel[0]) for channel in homogeneous.sigma_t]
     return {
         name: tuple(np.array(value, dtype=np.float64).ravel().tolist())
         for name, value in changes.items()
     }
 
 
-def frame_objects(scene: Scene, animation: Animation, frames: int) -> dict[str, tuple[Any, ...]]:
-    """Return by shape the matrices, (4, 4) [m], that take it from its place in the
-    scene to that in each frame.
+def frame_objects(
+    scene: Scene, animation: Animation, frames: int
+) -> dict[str, tuple[tuple[tuple[float, ...], ...], ...]]:
+    """Return by shape a matrix for each frame, (4, 4) [m], from the place in the scene to the
+    place in the frame.
     """
     objects = _objects(scene, animation)
-    matrices: dict[str, tuple[Any, ...]] = {}
+    matrices = {}
     for name, about in {} if objects is None else objects.middles.items():
         # A turn R about the point m is x -> R x + (m - R m): rotation block first, then the
         # translation that keeps m where it is.
-        own = np.tile(np.eye(4), (frames, 1, 1))
-        own[:, :3, :3] = [_turn(scene, number / frames) for number in range(frames)]
-        own[:, :3, 3] = about - own[:, :3, :3] @ about
-        matrices[name] = tuple(tuple(map(tuple, matrix)) for matrix in own.tolist())
+        turns = np.tile(np.eye(4), (frames, 1, 1))
+        turns[:, :3, :3] = [_turn(scene, number / frames) for number in range(frames)]
+        turns[:, :3, 3] = about - turns[:, :3, :3] @ about
+        matrices[name] = tuple(tuple(map(tuple, matrix)) for matrix in turns.tolist())
     return matrices
 
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether what bounds media are bodies beside one another, checked once, where a
-scene of a user is loaded.
+"""The bounds of media must be disjoint bodies: checked once, where a scene of a user is loaded.
 
 A mesh bounds a body if every edge is met by two triangles, once each way, no triangle passes
 through another, and around every point its triangles wind once (inside) or not at all (outside).
 Methods and reference count on that.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -28,33 +28,29 @@ from airlight.realtime.scene.closed_mesh import (
 )
 from airlight.realtime.scene.mesh_adjacency import scene_of
 from airlight.reference.scene.shapes import distance_to_triangles
-from airlight.validation.arrays import Array, Index
+from airlight.validation.arrays import Array, Bools, Index
 
 Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
 
 
-def check_bodies(scene: Any) -> None:
-    """Refuse an `mi.Scene` in which the bounds of media are no disjoint bodies,
-    with the name of an edge.
+def check_bodies(scene: mi.Scene) -> None:
+    """Refuse a scene in which the bounds of media are no disjoint bodies, with the name of an edge.
 
     Raises InputError for bounds that are no spheres or closed meshes, cross themselves or one
     another, are inside out, or lie within one another.
     """
     shapes = [shape for shape in scene.shapes() if _bounds_medium(shape)]
-    read = [read_bounds(shape) for shape in shapes]
+    bodies = [read_bounds(shape) for shape in shapes]
     # Spheres and convex meshes are compared pair by pair below. Only meshes that are not convex
     # need the search for crossing edges, and then all meshes take part, since either of two may be
     # the one that is not convex.
-    if any(bounds is None for bounds, _ in read):
-        meshes = {
-            shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None
-        }
-        _check_crossings(
-            meshes, scene_of([shape for shape, (_, mesh) in zip(shapes, read) if mesh is not None])
-        )
+    if any(bounds is None for bounds, _ in bodies):
+        with_mesh = [(shape, mesh) for shape, (_, mesh) in zip(shapes, bodies) if mesh is not None]
+        meshes = {shape_number(shape): mesh for shape, mesh in with_mesh}
+        _check_crossings(meshes, scene_of([shape for shape, _ in with_mesh]))
         _check_nesting(list(meshes.values()))
-    for first, second in combinations(range(len(read)), 2):
-        if _overlap(read[first], read[second]):
+    for first, second in combinations(range(len(bodies)), 2):
+        if _overlap(bodies[first], bodies[second]):
             raise InputError(
                 f"the media of shapes '{shapes[first].id()}' and '{shapes[second].id()}' overlap "
                 "or one holds the "
@@ -62,7 +58,7 @@ def check_bodies(scene: Any) -> None:
             )
 
 
-def _bounds_medium(shape: Any) -> bool:
+def _bounds_medium(shape: mi.Shape) -> bool:
     null = shape.bsdf() is not None and shape.bsdf().class_name() == "Null"
     return null and not shape.is_emitter() and shape.interior_medium() is not None
 
@@ -119,8 +115,8 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
     # no edges cross (checked before), so one point decides for the whole part.
     parts = [(number, *part) for number, mesh in enumerate(meshes) for part in _parts(mesh)]
     boxes = [(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for *_, corners, _ in parts]
-    for number, (own, first, _, outwards) in enumerate(parts):
-        mesh = meshes[own]
+    for number, (of_mesh, first, _, outwards) in enumerate(parts):
+        mesh = meshes[of_mesh]
         tail, head = mesh.faces[first, :2]
         point = mesh.vertices[tail]
         # The winding numbers of all other parts about the point, summed over the parts of a mesh.
@@ -131,14 +127,14 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
                 holder, _, corners, _ = parts[other]
                 around[holder] = around.get(holder, 0) + round(winding_number(corners, point))
         # A part that faces inwards is the wall of a hollow.
-        if around.pop(own, 0) != (0 if outwards else 1):
+        if around.pop(of_mesh, 0) != (0 if outwards else 1):
             flaw = "has a part within another" if outwards else "is inside out"
             raise InputError(
                 f"shape '{mesh.name}' bounds a medium and {flaw}, at "
                 f"{mesh.edge_words(tail, head)}; expected faces "
                 "that run counter-clockwise seen from outside, and parts beside one another"
             )
-        # Only the windings of other meshes are left in `around`.
+        # `around` has only the windings of other meshes now.
         nesting = [other for other, winding in around.items() if winding]
         if nesting:
             raise InputError(
@@ -149,8 +145,8 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
 
 
 def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
-    """Return of each connected part of a mesh one triangle, the corners of all, and
-    whether these face outwards.
+    """Return the connected parts of a mesh: of each the number of one triangle, the corners of
+    its triangles, (triangles, 3, 3) [m], and whether these face outwards.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -161,20 +157,20 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
         (np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2
     )
     _, component = connected_components(graph, directed=False)
-    own = component[mesh.faces[:, 0]]
+    of_face = component[mesh.faces[:, 0]]
     parts = []
-    for each in np.unique(own):
-        inside = np.flatnonzero(own == each)
-        corners = mesh.corners[inside]
+    for each in np.unique(of_face):
+        triangles = np.flatnonzero(of_face == each)
+        corners = mesh.corners[triangles]
         # Six times the signed volume, about the mean of the corners, where the sum loses fewest
         # digits. It is positive for faces that run counter-clockwise seen from outside.
         local = corners - corners.mean(axis=(0, 1))
         volume = np.einsum("ij,ij->", local[:, 0], np.cross(local[:, 1], local[:, 2]))
-        parts.append((int(inside[0]), corners, bool(volume > 0)))
+        parts.append((int(triangles[0]), corners, bool(volume > 0)))
     return parts
 
 
-def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
+def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: mi.Scene) -> None:
     """Refuse meshes with an edge that passes through a triangle that it does not touch.
 
     `meshes`: by the numbers of their shapes in the Mitsuba scene `boundary`. Mitsuba finds
@@ -218,20 +214,24 @@ def _edges(mesh: ClosedMesh) -> tuple[Index, Index]:
     return tail[tail < head], head[tail < head]
 
 
-def _met_triangles(boundary: Any, begin: Array, end: Array):
-    """Return the numbers of shapes and triangles that edges meet, and of the edges."""
+def _met_triangles(boundary: mi.Scene, begin: Array, end: Array) -> tuple[Index, Index, Index]:
+    """Return the numbers of the shapes and of the triangles that edges meet, and of the edges,
+    (hits,) each.
+
+    `begin`, `end`: of the edges, (edges, 3) each [m].
+    """
     length = np.linalg.norm(end - begin, axis=1)
     unit = (end - begin) / length[:, None]
     shapes, triangles, edges = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
-    left, past = np.arange(len(begin)), np.zeros(len(begin))
+    active, past = np.arange(len(begin)), np.zeros(len(begin))
     # Triangles at the corners of an edge may hide what lies behind them: the edge is cast
     # on from there to its end.
-    while len(left):
-        start = begin[left] + unit[left] * past[left, None]
+    while len(active):
+        start = begin[active] + unit[active] * past[active, None]
         ray = mi.Ray3f(
             mi.Point3f(*(aligned_array(mi.Float, column) for column in start.T)),
-            mi.Vector3f(*(aligned_array(mi.Float, column) for column in unit[left].T)),
-            aligned_array(mi.Float, length[left] - past[left]),
+            mi.Vector3f(*(aligned_array(mi.Float, column) for column in unit[active].T)),
+            aligned_array(mi.Float, length[active] - past[active]),
             0.0,
             [],
         )
@@ -240,18 +240,20 @@ def _met_triangles(boundary: Any, begin: Array, end: Array):
         valid = np.isfinite(np.array(hit.t))
         shapes.append(np.array(dr.reinterpret_array(mi.UInt32, hit.shape))[valid])
         triangles.append(np.array(hit.prim_index)[valid].astype(np.int64))
-        left = left[valid]
-        edges.append(left)
+        active = active[valid]
+        edges.append(active)
         # The next ray starts a little beyond the hit, by 1e-5 of the edge, so that it does not find
         # the same triangle again.
-        past[left] += np.array(hit.t, dtype=np.float64)[valid] + 1e-5 * length[left]
-        left = left[past[left] < length[left]]
+        past[active] += np.array(hit.t, dtype=np.float64)[valid] + 1e-5 * length[active]
+        active = active[past[active] < length[active]]
     return np.concatenate(shapes), np.concatenate(triangles), np.concatenate(edges)
 
 
-def _piercing(corners: Array, begin: Array, end: Array):
-    """Return which segments pass through the inside of triangles, by Moeller and
+def _piercing(corners: Array, begin: Array, end: Array) -> Bools:
+    """Return which segments pass through the inside of triangles, (n,), by Moeller and
     Trumbore's weights in float64.
+
+    `corners`: of a triangle for each segment, (n, 3, 3) [m]; `begin`, `end`: (n, 3) each [m].
     """
     # Solve begin + fraction along = corner + u first + v second by Cramer's rule; the weights of
     # the corners are 1 - u - v, u, v. A segment in the plane has no determinant and pierces

@@ -22,12 +22,15 @@ last. Media are named so too: first the one around the camera, then those with b
 of their shapes.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
 from airlight.errors import InputError, nearest
 from airlight.reference.scene.transforms import matrix_of
@@ -36,6 +39,7 @@ from airlight.validation.arrays import Array
 from airlight.validation.readers import named_values
 from airlight.validation.scenes.height_fog import NUMBERS
 from airlight.validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
+from airlight.validation.scenes.parts import Plugin
 
 Values = tuple[float, ...]
 _LIGHTS = {"intensity": "W/sr", "irradiance": "W/m^2", "radiance": "W/(m^2 sr)"}
@@ -54,15 +58,15 @@ class Changeable:
     direction: bool = False  #: only its direction matters: not all of it may be 0
 
 
-def changeable(scene) -> dict[str, Changeable]:
-    """Return the changeable parameters of a Mitsuba scene, by name, with their values."""
+def changeable(scene: mi.Scene) -> dict[str, Changeable]:
+    """Return the changeable parameters of a scene, by name, with their values."""
     # A scene without a camera has lights and media to change all the same.
-    found = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
+    parameters = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
     for number, emitter in enumerate(_lights(scene), 1):
-        found += _of_light(_numbered("light", number), emitter)
+        parameters += _of_light(_numbered("light", number), emitter)
     for number, medium in enumerate(_media(scene), 1):
-        found += _of_medium(_numbered("medium", number), medium)
-    return {item.name: item for item in found}
+        parameters += _of_medium(_numbered("medium", number), medium)
+    return {each.name: each for each in parameters}
 
 
 def parse_changes(words: Sequence[str]) -> dict[str, Values]:
@@ -80,23 +84,24 @@ def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:
     ]
 
 
-def checked_changes(scene, changes: Mapping[str, Sequence[float]]) -> dict[str, Values]:
-    """Return the changes of an `mi.Scene`; names that it does not have, and values that it cannot
-    have, are refused.
+def checked_changes(scene: mi.Scene, changes: Mapping[str, Sequence[float]]) -> dict[str, Values]:
+    """Return the changes of a scene as tuples.
+
+    Raises InputError for a name that the scene does not have, and a value that it cannot have.
     """
-    known = changeable(scene)
-    return {name: _checked(name, values, known) for name, values in changes.items()}
+    parameters = changeable(scene)
+    return {name: _checked(name, values, parameters) for name, values in changes.items()}
 
 
-def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
-    """Change an `mi.Scene` in place: values by name, see the module.
+def change_scene(scene: mi.Scene, changes: Mapping[str, Sequence[float]]) -> None:
+    """Change a scene in place: values by name, see the module.
 
-    A name that the scene does not have and a value that it cannot have are refused,
-    and the scene is as it was.
+    Raises InputError for a name that the scene does not have, and a value that it cannot have: then
+    nothing is changed.
     """
     # All values are checked before any is set. What a part refuses of values together, such as
     # numbers of height fog without a bound, is known only then: all parts get their old values.
-    wanted = checked_changes(scene, changes)
+    checked = checked_changes(scene, changes)
     changed = []
     for kind, parts, change in (
         ("camera", scene.sensors()[:1], _change_camera),
@@ -105,17 +110,17 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
     ):
         for number, part in enumerate(parts, 1):
             prefix = _numbered(kind, number) + "."
-            own = {
+            of_part = {
                 name.removeprefix(prefix): values
-                for name, values in wanted.items()
+                for name, values in checked.items()
                 if name.startswith(prefix)
             }
-            changed += [(part, change, own)] if own else []
+            changed += [(part, change, of_part)] if of_part else []
     before = [(part, _parameters(part)) for part, _, _ in changed]
     try:
         # The changes of one part are made together, since its plugin is updated once.
-        for part, change, own in changed:
-            change(part, own)
+        for part, change, of_part in changed:
+            change(part, of_part)
     except InputError:
         for part, values in before:
             parameters = mi.traverse(part)
@@ -125,17 +130,16 @@ def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
         raise
 
 
-def _parameters(part: Any) -> dict[str, Any]:
+def _parameters(part: mi.Object) -> dict[str, Any]:
     """Return copies of the parameters of a plugin, which Mitsuba may change in place."""
     return {name: type(value)(value) for name, value in mi.traverse(part)}
 
 
-def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> None:
-    """Move shapes of an `mi.Scene` in place, by their ids: from where they are, by
-    matrices of shape (4, 4) [m].
+def move_shapes(scene: mi.Scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> None:
+    """Move shapes of a scene in place from where they are; `matrices`: (4, 4) [m], by the ids
+    of the shapes.
 
-    Raises InputError for a shape that the scene does not have, or whose place
-    Mitsuba does not let change.
+    Raises InputError for a shape that the scene does not have, or that Mitsuba cannot move.
     """
     if not matrices:
         return
@@ -143,12 +147,12 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
     shapes = [shape.id() for shape in scene.shapes()]
     for name, rows in matrices.items():
         if name not in shapes:
-            known = (
+            advice = (
                 f"expected some of {', '.join(shapes)}{nearest(name, shapes)}"
                 if shapes
                 else "the scene has no shapes"
             )
-            raise InputError(f"objects: got {name!r}, {known}")
+            raise InputError(f"objects: got {name!r}, {advice}")
         # A mesh has its vertices in world coordinates and no transform that could be set; the
         # vertices themselves are moved. Rectangle, disk and sphere have `to_world`.
         matrix = np.array(rows, dtype=np.float64)
@@ -177,10 +181,8 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
     parameters.update()
 
 
-def shift_film(scene, right: float, down: float) -> None:
-    """Let the rays of an `mi.Scene` pass right of and below the centres of its
-    pixels [pixels], in place.
-    """
+def shift_film(scene: mi.Scene, right: float, down: float) -> None:
+    """Let the camera's rays pass right of and below the centres of pixels [pixels], in place."""
     parameters = mi.traverse(scene.sensors()[0])
     for axis, size, shift in zip("xy", parameters["film.size"], (right, down), strict=True):
         parameters[f"principal_point_offset_{axis}"] = shift / int(size)
@@ -192,8 +194,8 @@ def _numbered(kind: str, number: int) -> str:
 
 
 def _word(value: float) -> str:
-    """Return the shortest decimals that are this number in single precision, if
-    it is one, or in double.
+    """Return the shortest decimals that are read as this number: in single precision where it is
+    a number of single precision, else in double.
     """
     # The shortest decimals of float32 are enough where the value came from float32; otherwise more
     # digits are needed to read the same double again.
@@ -203,14 +205,16 @@ def _word(value: float) -> str:
     )
 
 
-def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]) -> Values:
-    if name not in known:
+def _checked(name: str, values: Sequence[float], parameters: Mapping[str, Changeable]) -> Values:
+    if name not in parameters:
         raise InputError(
-            f"--change: got {name!r}, expected one of {', '.join(known)}{nearest(name, known)}"
+            f"--change: got {name!r}, expected one of {', '.join(parameters)}"
+            f"{nearest(name, parameters)}"
         )
-    item = known[name]
-    if len(values) not in item.sizes:
-        sizes = " or ".join(str(size) for size in item.sizes)
+    # The numbers of a value: how many, within which limits, and not all 0 for a direction.
+    parameter = parameters[name]
+    if len(values) not in parameter.sizes:
+        sizes = " or ".join(str(size) for size in parameter.sizes)
         raise InputError(
             f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them and a "
             "point "
@@ -218,14 +222,14 @@ def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]
         )
     # The comparison is written so that NaN fails it.
     numbers = np.array(values, dtype=np.float64)
-    if not np.all((numbers >= item.least) & (numbers <= item.most)):
+    if not np.all((numbers >= parameter.least) & (numbers <= parameter.most)):
         given = ",".join(f"{value:g}" for value in values)
-        unit = f" [{item.unit}]" if item.unit else ""
+        unit = f" [{parameter.unit}]" if parameter.unit else ""
         raise InputError(
-            f"{name}: got {given}, expected finite numbers from {item.least:g} to "
-            f"{item.most:g}{unit}"
+            f"{name}: got {given}, expected finite numbers from {parameter.least:g} to "
+            f"{parameter.most:g}{unit}"
         )
-    if item.direction and not np.any(numbers):
+    if parameter.direction and not np.any(numbers):
         raise InputError(
             f"{name}: got {','.join('0' for _ in values)}, expected a direction: not all of it 0"
         )
@@ -244,7 +248,7 @@ def _point(name: str, value: Array, *, direction: bool = False) -> Changeable:
     )
 
 
-def _values(value: Any) -> Values:
+def _values(value: ArrayLike) -> Values:
     return tuple(float(number) for number in np.array(value, dtype=np.float64).ravel())
 
 
@@ -253,7 +257,7 @@ def _values(value: Any) -> Values:
 _AIM = ("origin", "target", "up")
 
 
-def _of_camera(sensor) -> Iterable[Changeable]:
+def _of_camera(sensor: mi.Sensor) -> Iterable[Changeable]:
     parameters = mi.traverse(sensor)
     if "x_fov" not in parameters:
         return
@@ -266,7 +270,7 @@ def _of_camera(sensor) -> Iterable[Changeable]:
     yield Changeable("camera.fov", _values(parameters["x_fov"]), (1,), 0.1, 179.0, "degrees")
 
 
-def _change_camera(sensor, changed: Mapping[str, Values]) -> None:
+def _change_camera(sensor: mi.Sensor, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(sensor)
     # Origin, target and up make one transform: coordinates that are not changed are read from the
     # camera.
@@ -279,9 +283,9 @@ def _change_camera(sensor, changed: Mapping[str, Values]) -> None:
     parameters.update()
 
 
-def _looking(like, origin: Values, target: Values, up: Values):
-    """Return the transform of a camera that looks from a point at another, of the
-    type of another transform.
+def _looking(like: mi.Transform4f, origin: Values, target: Values, up: Values) -> mi.Transform4f:
+    """Return the transform of a camera that looks from a point at another, of the type of the
+    transform `like`.
     """
     forward = np.subtract(target, origin)
     # Up and forward must span a plane: else `look_at` divides by zero. 1e-9 is the sine of the
@@ -298,14 +302,14 @@ def _looking(like, origin: Values, target: Values, up: Values):
 # Lights -------------------------------------------------------------------------------------------
 
 
-def _lights(scene) -> list[Any]:
+def _lights(scene: mi.Scene) -> list[mi.Emitter]:
     """Return the emitters in the order of their names: a sky comes behind the lights, which methods
     count without it.
     """
     return sorted(scene.emitters(), key=lambda emitter: emitter.is_environment())
 
 
-def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
+def _of_light(prefix: str, emitter: mi.Emitter) -> Iterable[Changeable]:
     parameters = mi.traverse(emitter)
     kind = emitter.class_name()
     # A point light keeps its position as a parameter; a spot has it in its transform, with its axis
@@ -333,7 +337,7 @@ def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
             )
 
 
-def _change_light(emitter, changed: Mapping[str, Values]) -> None:
+def _change_light(emitter: mi.Emitter, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(emitter)
     if "position" in parameters and "position" in changed:
         parameters["position"] = type(parameters["position"])(*changed["position"])
@@ -345,8 +349,12 @@ def _change_light(emitter, changed: Mapping[str, Values]) -> None:
     parameters.update()
 
 
-def _shining(emitter, like, changed: Mapping[str, Values]):
-    """Return the transform of a light that shines along a direction from a position."""
+def _shining(
+    emitter: mi.Emitter, like: mi.Transform4f, changed: Mapping[str, Values]
+) -> mi.Transform4f:
+    """Return the transform of a light with its new position and direction, of the type of the
+    transform `like`.
+    """
     matrix = matrix_of(emitter.world_transform())
     if "position" in changed:
         matrix[:3, 3] = changed["position"]
@@ -364,11 +372,11 @@ def _shining(emitter, like, changed: Mapping[str, Values]):
 # Media --------------------------------------------------------------------------------------------
 
 
-def _media(scene) -> list[Any]:
-    """Return the media of a scene: the one around the camera, and those that
-    shapes bound, each once.
+def _media(scene: mi.Scene) -> list[mi.Medium]:
+    """Return the media of a scene, each once: first the medium around the camera, then the media
+    that shapes bound.
     """
-    media: list[Any] = []
+    media: list[mi.Medium] = []
     # The order makes the names: `medium` is the one around the camera. Grids are left out: they
     # have no single extinction to change.
     around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
@@ -382,7 +390,7 @@ def _media(scene) -> list[Any]:
     return media
 
 
-def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
+def _of_medium(prefix: str, medium: mi.Medium) -> Iterable[Changeable]:
     parameters = mi.traverse(medium)
     if _is_height_fog(medium):
         yield from _of_layers(
@@ -406,12 +414,12 @@ def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
         yield Changeable(f"{prefix}.g", g, (1,), -0.99, 0.99)
 
 
-def _is_height_fog(medium) -> bool:
+def _is_height_fog(medium: mi.Medium) -> bool:
     return "sigma_t.H_1" in mi.traverse(medium)
 
 
 def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeable]:
-    """Yield the numbers of layers that are there, and the constant part."""
+    """Yield the constant part, and the numbers of the layers that have an extinction."""
     for name, value in numbers.items():
         part, layer = name.split("_")
         if layer == "0" or numbers[f"sigma_{layer}"] > (0.0,):
@@ -428,7 +436,7 @@ def _of_layers(prefix: str, numbers: Mapping[str, Values]) -> Iterable[Changeabl
             )
 
 
-def _change_medium(medium, changed: Mapping[str, Values]) -> None:
+def _change_medium(medium: mi.Medium, changed: Mapping[str, Values]) -> None:
     parameters = mi.traverse(medium)
     if "sigma_t" in changed:
         # The value that is set is the whole extinction: the old scale must not multiply it again.
@@ -451,14 +459,12 @@ def _change_medium(medium, changed: Mapping[str, Values]) -> None:
         raise InputError(f"--change: {error}") from error
 
 
-def _is_isotropic(medium) -> bool:
+def _is_isotropic(medium: mi.Medium) -> bool:
     return medium.phase_function().class_name() == "IsotropicPhaseFunction"
 
 
-def isotropic_media(scene) -> dict[str, str]:
-    """Return the ids of the isotropic media of a Mitsuba scene by the
-    names of their mean cosines.
-    """
+def isotropic_media(scene: mi.Scene) -> dict[str, str]:
+    """Return the ids of the isotropic media of a scene by the names of their mean cosines."""
     numbered = enumerate(_media(scene), 1)
     return {
         f"{_numbered('medium', number)}.g": medium.id()
@@ -467,7 +473,7 @@ def isotropic_media(scene) -> dict[str, str]:
     }
 
 
-def _set_colour(parameters, key: str, values: Values) -> None:
+def _set_colour(parameters: mi.SceneParameters, key: str, values: Values) -> None:
     kind = type(parameters[key])
     parameters[key] = kind(*values) if len(values) == 3 else kind(values[0])
 
@@ -475,8 +481,8 @@ def _set_colour(parameters, key: str, values: Values) -> None:
 # Isotropic media given a mean cosine --------------------------------------------------------------
 
 
-def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
-    """Return the Mitsuba scene of a dictionary, see `give_lobes`."""
+def scene_with_lobes(description: Plugin, lobes: Mapping[str, float]) -> mi.Scene:
+    """Return the scene of a dictionary, see `give_lobes`."""
     config = mi.parser.ParserConfig(mi.variant())
     # Merged meshes would lose their names, as in `load_scene`.
     config.merge_meshes = False
@@ -491,13 +497,13 @@ def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
     return scene
 
 
-def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:
-    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions, mean cosines
-    by the ids of the media.
+def give_lobes(state: mi.parser.ParserState, lobes: Mapping[str, float]) -> None:
+    """Give isotropic media of a parsed scene Henyey-Greenstein phase functions; `lobes`: their mean
+    cosines by the ids of the media.
 
-    Mitsuba changes the numbers of a phase function that it has built, not its kind: its description
-    is changed before. A medium that has no description of its own, as part of a shape that was
-    built before, is refused.
+    Mitsuba can change the numbers of a phase function that it has built, not its kind: the
+    description is changed before. Raises InputError for a medium without a description, which is
+    part of a shape that was built before.
     """
     for name, g in lobes.items():
         phase = _isotropic_phase(state, name)
@@ -509,9 +515,9 @@ def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:
         phase["g"] = g
 
 
-def _isotropic_phase(state: Any, name: str) -> Any:
-    """Return the properties of the phase function of a medium, None where
-    there are none to change.
+def _isotropic_phase(state: mi.parser.ParserState, name: str) -> mi.Properties | None:
+    """Return the properties of the isotropic phase function of a medium; None where the parsed
+    scene has none.
     """
     nodes = [node.props for node in state.nodes]
     for medium in nodes:

@@ -106,7 +106,7 @@ def parameters_of(
     if engine == "playcanvas":
         return {"density": sigma_t, "heightBase": base, "heightFalloff": 1 / scale}
     factor = _UNREAL * (0.5 if engine == "unreal-volumetric" else LN2**2)
-    found = {
+    numbers = {
         "FogDensity": sigma_t / factor,
         "FogHeightFalloff": 10 / (scale * LN2),
         "FogHeight": base,
@@ -114,12 +114,12 @@ def parameters_of(
     # The second layer of Unreal has its height relative to the first.
     if len(layers) == 2:
         sigma_t, other, scale = layers[1]
-        found["SecondFogDensity"] = sigma_t / factor
-        found |= {
+        numbers["SecondFogDensity"] = sigma_t / factor
+        numbers |= {
             "SecondFogHeightFalloff": 10 / (scale * LN2),
             "SecondFogHeightOffset": other - base,
         }
-    return found
+    return numbers
 
 
 def _is_clamped(engine: str) -> bool:

@@ -26,15 +26,17 @@ Mitsuba knows the volume once a scene was loaded, or `register_height_fog`
 was called for its variant.
 """
 
+from __future__ import annotations
+
 import math
 from functools import cache
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from airlight.reference.scene.transforms import matrix_of
+from airlight.validation.arrays import Array
 from airlight.validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
@@ -51,13 +53,13 @@ def _register(variant: str) -> None:
         """Exponential layers over a floor and under a cap."""
 
         def __init__(self, props):
-            given, self._clamped = _given(props)
+            numbers, self._clamped = _layers(props)
             # Mitsuba samples distances within the box of `to_world`: the wide box replaces the one
             # of the file, which gives floor and cap only.
             floor, cap, up, box = _box(props)
             props["to_world"] = mi.ScalarAffineTransform4d(box)
             mi.Volume.__init__(self, props)
-            self._numbers = {name: mi.Float(value) for name, value in given.items()}
+            self._numbers = {name: mi.Float(value) for name, value in numbers.items()}
             self._ends = {"floor": mi.Float(floor), "cap": mi.Float(cap)}
             self._up = mi.Vector3f(*up)
             # Opaque numbers are inputs of compiled kernels: a change of the fog compiles nothing
@@ -66,13 +68,13 @@ def _register(variant: str) -> None:
             self.parameters_changed()
 
         def parameters_changed(self, keys=()):
-            given = {name: float(value[0]) for name, value in self._numbers.items()}
+            numbers = {name: float(value[0]) for name, value in self._numbers.items()}
             # Delta tracking needs a bound that no evaluation in float32 exceeds.
             above = 1 + 1e-5  # what float32 may add to the largest density
             self._largest = above * _checked_largest(
-                given, self._clamped, float(self._ends["floor"][0])
+                numbers, self._clamped, float(self._ends["floor"][0])
             )
-            self._layers = [i for i in "12" if given[f"sigma_{i}"] > 0]
+            self._layers = [i for i in "12" if numbers[f"sigma_{i}"] > 0]
 
         def eval_1(self, it, active=True):
             # The axis up is an axis of coordinates with a sign, so the dot product is the height
@@ -109,27 +111,29 @@ def _register(variant: str) -> None:
     mi.register_texture("heightfog", HeightFog)
 
 
-def _given(props: Any) -> tuple[dict[str, float], bool]:
+def _layers(props: mi.Properties) -> tuple[dict[str, float], bool]:
     """Return the numbers of the layers, and whether they are clamped, from numbers or
     from an engine's parameters.
     """
     if "engine" not in props:
-        given = {name: float(props.get(name, 0.0)) for name in NUMBERS}
-        return given, bool(props.get("clamped", False))
+        numbers = {name: float(props.get(name, 0.0)) for name in NUMBERS}
+        return numbers, bool(props.get("clamped", False))
     engine = str(props["engine"])
     # A parameter that the engine has but the file does not give keeps the engine's default.
     names = ENGINES[engine]["parameters"] if engine in ENGINES else ()
     layers, clamped = layers_of(
         engine, {name: float(props[name]) for name in names if name in props}
     )
-    given = dict.fromkeys(NUMBERS, 0.0)
+    numbers = dict.fromkeys(NUMBERS, 0.0)
     for i, layer in enumerate(layers, 1):
-        given |= dict(zip((f"sigma_{i}", f"z_{i}", f"H_{i}"), layer, strict=True))
-    return given, clamped
+        numbers |= dict(zip((f"sigma_{i}", f"z_{i}", f"H_{i}"), layer, strict=True))
+    return numbers, clamped
 
 
-def _box(props: Any) -> tuple[float, float, list[float], Any]:
-    """Return floor, cap, the unit vector up, and the transform of the box that Mitsuba gets."""
+def _box(props: mi.Properties) -> tuple[float, float, list[float], Array]:
+    """Return floor and cap [m], the unit vector up, (3,), and the transform of the box that
+    Mitsuba gets, (4, 4) [m].
+    """
     if "to_world" not in props:
         raise ValueError(
             "heightfog has no to_world; expected the box of the fog: the unit cube from its floor "
@@ -166,11 +170,11 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
     return floor, floor + height, [float(each) for each in up], box
 
 
-def _checked_largest(given: dict[str, float], clamped: bool, floor: float) -> float:
+def _checked_largest(numbers: dict[str, float], clamped: bool, floor: float) -> float:
     """Return the largest density, that at the floor [1/m]; refuse numbers that make no fog."""
-    total = given["sigma_0"]
+    total = numbers["sigma_0"]
     for i in "12":
-        sigma_t, base, scale = (given[f"{name}_{i}"] for name in ("sigma", "z", "H"))
+        sigma_t, base, scale = (numbers[f"{name}_{i}"] for name in ("sigma", "z", "H"))
         if sigma_t and not scale > 0:
             raise ValueError(
                 f"heightfog has sigma_{i} = {sigma_t:g} and H_{i} = {scale:g}; expected a scale "
@@ -183,11 +187,11 @@ def _checked_largest(given: dict[str, float], clamped: bool, floor: float) -> fl
             above = (max(floor - base, 0.0) if clamped else floor - base) / scale
             total += sigma_t * (math.exp(-above) if above > -700 else math.inf)
     # Written with `not >= 0` so that NaN is refused too.
-    negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not given[name] >= 0]
+    negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not numbers[name] >= 0]
     if negative:
         raise ValueError(
-            f"heightfog has {negative[0]} = {given[negative[0]]:g}; expected an extinction of 0 or "
-            "more"
+            f"heightfog has {negative[0]} = {numbers[negative[0]]:g}; expected an extinction of 0 "
+            "or more"
         )
     if not total < 1e9:
         raise ValueError(

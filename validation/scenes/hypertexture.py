@@ -137,7 +137,7 @@ def inside(mesh: Mesh, points: Array) -> Bools:
     x, y = x + 1e-7 * (x[1] - x[0]), y + 1.7e-7 * (y[1] - y[0])
     # The columns of the lattice whose x and y lie within the bounding rectangle of each triangle:
     # `_low` is the first of them, `_high` the one after the last.
-    ends = [np.searchsorted(own, corners[:, :, axis]) for axis, own in enumerate((x, y))]
+    ends = [np.searchsorted(columns, corners[:, :, axis]) for axis, columns in enumerate((x, y))]
     (x_low, x_high), (y_low, y_high) = ((end.min(axis=1), end.max(axis=1)) for end in ends)
     triangle = np.repeat(np.arange(len(faces)), (x_high - x_low) * (y_high - y_low))
     # One entry for each pair of a triangle and a column of its rectangle; `number` counts the pairs

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loading of scenes by name or by path; input is checked before any work is done."""
 
+from __future__ import annotations
+
 import hashlib
 import os
 import re
@@ -11,7 +13,6 @@ from functools import lru_cache
 from itertools import count
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import mitsuba as mi
 
@@ -39,7 +40,7 @@ class LoadedScene:
     """A Mitsuba scene and where it came from."""
 
     name: str  #: name of the built-in or random scene, or stem of the file
-    scene: Any  #: the `mi.Scene`
+    scene: mi.Scene
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that it stands for; empty for a file
     path: Path | None = None  #: of the file; None for a built-in or random scene
@@ -54,8 +55,9 @@ def load_scene(
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 
     `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a
-    Mitsuba scene file; `size`: width and height of the image [pixels]; the scene's own by default;
-    `changes`: what is not as the scene has it, values by name, see `validation.scenes.changes`.
+    Mitsuba scene file; `size`: width and height of the image [pixels], by default the size that the
+    scene has; `changes`: values by name that replace those of the scene, see
+    `validation.scenes.changes`.
 
     Raises InputError for an unknown name, a missing or malformed file, a size that no image can
     have, and a change that the scene cannot have. Whether methods and reference support the scene
@@ -81,7 +83,7 @@ def load_scene(
         loaded = LoadedScene(
             path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
         )
-    # Mitsuba builds no phase function of a g that is refused here.
+    # Changes are checked first: Mitsuba must not build a phase function of an impossible g.
     if changes:
         checked_changes(loaded.scene, changes)
     # The g of an isotropic medium has no parameter to set: such a scene is built again with phase
@@ -108,7 +110,7 @@ def load_scene(
 
 
 def find_record(name: str) -> SceneRecord | None:
-    """Return the record of a built-in or random scene, None for what must be a path."""
+    """Return the record of a built-in or random scene; None where the name must be a path."""
     if not is_random(name):
         return SCENES.get(name)
     from airlight.validation.scenes.random.scene import random_record
@@ -126,11 +128,11 @@ def scene_stem(name_or_path: str) -> str:
 
 
 def scene_identity(scene: str) -> str:
-    """Return the identity of a scene: a name or seed with a digest of its description, the
+    """Return the identity of a scene: its name or seed with a digest of its description, or the
     digest of a file's scene.
 
-    A scene that has no digest has an identity of its own each time: what is made of
-    it is never found again.
+    A scene that has no digest has another identity each time: no result that is made of it is
+    found again.
     """
     if scene in SCENES:
         return f"{scene} {SCENES[scene].digest}"
@@ -220,7 +222,7 @@ def _check_films(loaded: LoadedScene) -> None:
             )
 
 
-def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
+def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> mi.Scene:
     from airlight.validation.scenes.files.read import read_file
 
     scene = read_file(path, lobes)
@@ -235,10 +237,8 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
     return scene
 
 
-def name_shapes(scene) -> None:
-    """Name the shapes of a Mitsuba scene that have no id, such as 'sphere-2':
-    messages and copies need names.
-    """
+def name_shapes(scene: mi.Scene) -> None:
+    """Give shapes that have no id a name, such as 'sphere-2': messages and copies need names."""
     taken = {shape.id() for shape in scene.shapes()}
     for number, shape in enumerate(scene.shapes(), 1):
         if not shape.id():
@@ -248,8 +248,8 @@ def name_shapes(scene) -> None:
             taken.add(shape.id())
 
 
-def resize(scene, size: tuple[int, int]) -> None:
-    """Set the image size of all cameras of a Mitsuba scene in place, width and height [pixels]."""
+def resize(scene: mi.Scene, size: tuple[int, int]) -> None:
+    """Set the image size of all cameras of a scene in place, width and height [pixels]."""
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(
             f"size: got {size[0]}x{size[1]}, expected at least 1x1 and at most {_LARGEST} pixels "

@@ -169,9 +169,9 @@ def icosphere(levels: int) -> Mesh:
     vertices = vertices / np.linalg.norm(vertices[0])
     # Only the midpoints are new; they are moved out to the unit sphere.
     for _ in range(levels):
-        known = len(vertices)
+        count = len(vertices)
         vertices, faces = divided((vertices, faces))
-        vertices[known:] /= np.linalg.norm(vertices[known:], axis=1, keepdims=True)
+        vertices[count:] /= np.linalg.norm(vertices[count:], axis=1, keepdims=True)
     return vertices, faces
 
 
@@ -288,8 +288,8 @@ def pierced(
     hole,
     cells: tuple[int, int],
 ) -> Mesh:
-    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0]
-    of which touch the hole.
+    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, of which cells[0] touch
+    the hole.
 
     A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal
     across x up. The hole has the position of its centre along `across` and along `up`, as fractions

@@ -8,8 +8,9 @@ a triangle and the planes of a silhouette need the fourth power of a coordinate:
 by coefficients, so its limit is lower than the type's.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -26,13 +27,12 @@ _NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
 _PLACES = ("z_1", "z_2", "floor", "cap", "up")  # of height fog
 _CUTOFF = "cutoff_angle"  # of spots, half of the cone [degrees]
 
-_CLIP = ("near_clip", "far_clip")  # no method takes them, see `validation.scenes.files.camera`
-_NO_MATTER = ("vertex_texcoords",)
+_CLIP = ("near_clip", "far_clip")  # no method uses them, see `validation.scenes.files.camera`
+_UNUSED = ("vertex_texcoords",)
 
 
-def check_numbers(scene: Any) -> None:
-    """Refuse an `mi.Scene` with a number that no image can be computed from,
-    by the name of its part.
+def check_numbers(scene: mi.Scene) -> None:
+    """Refuse a scene with a number that no image can be computed from, by the name of its part.
 
     A scene whose lengths are lost in its coordinates is refused too (`realtime.scene.rounding`).
     """
@@ -47,9 +47,9 @@ def check_numbers(scene: Any) -> None:
     check_rounding(scene)
 
 
-def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the parts of a scene under names that a user knows; media first, which
-    are parts of others too.
+def _plugins(scene: mi.Scene) -> Iterator[tuple[str, mi.Object]]:
+    """Yield the parts of a scene with names that a user knows; media first, which are parts of
+    others too.
     """
     # Media are checked under their own names before the shapes and cameras that hold them.
     media = [sensor.get_medium() for sensor in scene.sensors()]
@@ -67,13 +67,13 @@ def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
                 yield _name(kind, plugin, number), plugin
 
 
-def _name(kind: str, plugin: Any, number: int) -> str:
+def _name(kind: str, plugin: mi.Object, number: int) -> str:
     return f"{kind} '{plugin.id()}'" if plugin.id() else f"{kind} {number}"
 
 
-def _parameter(parameters: Any, key: str) -> Any:
-    """Return a parameter, None where a plugin has none in its place, at which
-    Mitsuba's own look-up fails.
+def _parameter(parameters: mi.SceneParameters, key: str) -> object:
+    """Return a parameter; None where a plugin has no value for it, on which Mitsuba's look-up
+    fails.
     """
     try:
         return parameters[key]
@@ -81,13 +81,13 @@ def _parameter(parameters: Any, key: str) -> Any:
         return None
 
 
-def _numbers(value: Any) -> Array | None:
-    """Return the numbers of a parameter, None where it has none."""
+def _numbers(value: object) -> Array | None:
+    """Return the numbers of a parameter; None where it has none."""
     if value is None:
         return None
     # By the name of the type: a colour has a `matrix` too, a swizzle that holds its
     # first channel six times.
-    matrix = value.matrix if "Transform" in type(value).__name__ else value
+    matrix = getattr(value, "matrix", value) if "Transform" in type(value).__name__ else value
     try:
         return np.array(matrix, dtype=np.float64)
     except (TypeError, ValueError):
@@ -96,7 +96,7 @@ def _numbers(value: Any) -> Array | None:
 
 def _check(name: str, key: str, values: Array) -> None:
     words = key.split(".")
-    if words[-1] in _NO_MATTER:
+    if words[-1] in _UNUSED:
         return
     if words[-1] == _CUTOFF and not np.all((values > 0) & (values < 90)):
         raise InputError(
@@ -119,7 +119,7 @@ def _check(name: str, key: str, values: Array) -> None:
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
         # The message names the number of bad places: a mesh has thousands of coordinates.
-        way = (
+        advice = (
             "a medium scatters no more than arrives"
             if "albedo" in words
             else "use other units, or the right sign"
@@ -129,7 +129,7 @@ def _check(name: str, key: str, values: Array) -> None:
         wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:.3g}"
         raise InputError(
             f"{name}: {key.removesuffix('.value').removesuffix('.value')} has {given}; expected "
-            f"{wanted}: {way}"
+            f"{wanted}: {advice}"
         )
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))
@@ -148,8 +148,8 @@ def _check_transform(name: str, key: str, matrix: Array) -> None:
         )
 
 
-def _check_faces(name: str, parameters: Any) -> None:
-    """Refuse triangles of vertices that are not there."""
+def _check_faces(name: str, parameters: mi.SceneParameters) -> None:
+    """Refuse triangles with vertices that the mesh does not have."""
     faces = np.array(parameters["faces"], dtype=np.int64)
     count = len(np.array(parameters["vertex_positions"])) // 3
     if faces.size and faces.max() >= count:

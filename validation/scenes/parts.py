@@ -3,6 +3,8 @@
 functions, lights and cameras.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,8 +16,13 @@ from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.validation.scenes.meshes import Mesh
 
+#: The dictionary of a Mitsuba plugin, as `mi.load_dict` takes it: 'type' has the name of the
+#: plugin, and other keys its properties (numbers, words, lists of numbers, transforms) and the
+#: plugins within it, as such dictionaries or as Mitsuba's own objects.
+Plugin = dict[str, object]
 
-def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
+
+def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]) -> mi.Mesh:
     """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB
     `reflectance` [1], 0 to 1.
     """
@@ -23,24 +30,25 @@ def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
     return mesh_with_material(name, mesh, {"type": "twosided", "bsdf": diffuse})
 
 
-def mesh_with_material(name: str, mesh: Mesh, material):
-    """Return a Mitsuba mesh with flat shading and a `material`, a dictionary or Mitsuba's own."""
+def mesh_with_material(name: str, mesh: Mesh, material: Plugin | mi.BSDF) -> mi.Mesh:
+    """Return a Mitsuba mesh with flat shading and a `material`."""
     return _mesh(name, mesh, {"mesh_bsdf": material})
 
 
-def medium_boundary(name: str, mesh: Mesh, medium: Any, around: Any = None):
-    """Return a Mitsuba mesh of the material `null` with a medium inside, and outside
-    where that is not vacuum.
+def medium_boundary(
+    name: str, mesh: Mesh, medium: Plugin | mi.Medium, around: mi.Medium | None = None
+) -> mi.Mesh:
+    """Return a Mitsuba mesh of the material `null` that bounds a medium.
 
-    Media are dictionaries or Mitsuba's own.
+    `around`: the medium outside; None for vacuum.
     """
     # A medium of a dictionary gets an id, so that messages and changes can name it.
     inside = medium | {"id": f"{name}-medium"} if isinstance(medium, dict) else medium
-    outside = {} if around is None else {"exterior": around}
-    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": inside} | outside)
+    plugins: Plugin = {"mesh_bsdf": {"type": "null"}, "interior": inside}
+    return _mesh(name, mesh, plugins if around is None else plugins | {"exterior": around})
 
 
-def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
+def _mesh(name: str, mesh: Mesh, plugins: Plugin) -> mi.Mesh:
     properties = mi.Properties()
     for key, plugin in plugins.items():
         properties[key] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
@@ -55,8 +63,8 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, Any]):
 
 
 def fog(
-    sigma_t: float | Sequence[float], albedo: Sequence[float], phase: dict[str, Any] | None = None
-) -> dict[str, Any]:
+    sigma_t: float | Sequence[float], albedo: Sequence[float], phase: Plugin | None = None
+) -> Plugin:
     """Return a homogeneous medium with the id 'fog', of grey or RGB extinction
     [1/m], isotropic by default.
     """
@@ -81,8 +89,8 @@ def height_fog(
     cap: float,
     *,
     albedo: Sequence[float],
-    phase: dict[str, Any],
-) -> dict[str, Any]:
+    phase: Plugin,
+) -> Plugin:
     """Return height fog with the id 'fog': one or two layers of extinction [1/m],
     base and scale height [m].
 
@@ -105,8 +113,8 @@ def height_fog(
     }
 
 
-def phase_function(words: str, values: int) -> dict[str, Any]:
-    """Return a phase function from words such as 'hg:0.37', a table of `values` where
+def phase_function(words: str, values: int) -> Plugin:
+    """Return a phase function from words such as 'hg:0.37'; a table of so many `values` where
     Mitsuba has no other plugin.
     """
     name, _, number = words.partition(":")
@@ -115,9 +123,8 @@ def phase_function(words: str, values: int) -> dict[str, Any]:
     return {"type": name} if name in ("isotropic", "rayleigh") else tabulated_phase(words, values)
 
 
-def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
-    """Return any phase function as a table, which Mitsuba and both readers of scenes take;
-    'mie' has no other plugin.
+def tabulated_phase(words: str, values: int = 2001) -> Plugin:
+    """Return any phase function as a table, which Mitsuba and both readers of scenes take.
 
     Each value is the mean of the function under the hat of its cosine: the table has the same mean,
     1, is nowhere below 0, and blurs a peak by a cell, which beside the forward direction is the
@@ -148,40 +155,51 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
     return {"type": "tabphase", "values": ", ".join(repr(float(value)) for value in hats)}
 
 
-def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
-    """Return a light of a type and a colour, RGB.
+def light(type: str, colour: Sequence[float], **properties: Any) -> Plugin:
+    """Return a light of a type and a colour, RGB, by the keys of a scene's table.
 
     'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk',
-    'sphere' and 'sky' a radiance [W/(m^2 sr)]. All but sun and sky need a `position`; all but these
-    and points a `target`. A spot needs the half angles `cutoff` and `beam` [degrees], and perhaps
-    `up`; a sun the `direction` of its light; others `size`, and `opaque`, which is false for a
-    light that only shines.
+    'sphere' and 'sky' a radiance [W/(m^2 sr)]. All but sun and sky need a `position`, (3,) [m]; all
+    but these and points a `target`, (3,) [m]. A spot needs the half angles `cutoff` and `beam`
+    [degrees], and perhaps `up`; a sun the `direction` of its light; others the `size` as of
+    `area_lamp`, and `opaque`, which is false for a light that only shines.
     """
     match type:
         case "point":
-            return point_light(given["position"], colour)
+            return point_light(properties["position"], colour)
         case "spot":
-            aim = {
-                "origin": given["position"],
-                "target": given["target"],
-                "up": given.get("up", [0, 0, 1]),
-            }
-            return {
-                "type": "spot",
-                "to_world": mi.ScalarTransform4f().look_at(**aim),
-                "cutoff_angle": given["cutoff"],
-                "beam_width": given["beam"],
-                "intensity": {"type": "rgb", "value": list(colour)},
-            }
+            return spot_light(colour, **properties)
         case "sun":
-            return sun(given["direction"], colour)
+            return sun(properties["direction"], colour)
         case "sky":
             return sky(colour)
-    lamp = area_lamp(type, given["position"], given["target"], given["size"], colour)
-    return lamp if given.get("opaque", True) else lamp | {"material": {"type": "null"}}
+    lamp = area_lamp(type, properties["position"], properties["target"], properties["size"], colour)
+    return lamp if properties.get("opaque", True) else lamp | {"material": {"type": "null"}}
 
 
-def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:
+def spot_light(
+    intensity: Sequence[float],
+    *,
+    position: Sequence[float],
+    target: Sequence[float],
+    cutoff: float,
+    beam: float,
+    up: Sequence[float] = (0, 0, 1),
+) -> Plugin:
+    """Return a spot at a `position` that shines at a `target`, (3,) each [m], with an RGB
+    `intensity` [W/sr]; `cutoff` and `beam` are half angles [degrees].
+    """
+    aim = mi.ScalarTransform4f().look_at(origin=list(position), target=list(target), up=list(up))
+    return {
+        "type": "spot",
+        "to_world": aim,
+        "cutoff_angle": cutoff,
+        "beam_width": beam,
+        "intensity": {"type": "rgb", "value": list(intensity)},
+    }
+
+
+def point_light(position: Sequence[float], intensity: Sequence[float]) -> Plugin:
     """Return a point light at `position`, (3,) [m], with the RGB `intensity`, (3,) [W/sr]."""
     return {
         "type": "point",
@@ -190,18 +208,18 @@ def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[s
     }
 
 
-def sun(travels: Sequence[float], irradiance: Sequence[float]) -> dict[str, Any]:
-    """Return a directional light that travels in a direction, (3,), with an RGB
+def sun(direction: Sequence[float], irradiance: Sequence[float]) -> Plugin:
+    """Return a directional light that travels in a `direction`, (3,), with an RGB
     `irradiance` across it [W/m^2].
     """
     return {
         "type": "directional",
-        "direction": [float(part) for part in np.asarray(travels) / np.linalg.norm(travels)],
+        "direction": [float(part) for part in np.asarray(direction) / np.linalg.norm(direction)],
         "irradiance": {"type": "rgb", "value": list(irradiance)},
     }
 
 
-def sky(radiance: Sequence[float]) -> dict[str, Any]:
+def sky(radiance: Sequence[float]) -> Plugin:
     """Return a sky of constant RGB `radiance`, (3,) [W/(m^2 sr)]."""
     return {"type": "constant", "radiance": {"type": "rgb", "value": list(radiance)}}
 
@@ -212,12 +230,12 @@ def area_lamp(
     target: Sequence[float],
     size: float | Sequence[float],
     radiance: Sequence[float],
-) -> dict[str, Any]:
+) -> Plugin:
     """Return a black area light of constant RGB radiance [W/(m^2 sr)].
 
-    It is a 'rectangle' or 'disk', which shine on one side, or a 'sphere', its middle at a position,
-    facing a target, (3,) each [m]. The size is the radius, or half of both sides of a rectangle
-    [m].
+    The `shape` is 'rectangle' or 'disk', which shine on one side, or 'sphere'. Its middle is at the
+    `position`, and it faces the `target`, (3,) each [m]. The `size` is the radius [m], or half of
+    each side of a rectangle, (2,) [m].
     """
     across, up = (size, size) if isinstance(size, float) else size
     turned = mi.ScalarTransform4f().look_at(
@@ -238,13 +256,13 @@ def camera(
     fov: float,
     size: tuple[int, int],
     in_fog: bool = True,
-) -> dict[str, Any]:
+) -> Plugin:
     """Return a perspective sensor at an origin that looks at a target, (3,) each [m]; its up is z.
 
     The field of view is horizontal [degrees], the size in pixels. The camera is in the
     medium 'fog' or in vacuum.
     """
-    medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
+    medium: Plugin = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
     return medium | {
         "type": "perspective",
         "fov": fov,

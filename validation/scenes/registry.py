@@ -46,11 +46,14 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
+from airlight.validation.arrays import Array
 from airlight.validation.scenes import cloud_meshes, meshes
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
 from airlight.validation.scenes.parts import (
+    Plugin,
     camera,
     fog,
     height_fog,
@@ -66,8 +69,9 @@ FILES = tuple(
     for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
 )
 
+#: A table of a scene's file, with the keys of the module: their values are numbers, words, lists
+#: and tables, as the function of a key takes them.
 Table = dict[str, Any]
-
 
 _COPYING = ("copies", "first", "step", "of", "sunflower", "colours")
 _PLACING = ("name", "mesh", "waves", "scale", "turn", "at", "polar", "reflectance", "medium")
@@ -100,17 +104,13 @@ class SceneRecord:
     """A built-in scene."""
 
     name: str
-    #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
-    build: Callable[[], dict[str, Any]]
+    build: Callable[[], Plugin]  #: the dictionary of the scene; needs an active Mitsuba variant
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
     varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
-    clouds: bool = (
-        #: whether light is scattered many times: then `cloud-paths` is its
-        #: reference, and few methods fit
-        False
-    )
+    #: whether light is scattered many times: its reference is `cloud-paths`, and few methods fit
+    clouds: bool = False
     digest: str = ""  #: of its description
     many: bool = False  #: whether it has many lights, among which methods choose
 
@@ -142,8 +142,8 @@ def _record(name: str, table: Table) -> SceneRecord:
     )
 
 
-def _build(table: Table) -> dict[str, Any]:
-    scene: dict[str, Any] = {"type": "scene"}
+def _build(table: Table) -> Plugin:
+    scene: Plugin = {"type": "scene"}
     # The medium comes first: the camera and boundaries refer to it by its id 'fog'.
     if "fog" in table:
         scene["fog"] = _medium(table["fog"])
@@ -168,17 +168,20 @@ def _lights(entries: Iterable[Table]) -> Iterator[Table]:
         if "swarm" not in entry:
             yield entry
             continue
-        own = dict(entry)
-        swarm = own.pop("swarm")
+        shared = dict(entry)
+        swarm = shared.pop("swarm")
         # Seeded: the swarm is the same on every machine, as a file with every light written out
         # would be.
         rng = np.random.default_rng(swarm["seed"])
         places = rng.uniform(swarm["low"], swarm["high"], (swarm["count"], 3))
-        colours = np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * own["colour"]
+        colours = (
+            np.exp(swarm["spread"] * rng.standard_normal((swarm["count"], 1))) * shared["colour"]
+        )
         for number, (place, colour) in enumerate(
             zip(places.tolist(), colours.tolist(), strict=True)
         ):
-            yield own | {"name": f"{own['name']}-{number}", "position": place, "colour": colour}
+            name = f"{shared['name']}-{number}"
+            yield shared | {"name": name, "position": place, "colour": colour}
 
 
 def copies(entries: Iterable[Table]) -> Iterator[Table]:
@@ -200,19 +203,20 @@ def copies(entries: Iterable[Table]) -> Iterator[Table]:
 
 
 def _plus(value: Any, step: Any, times: int) -> Any:
+    """Return a number or a list of numbers plus `times` a `step` of its shape; None for no step."""
     if step is None:
         return value
     if isinstance(value, list):
-        return [_plus(own, added, times) for own, added in zip(value, step, strict=True)]
+        return [_plus(number, added, times) for number, added in zip(value, step, strict=True)]
     return value + times * step
 
 
 def _seed(entry: Table, number: int) -> Table:
-    """Return place, kind, size, turn and colour of a seed of a sunflower, a
-    spiral that is a little flat.
+    """Return place, kind, size, turn and colour of a seed of a sunflower, whose spiral is a
+    little flat.
     """
-    # Vogel's spiral: the golden angle of 137.50776 degrees and radii as the square root of the
-    # number.
+    # Vogel's spiral: the golden angle of 137.50776 degrees, and radii in proportion to the square
+    # root of the number.
     distance, angle = 0.419 * math.sqrt(number + 2.3), math.radians(137.50776 * number + 21.7)
     x, y, z = entry["at"]
     return {
@@ -225,17 +229,16 @@ def _seed(entry: Table, number: int) -> Table:
 
 
 def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
-    """Return the mesh of a shape, a part or a kind, where it is."""
+    """Return the mesh of a shape, a part or a kind at its place."""
     if "parts" in entry:
         mesh = joined([mesh_of(part, kinds) for part in copies(entry["parts"])])
     else:
         # Keys that place a mesh are used below; all other keys are arguments of the function that
         # makes it.
-        name, given = (
-            entry["mesh"],
-            {key: value for key, value in entry.items() if key not in _PLACING},
-        )
-        mesh = mesh_of({**kinds[name], **given}, {}) if name in kinds else MESHES[name](**given)
+        name = entry["mesh"]
+        arguments = {key: value for key, value in entry.items() if key not in _PLACING}
+        kind = kinds.get(name)
+        mesh = MESHES[name](**arguments) if kind is None else mesh_of(kind | arguments, {})
     # In this order: waves bend the mesh about its own origin, then come scale, turn and place.
     if "waves" in entry:
         mesh = bent(mesh[0], entry["waves"]), mesh[1]
@@ -254,7 +257,7 @@ def mesh_of(entry: Table, kinds: Mapping[str, Table]) -> Mesh:
     )
 
 
-def _medium(table: Table, shape: str = "") -> dict[str, Any]:
+def _medium(table: Table, shape: str = "") -> Plugin:
     # 20001 values of a tabulated phase function: glory and fogbow are blurred by less than 0.1
     # degrees.
     phase = phase_function(table.get("phase", "isotropic"), 20001)
@@ -267,9 +270,9 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
     if "smoke" in table:
         from airlight.validation.scenes.smoke import smoke
 
-        given = dict(table["smoke"])
-        low, high = np.array(given.pop("low")), np.array(given.pop("high"))
-        density = smoke(low, high, **given)
+        arguments = dict(table["smoke"])
+        low, high = np.array(arguments.pop("low")), np.array(arguments.pop("high"))
+        density = smoke(low, high, **arguments)
     elif "density" in table:
         density, low, high = _density(shape, json.dumps(table["density"]))
     else:
@@ -282,10 +285,13 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
 
 
 @cache
-def _density(mesh: str, given: str) -> Any:
+def _density(mesh: str, arguments: str) -> tuple[NDArray[np.float32], Array, Array]:
+    """Return the densities of a cloud in a mesh and the corners of their box, see `hypertexture`;
+    its `arguments` are JSON.
+    """
     from airlight.validation.scenes.hypertexture import hypertexture
 
-    return hypertexture(MESHES[mesh](), **json.loads(given))
+    return hypertexture(MESHES[mesh](), **json.loads(arguments))
 
 
 #: The built-in scenes by name; `FOG_SCENES` are the scenes of homogeneous fog with few lights.

@@ -25,7 +25,7 @@ sqrt((rms^2 - mean^2)/2).
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -42,33 +42,37 @@ from airlight.validation.slab.request import SlabRequest
 # light through a plane: amount, mean and rms displacement
 Exit = tuple[float | None, float | None, float | None]
 
+#: Numbers by name as above, in dictionaries and lists; None where one is unknown.
+Numbers = dict[str, "Part"]
+Part = float | str | None | list["Part"] | Numbers
+
 #: Streams in each hemisphere: the first of these that leaves less than 1e-4 of the phase function
 #: to the peak.
 STREAMS = (64, 96, 128)
 #: Keys of a row that identify it and are no numbers of the light.
-_GIVEN = ("orders", "depth", "mu", "phi")
+_IDENTITY = ("orders", "depth", "mu", "phi")
 
 
 def slab_numbers(
     request: SlabRequest, *, photons: int = 0, seed: int = 0, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Return all numbers of a slab, see the module; None where nothing is known, such as
-    the mean place of no light.
+    """Return all numbers of a slab, see the module; None where one is unknown, such as the mean
+    place of no light.
     """
-    tell = progress or (lambda fraction, what: None)
-    tell(0.0, "orders")
+    report = progress or (lambda fraction, what: None)
+    report(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
     # The second run is coarser, and its change is the error of the first.
     nodes = 8
-    numbers, others = (
-        _numbers(request, streams, nodes),
-        _numbers(request, 3 * streams // 4, nodes - 2),
-    )
-    record: dict[str, Any] = {
-        **{name: getattr(request, name) for name in ("tau", "sun", "albedo")},
+    fine = _numbers(request, streams, nodes)
+    coarse = _numbers(request, 3 * streams // 4, nodes - 2)
+    numbers: Numbers = {
+        "tau": request.tau,
+        "sun": request.sun,
+        "albedo": request.albedo,
         "phase": request.phase.name,
-        **numbers,
-        "error": _differences(numbers, others),
+        **fine,
+        "error": _differences(fine, coarse),
         "photons": None,
     }
     if photons:
@@ -76,16 +80,16 @@ def slab_numbers(
         slab = Slab(
             request.tau, request.mu0, request.albedo, request.phase.sampled(), request.depths
         )
-        estimate = slab_estimate(slab, request.ranges, photons=photons, seed=seed, progress=tell)
-        record["photons"] = {
+        estimate = slab_estimate(slab, request.ranges, photons=photons, seed=seed, progress=report)
+        numbers["photons"] = {
             "count": photons,
             "seed": seed,
             **_estimated(request, estimate, 0),
             "standard_error": _estimated(request, estimate, 1),
         }
-    tell(1.0, "done")
-    found: dict[str, Any] = plain(record)
-    return found
+    report(1.0, "done")
+    json_numbers: dict[str, Any] = plain(numbers)
+    return json_numbers
 
 
 def expected_seconds(request: SlabRequest, photons: int) -> float:
@@ -104,14 +108,16 @@ def needed_streams(phase: SlabPhase) -> int:
     return next((count for count in STREAMS if moments[2 * count] < 1e-4), STREAMS[-1])
 
 
-def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
-    given = request.tau, request.mu0, request.phase.deterministic, request.albedo
-    effort: dict[str, Any] = {"depths": request.depths, "streams": streams, "nodes": nodes}
-    slab = SlabOrders(*given, **effort)
+def _numbers(request: SlabRequest, streams: int, nodes: int) -> Numbers:
+    """Return the light of a slab, computed with so many streams in each hemisphere and nodes in
+    each panel of depth.
+    """
+    medium = request.tau, request.mu0, request.phase.deterministic, request.albedo
+    slab = SlabOrders(*medium, depths=request.depths, streams=streams, nodes=nodes)
     chosen, total = order_sets(slab, request.ranges)
     # The panels of depth end at the depths that were asked for; the nearest edge is the one.
     places = [int(np.argmin(np.abs(slab.panels.edges - depth))) for depth in request.depths]
-    orders = [
+    orders: list[Part] = [
         _order_row(
             name,
             request.depths,
@@ -121,11 +127,13 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
         )
         for name, edges in zip(request.orders, chosen, strict=True)
     ]
-    radiance: list[dict[str, float]] = []
+    radiance: list[Part] = []
     if request.depths and request.directions:
         # `slab_radiance` is for unit flux across the beam; pi times it is for a flux of pi.
         azimuths = [(mu, math.radians(phi)) for mu, phi in request.directions]
-        values = np.pi * slab_radiance(*given, directions=azimuths, **effort)
+        values = np.pi * slab_radiance(
+            *medium, directions=azimuths, depths=request.depths, streams=streams, nodes=nodes
+        )
         radiance = [
             {"depth": depth, "mu": mu, "phi": phi, "value": float(value)}
             for depth, row in zip(request.depths, values, strict=True)
@@ -134,7 +142,7 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
     # Light that was never scattered leaves at the lower face, too.
     direct = math.exp(-request.tau / request.mu0)
     # Fluxes of unit flux across the beam over mu0 are fractions of the flux that enters the slab.
-    whole = {
+    whole: Numbers = {
         "reflectance": float(total[UP, 0, 0]) / request.mu0,
         "transmittance": float(total[DOWN, 0, -1]) / request.mu0 + direct,
         "flux": [
@@ -158,16 +166,16 @@ def _exit(moments: Array, unit: float) -> Exit:
     return amount / unit, first / amount, math.sqrt(max(second / amount, 0.0))
 
 
-def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> dict[str, Any]:
+def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> Numbers:
     """Return the values of photons for 0, or their standard errors for 1."""
     exits, totals, flux = (
         part[which].tolist() for part in (estimate.exits, estimate.totals, estimate.flux)
     )
-    orders = [
+    orders: list[Part] = [
         _order_row(name, request.depths, reflected, transmitted, fluence)
         for name, (reflected, transmitted, *fluence) in zip(request.orders, exits, strict=True)
     ]
-    total = {
+    total: Numbers = {
         "reflectance": totals[0],
         "transmittance": totals[1],
         "flux": [
@@ -185,14 +193,14 @@ def _order_row(
     reflected: Exit,
     transmitted: Exit,
     fluence: Iterable[Exit],
-) -> dict[str, Any]:
-    row: dict[str, Any] = {
+) -> Numbers:
+    row: Numbers = {
         "orders": name,
         "reflectance": reflected[0],
         "transmittance": transmitted[0],
     }
-    for side, found in (("reflected", reflected), ("transmitted", transmitted)):
-        row |= {f"{side}_mean": found[1], f"{side}_rms": found[2]}
+    for side, (_, mean, rms) in (("reflected", reflected), ("transmitted", transmitted)):
+        row |= {f"{side}_mean": mean, f"{side}_rms": rms}
     within = zip(depths, fluence, strict=True)
     return row | {
         "fluence": [
@@ -201,16 +209,20 @@ def _order_row(
     }
 
 
-def _differences(numbers: Any, others: Any) -> Any:
-    """Return the same structure with the differences of its numbers; what a row is of stays."""
-    # Keys that identify a row stay; all else is compared, entry by entry.
-    if isinstance(numbers, Mapping):
+def _differences(fine: Part, coarse: Part) -> Part:
+    """Return the same structure with the differences of its numbers; the keys of rows stay."""
+    # Both sides have the same structure, entry by entry.
+    if isinstance(fine, dict) and isinstance(coarse, dict):
         return {
             name: value
-            if name in _GIVEN and not isinstance(value, list)
-            else _differences(value, others[name])
-            for name, value in numbers.items()
+            if name in _IDENTITY and not isinstance(value, list)
+            else _differences(value, coarse[name])
+            for name, value in fine.items()
         }
-    if isinstance(numbers, list):
-        return [_differences(*pair) for pair in zip(numbers, others, strict=True)]
-    return None if numbers is None or others is None else abs(numbers - others)
+    if isinstance(fine, list) and isinstance(coarse, list):
+        return [_differences(*pair) for pair in zip(fine, coarse, strict=True)]
+    if fine is None or coarse is None:
+        return None
+    assert isinstance(fine, int | float)
+    assert isinstance(coarse, int | float)
+    return abs(fine - coarse)

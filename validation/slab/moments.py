@@ -88,12 +88,17 @@ class SlabOrders:
         self._sines = np.sqrt((1 - mu) * (1 + mu))
         moments = phase.moments(2 * streams + 1)
         peak = float(moments[-1])  # what is left out when P becomes polynomials of degree 2 N - 1
-        self.albedo, self.peak, self.kept = albedo, peak, moments[:-1] - peak
+        self.albedo, self.peak, self.moments = albedo, peak, moments[:-1] - peak
         self.scatter = [self._scattering(m).T.copy() for m in (0, 1)]
 
     def _scattering(self, m: int) -> Array:
         """Return S of one mode as a matrix of streams, the beam last."""
-        mu, weights, albedo, moments = self.streams.mu, self.streams.weights, self.albedo, self.kept
+        mu, weights, albedo, moments = (
+            self.streams.mu,
+            self.streams.weights,
+            self.albedo,
+            self.moments,
+        )
         matrix = np.zeros((mu.size + 1, mu.size + 1))
         matrix[:-1, :-1] = albedo / 2 * mode_kernel(m, moments, mu, mu) * weights
         # From the beam to the streams; nothing but the peak is scattered into the beam.
@@ -116,10 +121,10 @@ class SlabOrders:
     def following(self, fields: Array) -> tuple[Array, Array]:
         """Return the fields of the next order, and its moments at the edges."""
         sources = np.empty_like(fields)
-        for m, own in enumerate(([B0, A0, C0], [B1, A1])):
+        for m, rows in enumerate(([B0, A0, C0], [B1, A1])):
             # In one product, which is faster than one for each.
-            sources[own] = (fields[own].reshape(-1, fields.shape[2]) @ self.scatter[m]).reshape(
-                sources[own].shape
+            sources[rows] = (fields[rows].reshape(-1, fields.shape[2]) @ self.scatter[m]).reshape(
+                sources[rows].shape
             )
         return self._carried(sources)
 
@@ -166,7 +171,7 @@ class _AllOrders:
     def __init__(self, slab: SlabOrders, m: int):
         self._scatter = slab.scatter[m]
         self._modes = Eigenmodes(
-            slab.streams, m, albedo=slab.albedo, moments=slab.kept, peak=slab.peak
+            slab.streams, m, albedo=slab.albedo, moments=slab.moments, peak=slab.peak
         )
         self._transport = Transport(slab.panels, self._modes.cosines)
         # The beam meets only the peak: its sum of orders fades as if the medium were

@@ -46,26 +46,26 @@ def phase_pair(name: str) -> PhasePair:
     if name.lower().endswith(".csv"):
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
-    known = phase_from_words(name)
+    phase = phase_from_words(name)
     # Henyey and Greenstein's function of g = 0 is isotropic.
-    if isinstance(known, analytic.Isotropic | analytic.HenyeyGreenstein):
-        g = known.g if isinstance(known, analytic.HenyeyGreenstein) else 0.0
+    if isinstance(phase, analytic.Isotropic | analytic.HenyeyGreenstein):
+        g = phase.g if isinstance(phase, analytic.HenyeyGreenstein) else 0.0
         if abs(g) > LARGEST_G:
             raise InputError(
                 f"phase: got the mean cosine {g:g}, expected -{LARGEST_G} to {LARGEST_G}, for "
                 "example hg:0.85"
             )
         return PhasePair(name, HenyeyGreensteinPhase(g), lambda: HenyeyGreenstein(g))
-    if isinstance(known, analytic.HgDraine):
-        return PhasePair(name, hg_draine_phase(known.diameter), lambda: _table(known))
-    if not isinstance(known, analytic.Mie):
+    if isinstance(phase, analytic.HgDraine):
+        return PhasePair(name, hg_draine_phase(phase.diameter), lambda: _table(phase))
+    if not isinstance(phase, analytic.Mie):
         raise InputError(
             f"phase: got {name!r}, expected isotropic, hg:G, hg-draine, mie, mie-modified or "
             "FILE.csv"
         )
-    numbers = known.droplets.effective_radius, known.droplets.gamma, known.wavelength
-    deterministic = droplet_phase(*numbers, modified=isinstance(known, analytic.MieModified))
-    return PhasePair(name, deterministic, lambda: _table(known))
+    numbers = phase.droplets.effective_radius, phase.droplets.gamma, phase.wavelength
+    deterministic = droplet_phase(*numbers, modified=isinstance(phase, analytic.MieModified))
+    return PhasePair(name, deterministic, lambda: _table(phase))
 
 
 def _table(phase: analytic.PhaseFunction) -> Tabulated:

@@ -60,9 +60,15 @@ def slab_radiance(
     thickness, wanted = passing * tau, [passing * depth for depth in depths]
     panels = depth_panels(thickness, narrowest, depths=wanted, count=nodes)
     # The moments without the peak, normalised again.
-    kept = (moments[:-1] - peak) / (1 - peak)
+    scattered = (moments[:-1] - peak) / (1 - peak)
     source = _diffuse_source(
-        panels, rule, mu0, kept=kept, albedo=min(albedo * (1 - peak) / passing, 1.0), mu=mu, phi=phi
+        panels,
+        rule,
+        mu0,
+        moments=scattered,
+        albedo=min(albedo * (1 - peak) / passing, 1.0),
+        mu=mu,
+        phi=phi,
     )
     # The last term: the beam scattered once, with the true phase function.
     cosines = -mu * mu0 + np.sqrt((1 - mu) * (1 + mu) * (1 - mu0) * (1 + mu0)) * np.cos(phi)
@@ -79,7 +85,7 @@ def _diffuse_source(
     rule: Streams,
     mu0: float,
     *,
-    kept: Array,
+    moments: Array,
     albedo: float,
     mu: Array,
     phi: Array,
@@ -88,11 +94,11 @@ def _diffuse_source(
     tau = float(panels.edges[-1])
     total = np.zeros((panels.depths.size, mu.size))
     quiet = 0
-    for m in range(kept.size):
+    for m in range(moments.size):
         # K_m from the streams to the directions, and from the beam to the streams.
-        to_user = albedo / 2 * mode_kernel(m, kept, mu, rule.mu) * rule.weights
-        from_beam = albedo / (4 * np.pi) * mode_kernel(m, kept, rule.mu, np.array([-mu0]))[:, 0]
-        modes = Eigenmodes(rule, m, albedo=albedo, moments=kept, peak=0.0)
+        to_user = albedo / 2 * mode_kernel(m, moments, mu, rule.mu) * rule.weights
+        from_beam = albedo / (4 * np.pi) * mode_kernel(m, moments, rule.mu, np.array([-mu0]))[:, 0]
+        modes = Eigenmodes(rule, m, albedo=albedo, moments=moments, peak=0.0)
         field = modes.radiance(
             _beam_lines(modes, modes.decoupled(from_beam), mu0, panels.depths, tau)
         )

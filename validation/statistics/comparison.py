@@ -69,8 +69,8 @@ tail being negligible: that is 90 % if b = (q(0.975) + q(0.90)) se, q the quanti
 law; 3.24 se for many degrees of freedom.
 """
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -163,22 +163,20 @@ def compare_statistics(
     scale = float(2.0 ** np.frexp(largest)[1]) if largest > 0 else 1.0
     expected = _side("reference", reference, chosen, scale=scale, with_batches=whole)
     tested = _side("test", test, chosen, scale=scale, with_batches=whole)
+    # The images agree within a margin if every interval of the bias lies inside it.
     bias = _relative_bias(expected, tested, int(chosen.sum()))
-    intervals = [
-        bias["relative_bias_ci"],
-        bias["relative_bias_ci_batches"] or bias["relative_bias_ci"],
-    ]
-    found = {
+    intervals = [bias.relative_bias_ci, bias.relative_bias_ci_batches or bias.relative_bias_ci]
+    values = {
         "masked": (~asked).sum(),
         **_value_tests(expected, tested, chosen),
         **_block_tests(expected, tested),
-        **bias,
+        **asdict(bias),
         "margin": margin,
         "equivalent": None
         if margin is None
         else all(stated - margin < low and high < margin - stated for low, high in intervals),
     }
-    return record_of(found, Statistics)
+    return record_of(values, Statistics)
 
 
 def check_margin(margin: float | None) -> None:
@@ -187,18 +185,22 @@ def check_margin(margin: float | None) -> None:
         raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
 
 
-def _value_tests(expected: _Side, tested: _Side, chosen: Bools) -> dict[str, Any]:
+def _value_tests(expected: _Side, tested: _Side, chosen: Bools) -> dict[str, float]:
     """Test every value by itself."""
     difference, error = tested.mean - expected.mean, np.hypot(expected.error, tested.error)
+    # Values with an error have a z, and a p-value with the degrees of freedom of the error.
     random = chosen[:, :, None] & (error > 0)
     fixed = chosen[:, :, None] & ~random
     z = difference[random] / error[random]
     spread = expected.spread(expected.error**2) + tested.spread(tested.error**2)
     p = two_sided_p(z, satterthwaite(error**2, spread)[random])
+    # Channels of a pixel may depend on one another: each has its own tests of all p-values.
     channel = np.nonzero(random)[2]
     by_channel = [p[channel == c] for c in np.unique(channel)]
+    # A pixel is rejected if one of its values is too unlikely among all.
     small = np.zeros(random.shape, dtype=bool)
     small[random] = p < sidak(LEVEL, z.size)
+    # Without a reference, or without an error, differences are compared with the mean alone.
     dark = chosen[:, :, None] & (expected.mean == 0)
     mean = float(expected.mean[chosen].mean()) if chosen.any() else 0.0
     return {
@@ -225,7 +227,7 @@ def _largest(difference: Array, mean: float) -> float:
     return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
 
 
-def _block_tests(expected: _Side, tested: _Side) -> dict[str, Any]:
+def _block_tests(expected: _Side, tested: _Side) -> dict[str, int]:
     """Test the sums over blocks of pixels."""
     difference = block_sums(
         np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0)
@@ -252,6 +254,7 @@ def _side(
     """Check one estimate and make it regular: float64 of three dimensions, scaled, zero
     outside the chosen pixels.
     """
+    # Mean and standard error, in a common unit and 0 outside.
     shape = np.shape(estimate.mean)
     inside = chosen[:, :, None]
     mean = np.asarray(estimate.mean, dtype=np.float64).reshape(*shape[:2], -1)
@@ -271,6 +274,7 @@ def _side(
             f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask "
             "them"
         )
+    # Batch means give a second interval, where they are of the pixels that are compared.
     if estimate.batches is not None and estimate.batches < 2:
         raise InputError(
             f"batches of the {name}: got {estimate.batches}, expected at least 2 for a standard "
@@ -280,8 +284,8 @@ def _side(
         return _Side(mean, error, estimate.batches)
     means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
     means = means.reshape(len(means), -1).mean(axis=1)
-    # Means of a mask, or of other pixels, would give an interval for something else;
-    # float32 sums agree to 1e-4.
+    # Means over other pixels would give the interval of another number. Sums of float32 agree to
+    # 1e-4.
     bias = float(mean[chosen].mean())
     if len(means) < 2 or not np.isclose(means.mean(), bias, rtol=1e-4, atol=0):
         raise InputError(
@@ -295,19 +299,26 @@ def _side(
 # The relative bias of the whole image
 
 
-def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]:
-    """Pool the error of all pixels into one relative bias; nothing of it is known if the
-    reference is not bright.
-    """
-    numbers = ("relative_bias", "relative_bias_se", "relative_bias_freedom", "relative_bias_p")
-    found: dict[str, Any] = dict.fromkeys(numbers, np.nan)
-    found |= dict.fromkeys(
-        ("reference_variance_fraction", "largest_fraction", "detectable_bias"), np.nan
-    )
-    found |= {"relative_bias_ci": (np.nan, np.nan), "relative_bias_ci_batches": None}
+@dataclass(frozen=True)
+class _Bias:
+    """The relative bias of an image, by the names of `Statistics`; unknown numbers are NaN."""
+
+    relative_bias: float = math.nan
+    relative_bias_se: float = math.nan
+    relative_bias_freedom: float = math.nan
+    relative_bias_p: float = math.nan
+    relative_bias_ci: tuple[float, float] = (math.nan, math.nan)
+    relative_bias_ci_batches: tuple[float, float] | None = None
+    reference_variance_fraction: float = math.nan
+    largest_fraction: float = math.nan
+    detectable_bias: float = math.nan
+
+
+def _relative_bias(reference: _Side, test: _Side, pixels: int) -> _Bias:
+    """Pool the error of all pixels into one relative bias; unknown for a dark reference."""
     bright = float(reference.mean.sum())
     if not bright > 0:
-        return found
+        return _Bias()
     # From the difference, not from the ratio: no cancellation for images that nearly agree.
     value = float((test.mean - reference.mean).sum()) / bright
     sides = ((test, 1.0), (reference, (1 + value) ** 2))  # with the weight of its variance
@@ -322,16 +333,23 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]
     freedom, error = float(satterthwaite(total, spread)), float(np.sqrt(total))
     interval, reach = _interval(value, total, freedom)
     interval_batches, reach_batches = _from_batches(value, sides, bright, pixels)
-    found |= {"relative_bias": value, "relative_bias_se": error, "relative_bias_freedom": freedom}
-    found |= {"relative_bias_ci": interval, "relative_bias_ci_batches": interval_batches}
-    found["detectable_bias"] = max(reach, reach_batches)
-    if total > 0:
-        found["relative_bias_p"] = float(
-            two_sided_p(np.asarray(value / error), np.asarray(freedom))
-        )
-        found["reference_variance_fraction"] = of_reference / total
-        found["largest_fraction"] = float(variance.max()) / total
-    return found
+    bias = _Bias(
+        relative_bias=value,
+        relative_bias_se=error,
+        relative_bias_freedom=freedom,
+        relative_bias_ci=interval,
+        relative_bias_ci_batches=interval_batches,
+        detectable_bias=max(reach, reach_batches),
+    )
+    # Without variance there is no probability and no fraction of it.
+    if not total > 0:
+        return bias
+    return replace(
+        bias,
+        relative_bias_p=float(two_sided_p(np.asarray(value / error), np.asarray(freedom))),
+        reference_variance_fraction=of_reference / total,
+        largest_fraction=float(variance.max()) / total,
+    )
 
 
 def _from_batches(

@@ -56,8 +56,8 @@ class Estimate:
         if self.value is None or self.error is None:
             return None
         half = self.error * (errors if self.kind == "statistical" else 1.0)
-        known = math.isfinite(self.value) and math.isfinite(half)
-        return (self.value - half, self.value + half) if known else None
+        finite = math.isfinite(self.value) and math.isfinite(half)
+        return (self.value - half, self.value + half) if finite else None
 
     def exceeds(self, limit: float, errors: float = INTERVAL) -> Answer:
         """Return whether the true number is above a limit; `errors` as of `ends`."""
@@ -93,5 +93,5 @@ UNKNOWN = Estimate(None)
 
 
 def fact(value: float) -> Estimate:
-    """Return a number that has no error: a count, or what was computed of all there is."""
+    """Return a number without an error: a count, or a number computed from all values."""
     return Estimate(value, 0.0, "proven")

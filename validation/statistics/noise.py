@@ -37,15 +37,16 @@ far the next run will be. Four rules:
    same machine when it was shared. A ratio counts from `(1 + tolerance) spread` on, with the larger
    spread of the two reports. That is the least slowdown that can be seen; on a busy machine little
    can be, and the comparison says so.
-2. *Drift.* The median ratio over all frames is what all share: the machine, or something that every
-   method uses. A method is slower only if it is slower as measured and beside this. The drift
-   itself is judged by rule 1, once. Between two machines only what is left beside the drift is
-   compared, with four times the tolerance: methods do not profit alike from wider vectors, larger
-   caches or more threads.
-3. *Witnesses.* Each stage has timings of its own, and is part of others: surface and airlight of
-   the frame, the frame of one after the light moved, that of one after objects moved. Work that
-   grew is seen in them too, a burst is not: every stage that contains it must have grown by half as
-   many milliseconds. The surface alone is no concern of a method.
+2. *Drift.* All frames share the median ratio over all of them: it is the machine, or code that
+   every method uses. A method is slower only if it is slower as measured and after the drift is
+   divided out. The drift itself is judged by rule 1, once. Between two machines ratios are compared
+   after the drift is divided out, with four times the tolerance: methods do not profit alike from
+   wider vectors, larger caches or more threads.
+3. *Witnesses.* Each stage has timings, and is part of longer stages: surface and airlight are parts
+   of the frame, the frame is a part of a frame after the light moved, and this of one after objects
+   moved. If the work of a stage grew, the longer stages grew too; a burst hits one alone. Every
+   stage that contains it must have grown by half as many milliseconds. The surface alone is no
+   concern of a method.
 4. *Chance.* If a burst multiplies a time by exp(E), E exponential with the mean tau, the logarithm
    of the ratio of two times of the same work is the difference of two such E: U has Laplace's law,
    P(U > u) = exp(-u/tau)/2 for u > 0. All |U| of the n timings of other configurations are
@@ -67,13 +68,13 @@ the eight times the work of the shortest ladder, that is a time at one end that 
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from airlight.validation.statistics.comparison import LEVEL
 from airlight.validation.statistics.estimate import Answer, Estimate
 from airlight.validation.statistics.samples import sidak
+from airlight.validation.timing import TimeGrowth, Timing
 
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error
@@ -97,7 +98,6 @@ _WITNESSES = {
     "objects_moved": (),
 }
 
-Timing = Any  #: has median_ms, low_ms, high_ms, repetitions
 Times = Mapping[str, Timing]  #: by stage
 
 
@@ -226,20 +226,16 @@ def _medians(times: Times) -> dict[str, float]:
     return medians
 
 
-def other_power(old: Any, new: Any) -> float:
-    """Return by how much a time grows with another power of the work than before, 0
-    where noise may explain it.
+def other_power(old: TimeGrowth, new: TimeGrowth) -> float:
+    """Return the change of the power of the work with which a time grows, 0 where noise may explain
+    it.
 
-    Both have an `exponent` and its `standard_error`, None where it is not known: two steps have a
-    power without an error, and of that nothing can be told.
+    Two steps have a power without an error: whether it changed is unknown, and the change is 0.
     """
     before, after = old.exponent, new.exponent
-    errors = old.standard_error, new.standard_error
-    if before is None or after is None or None in errors:
+    old_error, new_error = old.standard_error, new.standard_error
+    if before is None or after is None or old_error is None or new_error is None:
         return 0.0
-    change = Estimate(after - before, math.hypot(*errors))
-    return (
-        after - before
-        if abs(after - before) > POWER_TOLERANCE and change.within(0.0, 3.0) is Answer.NO
-        else 0.0
-    )
+    change = after - before
+    moved = Estimate(change, math.hypot(old_error, new_error)).within(0.0, 3.0) is Answer.NO
+    return change if abs(change) > POWER_TOLERANCE and moved else 0.0

@@ -10,6 +10,8 @@ from airlight.validation.columns import column
 
 Number = float | None
 Ends = tuple[Number, Number]  #: of an interval
+Estimator = Literal["single-scatter", "volpath"]
+Layer = Literal["airlight", "surface"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +71,8 @@ class Statistics:
 class Agreement:
     """How far an estimator is from the quadrature image in one layer: a check of the reference."""
 
-    estimator: Literal["single-scatter", "volpath"] = column(meaning="that checks")
-    layer: Literal["airlight", "surface"] = column(meaning="that is checked")
+    estimator: Estimator = column(meaning="that checks")
+    layer: Layer = column(meaning="that is checked")
     width: int = column(unit="pixels")
     height: int = column(unit="pixels")
     batches: int = column(meaning="that were traced or taken from the cache")

@@ -9,7 +9,7 @@ one scene, by pixels or by methods, are one sample.
 import math
 from collections.abc import Sequence
 from hashlib import sha256
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import scipy
@@ -19,6 +19,8 @@ from scipy.special import ndtri, stdtr, stdtrit
 from airlight.validation.arrays import Array
 from airlight.validation.statistics.estimate import INTERVAL, Estimate
 
+_Errors = TypeVar("_Errors", float, Array)
+
 LEVEL = 0.95  #: with at least this probability an interval holds what it estimates
 #: values of a series of which the mean has an error: of fewer, r says nothing of
 #: phi (see `mean_of_series`)
@@ -27,8 +29,8 @@ LEAST = 8
 UNTOLD_SERIES = (
     f"its error is unknown with fewer than {LEAST} frames, or frames that are all off by the same"
 )
-# persistence that is reckoned with: a history that keeps more is a bias to
-# anyone who sees 128 frames
+# The largest persistence that is assumed: the error of a longer history looks like a bias in 128
+# frames.
 _MOST = 0.95
 
 
@@ -73,13 +75,14 @@ def student(values: Array) -> tuple[float, float]:
     return float(values.mean()), student_quantile(0.5 + LEVEL / 2, len(values) - 1) * float(error)
 
 
-def widened(error: Any, freedom: float) -> Any:
-    """Return standard errors so widened that twice each is half of Student's interval of 95
-    %, as `Estimate` has them.
+def widened(error: _Errors, freedom: _Errors) -> _Errors:
+    """Return standard errors times a factor: twice each is then half of Student's interval of 95 %,
+    as `Estimate` has them.
 
-    `error`: a number or an array; `freedom`: their degrees of freedom [1].
+    `freedom`: their degrees of freedom [1], of each.
     """
-    return error * (stdtrit(freedom, 0.5 + LEVEL / 2) / INTERVAL)
+    widened_error: _Errors = error * (stdtrit(freedom, 0.5 + LEVEL / 2) / INTERVAL)
+    return widened_error
 
 
 def first_equal(runs: Sequence[Array]) -> list[int]:

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any
 
 from airlight.errors import InputError, nearest
 from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer
@@ -29,6 +28,9 @@ from airlight.reference.storage.store import Content
 from airlight.validation.readers import named_values
 from airlight.validation.study.cost import TIMED, Work, frame_work
 
+#: Values of a method's parameters by name; words are converted to the type of the default.
+Parameters = Mapping[str, int | float | str]
+
 
 @dataclass(frozen=True)
 class Configuration:
@@ -36,7 +38,7 @@ class Configuration:
     differ from their defaults.
     """
 
-    method: str  #: name in the registry, or one's own as 'module:function' or 'fog.glsl'
+    method: str  #: name in the registry, or of a user's as 'module:function' or 'fog.glsl'
     kernel: str | None = None  #: see `find_kernel`
     parameters: tuple[tuple[str, int | float | str], ...] = ()  #: names and values
 
@@ -60,35 +62,38 @@ _NAMED = tomllib.loads(
 
 def named_configurations(word: str) -> tuple[Configuration, ...]:
     """Return the configurations that `studies/methods.toml` has under a word."""
-    found = []
-    for each in _NAMED[word]:
-        given = each.get("parameters", {})
-        parameters = _NAMED[given] if isinstance(given, str) else given
-        found.append(Configuration(each["method"], each.get("kernel"), tuple(parameters.items())))
-    return tuple(found)
+    configurations = []
+    for table in _NAMED[word]:
+        # Parameters that several configurations share have a name in the file.
+        parameters = table.get("parameters", {})
+        if isinstance(parameters, str):
+            parameters = _NAMED[parameters]
+        configurations.append(
+            Configuration(table["method"], table.get("kernel"), tuple(parameters.items()))
+        )
+    return tuple(configurations)
 
 
 #: see `studies/methods.toml`
 STANDARD, QUICK = named_configurations("standard"), named_configurations("quick")
 #: parameters of `soft-shafts`, beyond Ali 2016
-SHARED_POINTS: Mapping[str, Any] = _NAMED["shared_points"]
+SHARED_POINTS: Parameters = _NAMED["shared_points"]
 
 
 def configuration(
-    method: str | Callable[..., Any],
+    method: str | Callable[..., object],
     kernel: str | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    parameters: Parameters | None = None,
 ) -> Configuration:
     """Return a configuration, checked.
 
-    `method`: a name of `realtime.methods.registry.METHODS`, one's own as 'module:function',
+    `method`: a name of `realtime.methods.registry.METHODS`, a user's method as 'module:function',
     'path/to/file.py:function' or 'path/to/file.glsl', or a function itself; `kernel`: see
-    `find_kernel`; 'exact' by default for methods that call a kernel; `parameters`: values of the
-    method's parameters; words are converted to the type of the default.
+    `find_kernel`; 'exact' by default for methods that call a kernel; `parameters`: of the method.
 
     Raises InputError for an unknown method, kernel or parameter (the nearest is named), a value of
-    the wrong type or outside its range, values that contradict one another, and a method of one's
-    own that cannot be loaded.
+    the wrong type or outside its range, values that contradict one another, and a user's method
+    that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     chosen, light_samples = method_parameters(find_method(method), parameters or {})
@@ -101,8 +106,8 @@ def configuration(
     if uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
-    known = values(light_samples) | values(chosen)
-    return Configuration(method, kernel, tuple((name, known[name]) for name in parameters or {}))
+    checked = values(light_samples) | values(chosen)
+    return Configuration(method, kernel, tuple((name, checked[name]) for name in parameters or {}))
 
 
 def chosen_configurations(methods: Sequence[str] | None = None) -> tuple[Configuration, ...]:
@@ -111,10 +116,10 @@ def chosen_configurations(methods: Sequence[str] | None = None) -> tuple[Configu
     A method without any for every scene has its defaults too.
     """
     chosen: list[Configuration] = []
-    for method in dict.fromkeys(known.method for known in STANDARD) if methods is None else methods:
+    for method in dict.fromkeys(each.method for each in STANDARD) if methods is None else methods:
         default = configuration(method)
-        standard = [known for known in STANDARD if known.method == method]
-        everywhere = any("points" not in dict(known.parameters) for known in standard)
+        standard = [each for each in STANDARD if each.method == method]
+        everywhere = any("points" not in dict(each.parameters) for each in standard)
         chosen += standard if everywhere else [default, *standard]
     return tuple(chosen)
 
@@ -131,9 +136,12 @@ def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False)
     Raises InputError if the method refuses.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
-    parameters: dict[str, Any] = dict(chosen.parameters)
     return frame_renderer(
-        scene, find_method(chosen.method), kernel=kernel, extra_layers=extra_layers, **parameters
+        scene,
+        find_method(chosen.method),
+        kernel=kernel,
+        extra_layers=extra_layers,
+        **dict(chosen.parameters),
     )
 
 
@@ -149,21 +157,21 @@ def rendered_lights(scene: Scene, chosen: Configuration) -> int:
 
 def configuration_work(scene: Scene, chosen: Configuration, frames: float = TIMED) -> Work:
     """Return the work of some frames of a configuration at the size of a scene's image."""
-    given = dict(chosen.parameters)
-    steps = (
-        float(given.get("steps", 100)) if chosen.method == "ray-march" or "steps" in given else 0.0
-    )
+    parameters, steps = dict(chosen.parameters), 0.0
+    if chosen.method == "ray-march" or "steps" in parameters:
+        steps = float(parameters.get("steps", 100))
     size = scene.camera.width, scene.camera.height
     return frame_work(size, lights=rendered_lights(scene, chosen), steps=steps, frames=frames)
 
 
-def _function_name(function: Callable[..., Any]) -> str:
+def _function_name(function: Callable[..., object]) -> str:
     """Return 'module:function', the name by which a function can be imported again."""
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
-    named: Any = sys.modules.get(getattr(function, "__module__", None) or "")
+    # The name must lead back to the function: it does not for one within another function.
+    found_by_name: object = sys.modules.get(getattr(function, "__module__", None) or "")
     for part in getattr(function, "__qualname__", "").split("."):
-        named = getattr(named, part, None)
-    if not callable(function) or named is not function:
+        found_by_name = getattr(found_by_name, part, None)
+    if not callable(function) or found_by_name is not function:
         raise InputError(
             f"method: got {function!r}, expected a name or a function at the top of a module: give "
             "it a name there"
@@ -213,7 +221,7 @@ def _imported(name: str) -> Kernel:
         raise InputError(f"kernel {name}: it is a {type(function).__name__}; expected a function")
 
     @wraps(function)
-    def guarded(*arguments: Any) -> Any:
+    def guarded(*arguments: object) -> object:
         with user_errors(f"kernel {name}"):
             return function(*arguments)
 

@@ -7,7 +7,7 @@ A *turn* of a method renders its frames once; methods take turns (`validation.st
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
+from typing import TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -36,14 +36,18 @@ from airlight.realtime.scene.read_scene import Scene
 from airlight.validation.clock import timed, timing_of
 from airlight.validation.timing import FrameTimes, TimingRun
 
+_Result = TypeVar("_Result")
+#: The work of a frame: its result is the frame's stages and a cache for the next frame.
+NextFrame = Callable[[], tuple[tuple[object, object, object], FrameCache]]
+
 
 def timed_image(
     renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool
 ):
     """Render the next frame by `realtime.frame.incremental.next_parts`.
 
-    Return the image on the host, what its parts leave to the next frame, and what it took without
-    bringing it to the host [ms].
+    Return the image on the host, the caches of its parts for the next frame, and the time without
+    the transfer to the host [ms].
     """
     in_turn, frame, took = next_parts(renderer, scene, caches, **moved), None, 0.0
     caches_after: list[FrameCache] = []
@@ -65,14 +69,14 @@ def timed_image(
         del result, stages, cache
 
 
-def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
+def moved_light(renderer: FrameRenderer) -> NextFrame:
     """Return the work of a frame after the light moved: all stages run again, camera rays
     too, in the same geometry.
     """
     return _step(renderer, None, light_moved=True)
 
 
-def camera_rays(scene: Scene) -> Callable[[], Any]:
+def camera_rays(scene: Scene) -> Callable[[], None]:
     """Return the work of casting the camera rays without shading, the least time of
     a frame that casts them.
     """
@@ -86,11 +90,9 @@ def camera_rays(scene: Scene) -> Callable[[], Any]:
     return lambda: dr.eval(cast(scene.geometry, scene.facets, pixel, scene.camera))
 
 
-def _step(
-    renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool
-) -> Callable[[], Any]:
-    """Return the work of the next frame, which reuses what a cache has; without one
-    camera rays are cast too.
+def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> NextFrame:
+    """Return the work of the next frame, which reuses a cache; without one camera rays are cast
+    too.
     """
     moved = {"camera_moved": cache is None, "geometry_moved": False, "light_moved": light_moved}
     return lambda: next_frame(renderer, renderer.scene, cache, **moved)
@@ -105,8 +107,8 @@ def first_frame(renderer: FrameRenderer) -> FrameCache:
 
 @dataclass(frozen=True)
 class FrameSpent:
-    """The times of the frames of one turn, by the names of `FrameTimes`; None
-    for what was not asked for.
+    """The times of the frames of one turn, by the names of `FrameTimes`; None for a frame that was
+    not asked for.
     """
 
     frame: Spent
@@ -157,7 +159,7 @@ def staged_turn(renderer: FrameRenderer) -> Turn:
             surface += spent
             shade += timed(partial(_ready, run_shade, part, cast))[1]
             airlight += timed(partial(_ready, run_method, part, state, cast, lit))[1]
-        # A frame after a change prepares again if the method's state depends on what changed.
+        # A frame after a change prepares again if the method's state depends on the change.
         frame, nothing = surface + airlight, Spent()
         camera_cached = shade + airlight + (prepare if needed & {"light", "look"} else nothing)
         colours = shade + airlight + (prepare if "look" in needed else nothing)
@@ -201,11 +203,11 @@ def shader_turn(renderer: FrameRenderer, seconds: float) -> tuple[str, Turn]:
     return device, turn
 
 
-def object_moves(scene: Scene) -> Callable[[], Any] | None:
-    """Return the work of moving all objects of a scene, to where they stand; None
-    where none can be moved.
+def object_moves(scene: Scene) -> Callable[[], Scene] | None:
+    """Return the work of moving all objects of a scene to the places where they are; None where
+    none can be moved.
 
-    The work is that of any other place, the same for all methods.
+    A move to any other place takes as long, for all methods.
     """
     objects = _objects(scene)
     return None if objects is None else partial(turned_objects, scene, objects, np.eye(3))
@@ -233,9 +235,9 @@ def times_of(spent: Sequence[FrameSpent], moves: Sequence[Spent], run: TimingRun
     return FrameTimes(**timings, run=run)
 
 
-def _ready(stage: Callable[..., Any], *given: Any) -> Any:
-    """Return what a stage gives, evaluated."""
-    result = stage(*given)
+def _ready(stage: Callable[..., _Result], *arguments: object) -> _Result:
+    """Return the result of a stage, evaluated."""
+    result = stage(*arguments)
     dr.eval(result)
     return result
 

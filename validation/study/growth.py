@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How times grow with the work of a scene, which has less and more of one
-kind of work, step by step.
+"""The growth of times with the work of a scene, which has less and more of one kind of work, step
+by step.
 
 | kind | work | what changes |
 |---|---|---|
@@ -38,14 +38,16 @@ A step that is steeper by more than 0.6 is a cliff, where it takes longer than 5
 overflows there.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
@@ -62,6 +64,7 @@ from airlight.validation.columns import record_of
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.meshes import divided, rotation
 from airlight.validation.scenes.parts import mesh_with_material
+from airlight.validation.study.configuration import Parameters
 from airlight.validation.study.frame_times import camera_rays
 from airlight.validation.study.row import Growth, Row
 from airlight.validation.study.run import run, with_times
@@ -86,14 +89,14 @@ class Step:
     work: float  #: of its kind
     scene: Callable[[], Scene]
     #: of the method, beside the configuration's own
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Parameters = field(default_factory=dict)
 
 
 def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
     """Return the steps of a kind of work, of `GROWTH`, for a scene at a size
     [pixels], the least work first.
 
-    A scene that has nothing of the kind of which there could be less or more is refused.
+    Raises InputError for a scene without work of that kind.
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
     if kind not in makers:
@@ -155,7 +158,7 @@ def with_copies(scene: Scene, copies: int) -> Scene:
     return replace(scene, lights=lights)
 
 
-def _copy(light: Light, number: int, copies: int, camera) -> Light:
+def _copy(light: Light, number: int, copies: int, camera: Array) -> Light:
     light = replace(light, intensity=light.intensity / copies)
     if number == 0:
         return light
@@ -180,14 +183,15 @@ def _maps(name: str, size: tuple[int, int]) -> list[Step]:
     return [Step(side, partial(_read, name, size), {"map": side}) for side in sides]
 
 
-def triangles_of(scene) -> int:
-    """Return how many triangles the meshes of a Mitsuba scene have that `subdivided` cuts."""
+def triangles_of(scene: mi.Scene) -> int:
+    """Return the number of triangles of the meshes of a scene that `subdivided` cuts."""
     return sum(int(shape.face_count()) for shape in scene.shapes() if _is_cut(shape))
 
 
-def subdivided(scene, levels: int) -> Any:
-    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times
-    the triangles, and bumps.
+def subdivided(scene: mi.Scene, levels: int) -> mi.Scene:
+    """Return a scene whose opaque meshes have 4^levels times the triangles, and bumps.
+
+    Raises InputError for a scene without opaque meshes.
     """
     if not triangles_of(scene):
         raise InputError(
@@ -202,16 +206,14 @@ def subdivided(scene, levels: int) -> Any:
     return with_shapes(scene, shapes)
 
 
-def with_shapes(scene, shapes: Iterable[Any]) -> Any:
-    """Return a Mitsuba scene of other shapes, with the camera and the
-    lights without extent of one.
-    """
+def with_shapes(scene: mi.Scene, shapes: Iterable[mi.Shape]) -> mi.Scene:
+    """Return a scene of other shapes, with the camera and the lights without extent of a scene."""
     emitters = (emitter for emitter in scene.emitters() if emitter.class_name() != "AreaLight")
     parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
     return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
 
 
-def _cut(shape, levels: int, corner: Array, size: float) -> Any:
+def _cut(shape: mi.Shape, levels: int, corner: Array, size: float) -> mi.Shape:
     if not _is_cut(shape):
         return shape
     mesh = mesh_triangles(shape)
@@ -243,7 +245,7 @@ def bumpy(points: Array, corner: Array, size: float) -> Array:
     return moved
 
 
-def _is_cut(shape) -> bool:
+def _is_cut(shape: mi.Shape) -> bool:
     return shape.is_mesh() and not shape.is_emitter() and shape.bsdf().class_name() != "Null"
 
 
@@ -264,12 +266,10 @@ def study_growth(
                 "moves; expected methods of Python"
             )
     # `rows`: for each configuration a row of each step, until it refuses one.
-    name, rows, runs = (
-        study.scenes[0],
-        list[list[Row]]([] for _ in study.configurations),
-        list[TimingRun](),
-    )
-    anchor: Callable[[], Any] | None = None
+    name = study.scenes[0]
+    rows: list[list[Row]] = [[] for _ in study.configurations]
+    runs: list[TimingRun] = []
+    anchor: Callable[[], object] | None = None
     for number, step in enumerate(steps):
         scene = step.scene()
         # Steps are compared with one another: the camera rays of the first are the anchor of all.
@@ -307,25 +307,24 @@ def study_growth(
     # A record for each configuration, of the steps that were timed.
     scalings = []
     for chosen, of_method in zip(study.configurations, rows):
-        costs: list[dict[str, Any]] = [
-            {
-                **row.times.measured,
-                "work": row.work.amount,
-                "rays": row.work.rays,
-                "memory": row.memory,
-            }
+        timed_steps = [
+            (row, row.times.measured, row.work)
             for row in of_method
             if row.times is not None and row.work is not None
         ]
-        works = [cost["work"] for cost in costs]
-        times = {each: [cost[each].median_ms for cost in costs] for each in TIMES}
+        costs = [
+            {**times, "work": work.amount, "rays": work.rays, "memory": row.memory}
+            for row, times, work in timed_steps
+        ]
+        works = [work.amount for _, _, work in timed_steps]
+        medians = {name: [times[name].median_ms for _, times, _ in timed_steps] for name in TIMES}
         scaling = {
             "scene": Path(name).stem,
             "size": study.sizes[0],
             "label": chosen.label,
             "kind": kind,
             "costs": costs,
-            "growth": {each: growth(kind, each, works, values) for each, values in times.items()},
+            "growth": {each: growth(kind, each, works, ms) for each, ms in medians.items()},
             "refused": of_method[-1].reason,
             "run": joined(runs) if runs else None,
         }
@@ -338,8 +337,8 @@ def _same(scene: Scene, cell: Cell) -> Scene:
 
 
 def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> TimeGrowth:
-    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least
-    first, grows with the work.
+    """Return the growth of one of `TIMES` with the work; `times`: [ms] at steps of a kind of work,
+    the least work first.
     """
     exponent, standard_error = fitted_exponent(works, times)
     # The exponent of each step by itself, with the work at its end: a cliff hides in the mean

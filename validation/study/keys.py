@@ -88,14 +88,14 @@ class RowInputs(Inputs):
     chosen: Configuration
     code: tuple[Content, ...]  #: of the user's in the configuration
     measure: Measure
-    source: str  #: see `row_source`; a version says nothing that it does not
+    source: str  #: see `row_source`; it changes with every version
     packages: tuple[tuple[str, str], ...]
     variant: str  #: Mitsuba's
 
 
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
-    """Return the key of the row of a cell that these versions compute; one that is never
-    found again if it has none.
+    """Return the key of the row of a cell that these versions compute; a key that is never found
+    again where an input has no digest.
 
     `scenes` are digests of scenes that were read before, by name: anyone who has many cells
     of a file reads it once.

@@ -7,12 +7,13 @@ part of its error. A sixteenth of the pixels has a reference there, chosen by ch
 errors need no more.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
+import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
 from airlight.reference.quadrature.image import ReferenceImage
@@ -20,7 +21,7 @@ from airlight.reference.quadrature.reference import reference_of_pixels, referen
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, stored
-from airlight.validation.arrays import Array
+from airlight.validation.arrays import Array, Bools
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene
@@ -44,7 +45,7 @@ class Reference:
     error: Array  #: its error, three standard errors of area lights among it [W/(m^2 sr)]
     kind: Kind  #: of that error
     surface: Array | None  #: (height, width, 3) [W/(m^2 sr)]; None where area lights leave it out
-    mask: NDArray[np.bool_] | None  #: pixels that have a reference, (height, width); None for all
+    mask: Bools | None  #: pixels that have a reference, (height, width); None for all
     crossings: int | None  #: of all camera rays with edges between light and shadow
     spent: Spent  #: what it took when it was computed
 
@@ -60,12 +61,12 @@ class Reference:
         airlight, error = self.airlight[mask], self.error[mask]
         # A dark reference has no relative error.
         mean = float(airlight.mean())
-        known = mean > 0
+        bright = mean > 0
         return ReferenceError(
             "quadrature",
             mean,
-            float(error.mean()) / mean if known else None,
-            float((error / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
+            float(error.mean()) / mean if bright else None,
+            float((error / np.maximum(airlight, FLOOR * mean)).max()) if bright else None,
             self.spent.seconds,
             self.spent.processor,
             self.crossings,
@@ -93,10 +94,10 @@ def cell_reference(loaded: LoadedScene) -> Reference:
         whole = reference_result(loaded.scene)
         return of_image(whole.value, whole.spent)
     inputs = SampledInputs(scene_content(loaded.scene))
-    result = stored(inputs, lambda: sampled_reference(loaded.scene), dict[str, NDArray[Any]])
-    some = result.value
+    result = stored(inputs, lambda: sampled_reference(loaded.scene), SampledPixels)
+    sampled = result.value
     return Reference(
-        some["airlight"], some["error"], "statistical", None, some["mask"], None, result.spent
+        sampled.airlight, sampled.error, "statistical", None, sampled.mask, None, result.spent
     )
 
 
@@ -108,19 +109,24 @@ class SampledInputs(Inputs):
     scene: Content
 
 
-def sampled_reference(scene) -> dict[str, NDArray[Any]]:
-    """Return airlight, its error and the mask of the pixels that have one, of an `mi.Scene`."""
-    # One pixel of sixteen has a reference, but at least 64. The seed is fixed: all methods, and all
-    # studies, are judged at the same pixels.
+@dataclass(frozen=True)
+class SampledPixels:
+    """The reference of some pixels of an image; 0 in all others."""
+
+    airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
+    error: Array  #: its error, (height, width, 3) [W/(m^2 sr)]
+    mask: Bools  #: pixels that have a reference, (height, width)
+
+
+def sampled_reference(scene: mi.Scene) -> SampledPixels:
+    """Return the reference of one pixel in sixteen of a scene."""
+    # At least 64 pixels have a reference. The seed is fixed: all methods, and all studies, are
+    # judged at the same pixels.
     width, height = scene.sensors()[0].film().size()
     count = int(width * height)
     pixels = np.sort(np.random.default_rng(20261123).permutation(count)[: max(64, count // 16)])
-    some = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
+    computed = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
     airlight, error, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
-    airlight[pixels], error[pixels], mask[pixels] = some.airlight[0], some.error[0], True
+    airlight[pixels], error[pixels], mask[pixels] = computed.airlight[0], computed.error[0], True
     shape = int(height), int(width)
-    return {
-        "airlight": airlight.reshape(*shape, 3),
-        "error": error.reshape(*shape, 3),
-        "mask": mask.reshape(shape),
-    }
+    return SampledPixels(airlight.reshape(*shape, 3), error.reshape(*shape, 3), mask.reshape(shape))

@@ -5,8 +5,8 @@ are the fields of `Row`.
 A row leaves as JSON, records within records, and as a row of a Parquet, whose columns have the
 paths of the values in that JSON as names: `error.relative_rmse`, `times.frame.median_ms`. Values
 that are not known, not measured or not finite are null, never NaN or an infinity. In addition a
-Parquet has the scene's properties, `properties.NAME`, those that any of its rows has. `key` is the
-identity of a row: two rows of one key say the same.
+Parquet has the properties of scenes that any of its rows has, `properties.NAME`. `key` is the
+identity of a row: two rows of one key have the same numbers.
 
 Errors are those of the airlight, by the formulae of `validation.metrics`, as `airlight compare
 --metrics all` prints them. Where the epsilon of a formula is a radiance, `normalised` has the same
@@ -15,7 +15,7 @@ with the mean of the reference as unit.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from airlight.validation.columns import Column, column, columns_of, plain, shown_values
 from airlight.validation.metrics.colour import ColourDifference
@@ -23,6 +23,9 @@ from airlight.validation.metrics.errors import RADIANCE, Metrics, RunsError
 from airlight.validation.metrics.flip import Flip
 from airlight.validation.metrics.other_tools import PublishedErrors
 from airlight.validation.timing import FrameTimes, Timing
+
+if TYPE_CHECKING:  # an extra, which only writers of Parquet need
+    import pyarrow as pa
 
 #: Outcomes of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot
 #: do this scene, and `reason` why; 'left out': a frame would take too long; 'failed': an exception;
@@ -38,7 +41,7 @@ FRAME_MS = "times.frame.median_ms"  #: the column of the time of a frame
 
 @dataclass(frozen=True)
 class ReferenceError:
-    """The reference of a cell and its own error."""
+    """The reference of a cell and the error of the reference."""
 
     estimator: str = column("reference", "", "estimator of the reference")
     mean: float = column("mean", RADIANCE, "mean of the reference airlight")
@@ -112,7 +115,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Growth:
-    """A step of a kind of work, of which there is more and less (`validation.study.growth`)."""
+    """A step of work that grows (`validation.study.growth`)."""
 
     kind: str = column("work", meaning="'size', 'triangles', 'lights' or 'map'")
     amount: float = column(
@@ -241,14 +244,14 @@ def row_values(row: Row) -> dict[str, Any]:
     }
 
 
-def property_names(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+def property_names(rows: Iterable[Mapping[str, object]]) -> list[str]:
     """Return the columns of properties that any row has, in order."""
     return sorted({name for row in rows for name in row if name.startswith(PROPERTY)})
 
 
-def arrow_schema(properties: Iterable[str] = ()) -> Any:
-    """Return the `pyarrow.Schema` of the Parquet, with meanings and units;
-    `properties` as of `property_names`.
+def arrow_schema(properties: Iterable[str] = ()) -> "pa.Schema":
+    """Return the schema of the Parquet, with meanings and units; `properties` as of
+    `property_names`.
     """
     import pyarrow as pa
 

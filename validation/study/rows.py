@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows on disk: a database to which finished rows are added, and the Parquet and
-JSON that are made of it.
+"""Rows on disk: a database to which finished rows are added, and the Parquet and JSON files of it.
 
 `rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row
 that was added is on disk: a run that is killed, or whose disk is full, loses nothing that was
@@ -18,6 +17,10 @@ from airlight.errors import InputError
 from airlight.reference.storage.files import atomic_path, ensure_folder
 from airlight.validation.study.row import COLUMNS, arrow_schema, property_names
 
+#: The values of a row by the names of `validation.study.row.COLUMNS`: numbers, words and truth
+#: values, None where one is not known; the picture is bytes.
+Values = dict[str, Any]
+
 #: files of the folder of a study
 ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"
 
@@ -34,9 +37,7 @@ _ADD += "(excluded.status, excluded.data, excluded.picture)"
 
 
 class RowStore:
-    """The rows of a folder, open for adding: each is a dictionary by the names of
-    `validation.study.row.COLUMNS`.
-    """
+    """The rows of a folder, open for adding."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = ensure_folder(folder)
@@ -83,16 +84,16 @@ class RowStore:
 
     def status(self, key: str) -> str | None:
         """Return the status of a row; None where there is none."""
-        found = self._one("SELECT status FROM rows WHERE key = ?", key)
-        return None if found is None else found[0]
+        cells = self._one("SELECT status FROM rows WHERE key = ?", key)
+        return None if cells is None else cells[0]
 
-    def row(self, key: str) -> dict[str, Any]:
-        """Return the row of a key that is there."""
-        found = self._one("SELECT data, picture FROM rows WHERE key = ?", key)
-        assert found is not None, "it was added before"
-        return _row(*found)
+    def row(self, key: str) -> Values:
+        """Return the row of a key that was added before."""
+        cells = self._one("SELECT data, picture FROM rows WHERE key = ?", key)
+        assert cells is not None, "it was added before"
+        return _row(*cells)
 
-    def add(self, row: Mapping[str, Any]) -> None:
+    def add(self, row: Mapping[str, object]) -> None:
         """Add a row, or replace the one of the same key.
 
         If the disk is full an OSError names the file; the rows are as they were.
@@ -106,7 +107,7 @@ class RowStore:
         except sqlite3.OperationalError as error:
             raise OSError(f"{error}; {len(self)} rows are kept: {self.path}") from error
 
-    def rows(self) -> Iterator[dict[str, Any]]:
+    def rows(self) -> Iterator[Values]:
         """Yield every row once, in the order in which they were first finished."""
         for data, picture in self._rows.execute("SELECT data, picture FROM rows ORDER BY rowid"):
             yield _row(data, picture)
@@ -126,7 +127,7 @@ class RowStore:
                 temporary, schema, compression="zstd", write_page_checksum=True
             ) as writer,
         ):
-            batch: list[dict[str, Any]] = []
+            batch: list[Values] = []
             for row in self.rows():
                 batch.append(row if row["key"] in pictured else row | {"picture": None})
                 if len(batch) == 4096:  # written at once: memory holds no more rows
@@ -146,14 +147,13 @@ class RowStore:
         return target
 
     def _one(self, question: str, key: object) -> tuple[Any, ...] | None:
-        found: tuple[Any, ...] | None = self._rows.execute(question, (key,)).fetchone()
-        return found
+        """Return the cells of the row of a key, by a question; None where there is none."""
+        cells: tuple[Any, ...] | None = self._rows.execute(question, (key,)).fetchone()
+        return cells
 
 
-def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
-    """Return the keys of the rows whose pictures are worth keeping: the
-    worst of each configuration.
-    """
+def worst_rows(rows: Iterator[Values]) -> set[str]:
+    """Return the keys of the worst rows of each configuration, which alone keep their pictures."""
     worst: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
         for measure in _WORST_BY:
@@ -166,5 +166,5 @@ def worst_rows(rows: Iterator[Mapping[str, Any]]) -> set[str]:
     return {key for best in worst.values() for _, key in best}
 
 
-def _row(data: str, picture: bytes | None) -> dict[str, Any]:
+def _row(data: str, picture: bytes | None) -> Values:
     return {**dict.fromkeys(each.key for each in COLUMNS), **json.loads(data), "picture": picture}

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A cell becomes a row: its image is rendered and compared with the reference.
 
-Its times belong to a run of all that it is compared with (`validation.study.turns`); only where
-they need not be compared, as of sweeps whose cells are timed while others run, they are taken here.
+Times of cells that are compared with one another are measured together (`validation.study.turns`).
+Only times that need not be compared, as of sweeps whose cells are timed while others run, are
+measured here.
 
-A method that refuses a scene gives a row too, with its reason, and so does one that would take too
-long. Other exceptions are the caller's: they are faults. Nothing here knows where it runs.
+A method that refuses a scene gives a row with its reason, and so does one that would take too long.
+Other exceptions are faults, and the caller's. Nothing here depends on where it runs.
 """
+
+from __future__ import annotations
 
 import json
 import math
@@ -63,18 +66,18 @@ def run(
     scene: Scene,
     reference: Reference | None,
     *,
-    whole: Any = None,
+    whole: mi.Scene | None = None,
     paint: Paint | None = None,
     apart: Apart | None = None,
 ) -> tuple[Row, Frame | None]:
     """Render and compare a cell, and time it where its times are taken 'with' its errors.
 
     Scene and reference are of the same image, at the size of the cell; without a reference nothing
-    is compared. `whole` is the `mi.Scene` that both were read from: without it no error is held
-    against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
-    method in a separate process.
+    is compared. `whole` is the scene that both were read from: without it no error is compared with
+    the error that the method states. `paint` makes the picture of the row, and `apart` calls a
+    user's method in a separate process.
     """
-    # A user's method may crash or hang, so it is rendered in a process of its own, with its further
+    # A user's method may crash or hang: it is rendered in a separate process, with its further
     # runs. A refusal is a row as well.
     took = stopwatch()
     runs: list[Array] = []
@@ -180,27 +183,25 @@ def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
     return with_times(row, brief_times(renderer)) if measure.times == "with" else row, frame
 
 
-def with_times(row: Row, found: CellTimes) -> Row:
+def with_times(row: Row, times: CellTimes) -> Row:
     """Return a row with its times."""
-    notes = [row.note, found.note, f"not timed: {found.lost}" if found.lost else None]
-    cost = row.cost and replace(row.cost, prepare_ms=found.prepare_ms)
+    notes = [row.note, times.note, f"not timed: {times.lost}" if times.lost else None]
+    cost = row.cost and replace(row.cost, prepare_ms=times.prepare_ms)
     note = "; ".join(filter(None, notes)) or None
     return replace(
-        row, times=found.times, memory=found.memory, device=found.device, cost=cost, note=note
+        row, times=times.times, memory=times.memory, device=times.device, cost=cost, note=note
     )
 
 
 def _other_runs(scene: Scene, cell: Cell) -> list[Array]:
     """Return the airlight of further runs of a method that draws random numbers, (height,
-    width, 3); of others none.
+    width, 3) each; of others none.
     """
-    parameters: dict[str, Any] = dict(cell.chosen.parameters)
-    if not method_parameters(find_method(cell.chosen.method), parameters)[0].noisy:
+    chosen = cell.chosen
+    if not method_parameters(find_method(chosen.method), dict(chosen.parameters))[0].noisy:
         return []
-    renderer, rendered = (
-        prepared(scene, cell.chosen),
-        render_frame if cell.measure.times == "stages" else _unchecked,
-    )
+    renderer = prepared(scene, chosen)
+    rendered = render_frame if cell.measure.times == "stages" else _unchecked
     frames = (rendered(replace(renderer, run=run)) for run in range(1, RUNS))
     return [np.asarray(frame.airlight, dtype=np.float64) for frame in frames]
 
@@ -259,12 +260,12 @@ def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
 
 
 def _unchecked(renderer: FrameRenderer) -> Frame:
-    """Render a frame, one that is not finite too: its pixels are counted."""
+    """Render a frame, which may have pixels that are not finite: they are counted."""
     return unchecked_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
 
 
 def _errors(
-    cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: Any
+    cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole: mi.Scene | None
 ) -> dict[str, Any]:
     """Return the errors of a frame by the names of their fields in a row."""
     test, mask = np.asarray(frame.airlight, dtype=np.float64), reference.mask
@@ -285,9 +286,9 @@ def _errors(
     errors["published"] = published_errors(reference.airlight, test, mask=mask)
     errors["normalised"] = published_errors(reference.airlight, test, unit=None, mask=mask)
     errors["colour"] = colour_difference(reference.airlight, test, mask=mask)
-    # Pixels whose error is larger than the method itself allows: the integral relative to the
-    # pixel, with a floor in the dark, and the error of the reference. Pixels that are left may owe
-    # it to the ends of lit intervals.
+    # Pixels whose error exceeds the error that the method states, relative to the pixel with a
+    # floor in the dark, and the error of the reference. The ends of lit intervals may explain the
+    # excess of some.
     bound = stated_bound(cell.chosen, scene)
     if bound is not None and whole is not None:
         # There is no mask here: scenes in which a method states a bound have no area lights, so
@@ -303,13 +304,13 @@ def _errors(
 
 
 def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
-    """Return why a frame would take longer than the limit, or None.
+    """Return in words that a frame would take longer than the limit, or None.
 
-    It is judged by its preparation once kernels are compiled and, where that takes long and for a
-    user's method, by the second frame of a small scene, whose preparation takes as long. If there
-    are many groups of lights, only the first are prepared before the frame; the others take as long
-    each. Nothing is judged where there is one group, and making the renderer `took` so little [s]
-    that a frame is far below the limit.
+    The time is estimated from the preparation once kernels are compiled. Where that takes long, and
+    for a user's method, it is estimated from the second frame of a small image, whose preparation
+    takes as long. If there are many groups of lights, only the first are prepared before the frame;
+    the others take as long each. Nothing is estimated where there is one group, and the renderer
+    was made in so little time (`took` [s]) that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
     # First by the time that making the renderer took, which costs nothing more.
@@ -330,10 +331,8 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return None
     # Last by a small frame: its preparation takes as long as that of a full frame, the rest grows
     # with the pixels.
-    small, large = (
-        prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen),
-        renderer.scene.camera,
-    )
+    small = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen)
+    large = renderer.scene.camera
     render_frame(small)  # compiles
     took = timed(lambda: render_frame(small))[1].seconds
     fraction = (large.width * large.height) / (PROBE[0] * PROBE[1])

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of one scene: its reference, the checks of the reference, every
-configuration, images from elsewhere.
+"""The study of one scene: its reference, the checks of the reference, the rows of every
+configuration and of images from elsewhere.
 
 Each part is stored on disk as soon as it is computed: a study that was killed goes on where it
 stopped, and a study in which nothing changed computes nothing. Errors are stored by configuration.
 Times are stored by scene, for all of its configurations together: they are compared with one
 another, and come from one run (`validation.study.turns`).
 """
+
+from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,6 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,8 +124,8 @@ class SceneStudy:
         return self.study.sizes[0]
 
     @contextmanager
-    def at(self, size: tuple[int, int]) -> Iterator[Any]:
-        """Give the `mi.Scene` another size [pixels] for a while: it is loaded once."""
+    def at(self, size: tuple[int, int]) -> Iterator[mi.Scene]:
+        """Give the scene another size [pixels] within a block: it is loaded once."""
         resize(self.loaded.scene, size)
         try:
             yield self.loaded.scene
@@ -142,18 +145,17 @@ class SceneStudy:
         return Cell(self.path, self.size, (), chosen, self.study.measure)
 
     def seconds(self) -> dict[str, float]:
-        """Return roughly what each part that is not kept will take on one thread
-        [s], by name and by label.
+        """Return roughly how long each part will take on one thread [s], by the names that
+        `study_scene` reports; 0 for a part that is cached.
         """
         lights, area_lights = len(self.scene.lights), len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
-        # A part whose inputs have a result on disk is loaded, which takes no time. The names are
-        # those with which `study_scene` calls `progress`.
+        # A part whose inputs have a result on disk is loaded, which takes no time.
         cached = is_kept(self.reference_inputs.key)
         work = reference_work(self.size, lights=lights, area_lights=area_lights)
         parts["reference"] = 0.0 if cached else work.seconds
-        # Estimators stop when they have decided, or when the patience ends: it is the most that
-        # each takes. A minute stands for checks without an end.
+        # Estimators stop when they have decided, at the latest when the patience ends. Where it
+        # never ends a minute stands for it.
         with self.at(checks.size) as scene:
             cached = is_kept(CheckInputs(scene_content(scene), checks, self.study.points).key)
         parts["checks"] = 0.0 if cached else len(checks.margins) * (checks.patience or 60.0)
@@ -180,10 +182,10 @@ class SceneStudy:
         """The inputs of the reference, which are among those of all that is compared with it."""
         return ReferenceInputs(scene_content(self.loaded.scene), points=self.study.points)
 
-    def inputs(self, chosen: Configuration) -> "CellInputs":
+    def inputs(self, chosen: Configuration) -> CellInputs:
         """Return the inputs of the row and the image of a configuration, without its times."""
-        # How long frames are timed, and at which size, decides no error. Whether all stages are
-        # timed does: frames that are not finite are refused there, see `run.render`.
+        # How long frames are timed, and at which size, has no effect on errors. Whether all stages
+        # are timed has: frames that are not finite are refused then, see `run.render`.
         measure = self.study.measure
         times = "stages" if measure.times == "stages" else "none"
         errors = replace(measure, times=times, seconds=0.0, slow=None, timed_size=None)
@@ -191,7 +193,7 @@ class SceneStudy:
         return CellInputs(self.reference_inputs, cell, user_code(chosen), self.machine)
 
     @cached_property
-    def times_inputs(self) -> "TimesInputs | None":
+    def times_inputs(self) -> TimesInputs | None:
         """The inputs of the times that are of one run; None where nothing is timed."""
         if self.study.measure.times == "none" or not self.configurations:
             return None
@@ -251,8 +253,8 @@ class FlipInputs(Inputs):
     """The inputs of HDR-FLIP."""
 
     kind = "flip"
-    reference: Array  #: (height, width, 3) [W/(m^2 sr)]
-    test: Array  #: of the same shape
+    reference: Layer  #: (height, width, 3) [W/(m^2 sr)]
+    test: Layer  #: of the same shape
     version: str  #: of its program
 
 
@@ -283,10 +285,11 @@ class Judged:
 
     row: Row
     image: Image | None = None  #: its layers; None if there is none
-    #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
-    expected: Any = None
-    whole: Any = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
-    results: tuple[Kept[Any], ...] = ()  #: that it was made of
+    #: the reference of its layer `row.layer`, (height, width, 3) [W/(m^2 sr)]
+    expected: Layer | None = None
+    #: the reference of all its light for HDR-FLIP, (height, width, 3) [W/(m^2 sr)]; None without
+    whole: Layer | None = None
+    results: tuple[Kept[Any], ...] = ()  #: the cached results of which it is made
 
     @property
     def light(self) -> Array:
@@ -310,7 +313,8 @@ class SceneResult:
     multiple: MultipleScattering
     rows: tuple[Judged, ...]
     seconds: Mapping[str, float]  #: that its parts took when they were computed
-    results: tuple[Kept[Any], ...] = field(repr=False, default=())  #: every part, as it was kept
+    #: every part, as it is cached
+    results: tuple[Kept[Any], ...] = field(repr=False, default=())
 
 
 def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> SceneStudy:
@@ -321,7 +325,7 @@ def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> S
 def study_scene(
     study: SceneStudy,
     *,
-    images: Sequence["EngineImage"] = (),
+    images: Sequence[EngineImage] = (),
     apart: Apart | None = None,
     ended: Mapping[Configuration, str] | None = None,
     progress: Callable[[str], None] = lambda part: None,
@@ -353,17 +357,15 @@ def study_scene(
         progress(chosen.label)
         rows.append(_row(study, chosen, apart, ended or {}))
     progress("times")
-    timings = list[Kept[Any]]()
+    timings = None
     if study.times_inputs is not None:
-        timings.append(
-            scene_times(study, study.times_inputs, [judged.row for judged in rows], apart)
-        )
+        timings = scene_times(study, study.times_inputs, [judged.row for judged in rows], apart)
         rows = [
-            replace(each, row=with_times(each.row, found))
-            for each, found in zip(rows, timings[0].value, strict=True)
+            replace(judged, row=with_times(judged.row, times))
+            for judged, times in zip(rows, timings.value, strict=True)
         ]
-    # Nothing is timed any more: FLIP, which runs on one processor in a separate
-    # process, may have all of them.
+    # Nothing is timed any more: FLIP, which runs on one processor in a separate process, may use
+    # all processors.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
@@ -375,10 +377,17 @@ def study_scene(
         "multiple": multiple.seconds,
     }
     seconds["methods"] = round(sum(result.seconds for result in methods), 3)
-    seconds["times"] = round(sum(result.seconds for result in timings), 3)
-    results: tuple[Kept[Any], ...] = (reference, agreement, multiple, *methods, *timings)
+    seconds["times"] = 0 if timings is None else timings.seconds
+    results: list[Kept[Any]] = [reference, agreement, multiple, *methods]
+    results += [] if timings is None else [timings]
     return SceneResult(
-        study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results
+        study,
+        reference.value,
+        agreement.value,
+        multiple.value,
+        tuple(rows),
+        seconds,
+        tuple(results),
     )
 
 
@@ -402,7 +411,11 @@ def configurations_for(
 
 
 def check_reference(
-    scene, checks: Checks, points: int | None = None, *, spread: ElsewhereFor | None = None
+    scene: mi.Scene,
+    checks: Checks,
+    points: int | None = None,
+    *,
+    spread: ElsewhereFor | None = None,
 ) -> Kept[dict[str, Agreement]]:
     """Compare the reference with the Monte Carlo estimators; see
     `validation.estimates.agreement.agreements`.
@@ -422,7 +435,7 @@ def check_reference(
     return stored(CheckInputs(scene_content(scene), checks, points), compute, dict[str, Agreement])
 
 
-def multiple_scattering(scene, batches: int, samples: int) -> Kept[MultipleScattering]:
+def multiple_scattering(scene: mi.Scene, batches: int, samples: int) -> Kept[MultipleScattering]:
     """Return the fraction of multiple scattering; see
     `validation.estimates.multiple_scattering`.
     """
@@ -448,17 +461,15 @@ def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> K
 
 
 def _is_worth(row: Row) -> bool:
-    """Return whether a row is to be cached: a fault of the user's method may
-    have gone by the next run.
-    """
+    """Return whether a row is to be cached: a user may correct a method that failed."""
     return row.kind == "built-in" or row.status == "done"
 
 
 def scene_times(
     study: SceneStudy, inputs: TimesInputs, rows: Sequence[Row], apart: Apart | None
 ) -> Kept[list[CellTimes]]:
-    """Return the times of all cells of a scene, of one run; `rows`: what came of them,
-    as not all can be timed.
+    """Return the times of all cells of a scene, of one run; `rows`: of the cells, of which only
+    those that were done can be timed.
     """
     compute = partial(_scene_times, study, rows, apart)
     return stored(inputs, compute, list[CellTimes], partial(_all_timed, rows))
@@ -487,8 +498,8 @@ def _scene_times(study: SceneStudy, rows: Sequence[Row], apart: Apart | None) ->
     at = "timed at {} x {}: larger frames take minutes".format(*study.size)
     smaller = [cell is not None and cell.size != study.timed_size for cell in cells]
     return [
-        replace(found, note=at) if less else found
-        for found, less in zip(timings, smaller, strict=True)
+        replace(times, note=at) if less else times
+        for times, less in zip(timings, smaller, strict=True)
     ]
 
 
@@ -502,8 +513,7 @@ def _row(
     if chosen in ended:
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
         return Judged(row, results=(Kept(row, Spent(), time.time(), False),))
-    # The reference is loaded or computed before the configuration, so that it is no part of the
-    # time of a configuration.
+    # The reference is loaded or computed first: its time is no part of that of a configuration.
     reference = study.reference
     result = measured(study, chosen, apart)
     # The same scene may have been measured under another path.
@@ -516,16 +526,14 @@ def _row(
     return replace(judged, expected=reference.airlight, whole=whole)
 
 
-def _flip(reference: Array, test: Array) -> tuple[Flip, Layer | None]:
+def _flip(reference: Layer, test: Layer) -> tuple[Flip, Layer | None]:
     """Return HDR-FLIP and its map."""
     summary, error_map = flip_hdr(reference, test)
     return record_of(summary, Flip), error_map
 
 
 def _with_flip(judged: Judged) -> Judged:
-    """Return a row with its HDR-FLIP, whose map is a grey layer of the
-    image, where it is asked for.
-    """
+    """Return a row with HDR-FLIP where it is asked for; its map is a grey layer of the image."""
     if judged.whole is None or judged.image is None:
         return judged
     # FLIP is another program: its version is an input beside both images.
@@ -546,7 +554,7 @@ def _with_flip(judged: Judged) -> Judged:
     )
 
 
-def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
+def _image(study: SceneStudy, shown: EngineImage) -> Judged:
     """Return the row of an image from elsewhere."""
     from airlight.validation.engine.images import image_times
 
@@ -567,7 +575,7 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
 
 
 def _measured_image(
-    study: SceneStudy, shown: "EngineImage", times: tuple[Timing, str] | None
+    study: SceneStudy, shown: EngineImage, times: tuple[Timing, str] | None
 ) -> Judged:
     """Return the row of an image with its layers."""
     from airlight.validation.engine.images import measure_image, notes_of

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of a study: what its file asks for, and what a report says that was asked for.
+"""The settings of a study, as its file has them and as a report shows them.
 
-They are the same records, with their columns, and need no Mitsuba: a page
-reads them from report.json.
+Both are the same records, with their columns, and need no Mitsuba: a page reads them from
+report.json.
 """
 
 from collections.abc import Mapping

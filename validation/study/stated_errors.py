@@ -26,16 +26,18 @@ and shadow planes in exact order) state three errors:
   difference over the value.
 """
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.parameters import defaults
-from airlight.realtime.scene.phase import Tabulated
+from airlight.realtime.scene.phase import Phase, Tabulated
 from airlight.realtime.scene.read_scene import Scene
 from airlight.reference.quadrature.fields import field_of, optical_depth
 from airlight.reference.quadrature.intervals import AMBIENT, camera_segments, scattering_range
@@ -51,7 +53,7 @@ from airlight.reference.scene.read import (
 )
 from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.visibility.distances import crossings
-from airlight.validation.arrays import Array, Index
+from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.study.configuration import Configuration
 
 #: The error of the integral that methods promise which claim to be exact, relative to the pixel, or
@@ -61,13 +63,16 @@ EXACT = 1e-3
 #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
 END = 8 * 2.0**-24
 
+#: Returns the direction in which a light arrives at points and its irradiance [W/m^2], (n, 3) each.
+Incident = Callable[[Array], tuple[Array, Array]]
+
 _SAMPLES = 256  # of a ray, about each light: what is scattered is smooth between them
 _RAYS = 1024  # at once: so many take some 100 MB
 
 
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
-    """Return the relative error that a method states for itself in a scene, ends left
-    aside [1]; None for none.
+    """Return the relative error that a method states for itself in a scene, without that of the
+    ends of lit intervals [1]; None for none.
 
     Points in the place of area lights are an approximation.
     """
@@ -85,7 +90,7 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
     return bound if np.isfinite(bound) else None
 
 
-def _kinks(phase: Any) -> float:
+def _kinks(phase: Phase) -> float:
     """Return the largest error by the kinks of a phase function, relative to the integral."""
     if not isinstance(phase, Tabulated):
         return 0.0
@@ -98,9 +103,9 @@ def _kinks(phase: Any) -> float:
         return float(np.nan_to_num(0.25 * bends / neighbours.min(axis=1), posinf=np.inf).max())
 
 
-def worth_of_ends(scene: Any, pixels: Index) -> Array:
-    """Return the largest error by uncertain ends of lit intervals in an `mi.Scene`,
-    (pixels, 3) [W/(m^2 sr)].
+def worth_of_ends(scene: mi.Scene, pixels: Index) -> Array:
+    """Return the largest error by uncertain ends of lit intervals in pixels of a scene, by their
+    numbers, (pixels, 3) [W/(m^2 sr)].
 
     Valid for lights without extent. The ends may be anywhere: the largest x s(x) along
     a ray counts, lit or not.
@@ -116,31 +121,35 @@ def _worth_of_ends(reference: ReferenceScene) -> Array:
     """Return the largest error by uncertain ends of lit intervals of all rays
     of `reference`, (rays, 3).
     """
-    # Lights at a place are sampled at equal angles about them, lights at infinity at equal steps.
     distance = surface_hits(reference).distance
     worth = np.zeros((len(distance), 3))
-    sources: list[tuple[Any, ...]] = [
-        (light, _angles_about, _from_place) for light in reference.lights
-    ]
-    sources += [(light, _equal_steps, _from_infinity) for light in reference.directional]
     ends, growth = _ends(reference, distance)
-    for light, places_of, incident in sources:
+    for samples, incident in _sampled_lights(reference, distance):
         # The possible ends of rays have their own factor 1/|c|; at all other places a shadow may
         # end, with a factor of 1. Places that a ray does not have are infinite.
-        places = np.concatenate([ends, places_of(reference, light, distance)])
+        places = np.concatenate([ends, samples])
         uncertain = np.concatenate([growth, np.ones_like(places[len(ends) :])]).T
         x = np.clip(places, 0, distance).T
         ray, column = np.nonzero(np.isfinite(x))
         uncertain, x = (uncertain * x)[ray, column], x[ray, column]
-        scattered = uncertain[:, None] * _scattered(
-            reference, partial(incident, reference, light), ray, x, distance
-        )
+        scattered = uncertain[:, None] * _scattered(reference, incident, ray, x, distance)
         # One uncertain end for each light: errors of several lights add up.
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
     # No place between the samples scatters more than 1.1 times the largest of them.
     return 1.1 * END * worth
+
+
+def _sampled_lights(reference: ReferenceScene, distance: Array) -> Iterator[tuple[Array, Incident]]:
+    """Yield for each light distances along rays at which it is sampled, (places, rays) [m], and
+    its irradiance at points.
+    """
+    # Lights at a place are sampled at equal angles about them, lights at infinity at equal steps.
+    for light in reference.lights:
+        yield _angles_about(reference, light, distance), partial(_from_place, reference, light)
+    for sun in reference.directional:
+        yield _equal_steps(reference, distance), partial(_from_infinity, sun)
 
 
 def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
@@ -181,7 +190,7 @@ def _angles_about(reference: ReferenceScene, light: ReferenceLight, distance: Ar
     return np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf)
 
 
-def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: Array) -> Array:
+def _equal_steps(reference: ReferenceScene, distance: Array) -> Array:
     """Return distances at equal steps where rays scatter, (places, rays) [m]."""
     if isinstance(reference.medium, VaryingMedium):
         # A level ray through height fog scatters without an end: its steps are none.
@@ -196,7 +205,9 @@ def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: A
 def _from_place(
     reference: ReferenceScene, light: ReferenceLight, point: Array
 ) -> tuple[Array, Array]:
-    """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
+    """Return the direction in which light arrives at points and its irradiance [W/m^2], (n, 3)
+    each.
+    """
     segment = point - light.position
     r = np.linalg.norm(segment, axis=1)
     segment /= r[:, None]
@@ -204,24 +215,25 @@ def _from_place(
     return segment, light.intensity / (r * r)[:, None] * np.exp(-depth)
 
 
-def _from_infinity(
-    reference: ReferenceScene, light: DirectionalLight, point: Array
-) -> tuple[Array, Array]:
-    """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
-    return np.broadcast_to(light.direction, point.shape), np.broadcast_to(
-        light.irradiance, point.shape
+def _from_infinity(light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+    """As `_from_place`, but without attenuation on the way: an upper bound."""
+    direction, irradiance = (
+        np.broadcast_to(vector, point.shape) for vector in (light.direction, light.irradiance)
     )
+    return direction, irradiance
 
 
 def _scattered(
     reference: ReferenceScene,
-    incident: Callable[[Array], tuple[Array, Array]],
+    incident: Incident,
     ray: Index,
     x: Array,
     distance: Array,
 ) -> Array:
-    """Return the light that a metre of rays scatters at distances x, fully lit by one
-    light, (n, 3) [W/(m^3 sr)].
+    """Return the radiance that a metre of rays scatters at distances x, fully lit by one light,
+    (n, 3) [W/(m^3 sr)].
+
+    `ray`: number of the ray of each x; `distance`: of the surface on each ray [m].
     """
     direction = reference.direction[ray]
     segment, arriving = incident(reference.origin + x[:, None] * direction)
@@ -241,8 +253,10 @@ def _scattered(
 
 def _media(
     reference: ReferenceScene, ray: Index, x: Array, distance: Array
-) -> list[tuple[ReferenceMedium, Any]]:
-    """Return media and which places are in them; a place at a bound is on either side of it."""
+) -> list[tuple[ReferenceMedium, Bools]]:
+    """Return media, each with the mask of the places in it, (n,); a place at a bound is in the
+    media on both sides.
+    """
     if not reference.media:
         return [(homogeneous_around(reference), np.ones(len(x), dtype=bool))]
     # The slack is the uncertainty of a bound: a place on it is in the media at both sides.

@@ -34,20 +34,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from airlight.errors import InputError, nearest
 from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.parameters import defaults
 from airlight.validation.readers import (
     Reader,
-    each_once,
     read_list,
     read_named,
     read_number,
     read_one_of,
     read_table,
     read_toml,
+    read_whole,
     read_word,
     several,
 )
@@ -79,6 +79,8 @@ TIMES = ("none", "with", "alone", "stages")
 #: The studies of reports, and the kinds of work by which times may grow.
 STUDIES = ("quick", "default", "full")
 GROWTH = ("size", "triangles", "lights", "map")
+
+_Value = TypeVar("_Value")
 
 _FOLDER = Path(__file__).parent / "studies"
 
@@ -227,8 +229,8 @@ def default_configurations() -> tuple[Configuration, ...]:
     report, default area lights.
     """
     kinds = [each for each in QUICK if "points" not in dict(each.parameters)]
-    known = {each.method for each in kinds}
-    others = [name for name in FOG_METHODS if name not in known]
+    methods = {each.method for each in kinds}
+    others = [name for name in FOG_METHODS if name not in methods]
     return (*kinds, *(configuration(name) for name in others))
 
 
@@ -236,7 +238,7 @@ def default_study(count: int) -> Study:
     """Return the study without a file: so many random scenes, every
     method once, 160 x 120 pixels.
     """
-    read_number("study", count, 1, _MOST_SCENES)
+    read_whole("study", count, 1, _MOST_SCENES)
     return Study(
         f"random-{count}", random=RandomScenes(count), configurations=default_configurations()
     )
@@ -257,33 +259,35 @@ def read_study(path: Path) -> Study:
     return study
 
 
-def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "sweep") -> Study:
-    """Return the study that a table describes, as `tomllib` reads it; paths of
-    scenes begin at `folder`.
+def parse_study(data: Mapping[str, object], *, folder: Path = Path(), name: str = "sweep") -> Study:
+    """Return the study that a table describes, as `tomllib` reads it.
+
+    Paths of scenes begin at `folder`.
     """
-    # The keys of a study and of its measurements stand beside one another in the file; each reader
-    # skips those of the other.
+    # The keys of a study and of its measurements stand beside one another in the file: either
+    # reader passes over the keys of the other.
     others = ("scenes", "random", "methods", "kernels", "maps", "parameters")
-    given, measure = (
-        read_named("", data, _STUDY, *_MEASURE, *others),
-        read_named("", data, _MEASURE, *_STUDY, *others),
-    )
+    settings = read_named("", data, _STUDY, *_MEASURE, *others)
+    measure = read_named("", data, _MEASURE, *_STUDY, *others)
+    # Keys that contradict one another.
     times = measure.get("times", "with")
-    if "timed" in given and times != "alone":
+    if "timed" in settings and times != "alone":
         raise InputError(
             f'timed: it is of times = "alone", got times = "{times}"; leave one of them out'
         )
-    paths = given.get("checks", Checks()).samples.get("volpath", 0)
-    if given.get("half") and 4 * paths > _MOST_SAMPLES:
+    paths = settings.get("checks", Checks()).samples.get("volpath", 0)
+    if settings.get("half") and 4 * paths > _MOST_SAMPLES:
         raise InputError(
             f"checks.samples.volpath: got {paths}, expected at most {_MOST_SAMPLES // 4} beside "
             "`half`, whose scenes have four times as many"
         )
     scenes = data.get("scenes", [])
-    one = partial(_scene, folder=folder)
+    read_scene_name = partial(_scene, folder=folder)
     return Study(
-        **{"name": name, **given},
-        scenes=tuple(FOG_SCENES) if scenes == "all" else several(one, 0)("scenes", scenes),
+        **{"name": name, **settings},
+        scenes=tuple(FOG_SCENES)
+        if scenes == "all"
+        else several(read_scene_name, 0)("scenes", scenes),
         random=_random(data.get("random", {}), folder),
         configurations=_configurations(data),
         measure=Measure(**{_FIELDS.get(name, name): value for name, value in measure.items()}),
@@ -296,7 +300,7 @@ def standard_study(name: str) -> Study:
     return read_study(_FOLDER / f"{name}.toml")
 
 
-def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
+def _configurations(data: Mapping[str, object]) -> tuple[Configuration, ...]:
     """Return the combinations of methods, kernels, maps and parameters."""
     # A word stands for a set of configurations that are complete. Together with kernels, maps or
     # parameters it only names the methods.
@@ -310,11 +314,7 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
             return standard
         names = list(dict.fromkeys(each.method for each in standard))
     else:
-        names = list(
-            each_once(
-                "methods", tuple(read_word("methods", word) for word in read_list("methods", asked))
-            )
-        )
+        names = list(several(read_word)("methods", asked))
     # Every name is checked before anything is combined: the message then says which is wrong.
     for method in names:
         configuration(method)  # refuses unknown names
@@ -323,18 +323,16 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
         raise InputError(
             f"parameters.{stray[0]}: the study has no method of that name{nearest(stray[0], names)}"
         )
-    kernels = (
-        [read_word("kernels", word) for word in read_list("kernels", data["kernels"])]
-        if "kernels" in data
-        else [None]
-    )
+    # None stands for a method's default, where the file says nothing.
+    kernels: list[str | None] = [None]
+    if "kernels" in data:
+        kernels = [read_word("kernels", word) for word in read_list("kernels", data["kernels"])]
     for kernel in kernels:
         if kernel is not None:
             find_kernel(kernel)
-    # None stands for a method's default, where the file says nothing.
-    sides = read_list("maps", data["maps"]) if "maps" in data else [None]
-    for side in sides:
-        read_number("maps", 1 if side is None else side, 1, 16384)
+    sides: list[int | None] = [None]
+    if "maps" in data:
+        sides = [read_whole("maps", side, 1, 16384) for side in read_list("maps", data["maps"])]
     chosen = [
         each
         for method in names
@@ -354,9 +352,12 @@ def _of_method(
     method: str,
     kernels: Sequence[str | None],
     sides: Sequence[int | None],
-    parameters: Mapping[str, Any],
+    parameters: Mapping[str, object],
 ) -> Iterator[Configuration]:
-    """Yield the configurations of a method: kernels, maps and parameters, each with each."""
+    """Yield the configurations of a method: kernels, maps and parameters, each with each.
+
+    `sides`: of shadow maps [texels]; `parameters`: a value or a list of values by name.
+    """
     if "map" in parameters and sides != [None]:
         raise InputError(f"parameters.{method}.map: `maps` says it too; give one of them")
     lists = {
@@ -395,13 +396,13 @@ def map_side(chosen: Configuration) -> int | None:
     """
     if chosen.method not in METHODS:
         return None
-    known = defaults(METHODS[chosen.method]) | dict(chosen.parameters)
-    uses = "map" in known and known.get("shadow", "map") == "map"
-    return int(known["map"]) if uses and isinstance(known["map"], int) else None
+    values = defaults(METHODS[chosen.method]) | dict(chosen.parameters)
+    drawn = "map" in values and values.get("shadow", "map") == "map"
+    return int(values["map"]) if drawn and isinstance(values["map"], int) else None
 
 
-def _scene(what: str, item: Any, *, folder: Path) -> str:
-    word = read_word(what, item)
+def _scene(what: str, value: object, *, folder: Path) -> str:
+    word = read_word(what, value)
     if word in SCENES:
         if SCENES[word].clouds:
             raise InputError(
@@ -426,12 +427,12 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
     return str(path.resolve())
 
 
-def _random(table: Any, folder: Path) -> RandomScenes:
-    given = read_named("random.", read_table("random", table), _RANDOM)
-    if "ranges" in given:
-        given["ranges"] = (folder / given["ranges"]).resolve()
-        read_ranges(given["ranges"])  # refuses what cannot be drawn
-    scenes = RandomScenes(**given)
+def _random(value: object, folder: Path) -> RandomScenes:
+    settings = read_named("random.", read_table("random", value), _RANDOM)
+    if "ranges" in settings:
+        settings["ranges"] = (folder / settings["ranges"]).resolve()
+        read_ranges(settings["ranges"])  # refuses what cannot be drawn
+    scenes = RandomScenes(**settings)
     if scenes.count and scenes.first + scenes.count - 1 > LARGEST_SEED:
         raise InputError(
             f"random: got {scenes.count} scenes from random:{scenes.first} on, expected seeds up "
@@ -440,7 +441,7 @@ def _random(table: Any, folder: Path) -> RandomScenes:
     return scenes
 
 
-def _medium(what: str, item: Any) -> tuple[str, ...]:
+def _medium(what: str, item: object) -> tuple[str, ...]:
     changes: dict[str, tuple[float, ...]] = {}
     for name, value in read_table(what, item).items():
         if not name.partition(".")[0].startswith("medium"):
@@ -448,7 +449,7 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
                 f"media: got {name!r}, expected medium.sigma_t, medium.albedo or medium.g; quote "
                 "the name"
             )
-        numbers = value if isinstance(value, list) else [value]
+        numbers: list[Any] = value if isinstance(value, list) else [value]
         if not numbers or not all(type(number) in (int, float) for number in numbers):
             raise InputError(
                 f"media: got {value!r} for {name}, expected a number or a list of numbers"
@@ -457,7 +458,7 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
     return tuple(change_words(changes))
 
 
-def _size(what: str, value: Any) -> tuple[int, int]:
+def _size(what: str, value: object) -> tuple[int, int]:
     size = parse_size(read_word(what, value))
     if not all(1 <= side <= 16384 for side in size):
         raise InputError(
@@ -467,22 +468,22 @@ def _size(what: str, value: Any) -> tuple[int, int]:
     return size
 
 
-def _flip(what: str, value: Any) -> str:
+def _flip(what: str, value: object) -> str:
     words = {True: "all", False: "none", "kinds": "kinds"}
     if not isinstance(value, bool | str) or value not in words:
         raise InputError(f'{what}: got {value!r}, expected true, false or "kinds"')
     return words[value]
 
 
-def _pair(what: str, value: Any) -> tuple[int, ...]:
+def _pair(what: str, value: object) -> tuple[int, ...]:
     if not isinstance(value, list) or len(value) != 2:
         raise InputError(f"{what}: got {value!r}, expected two whole numbers")
     # A standard error needs two batches.
     batches, samples = value
-    return read_number(what, batches, 2, 1 << 16), read_number(what, samples, 1, _MOST_SAMPLES)
+    return read_whole(what, batches, 2, 1 << 16), read_whole(what, samples, 1, _MOST_SAMPLES)
 
 
-def _checks(what: str, value: Any) -> Checks:
+def _checks(what: str, value: object) -> Checks:
     checks = Checks(**read_named(f"{what}.", read_table(what, value), _CHECKS))
     if checks.margins.keys() != checks.samples.keys():
         raise InputError(
@@ -491,32 +492,31 @@ def _checks(what: str, value: Any) -> Checks:
     return checks
 
 
-def _by_estimator(read: Reader) -> Reader:
+def _by_estimator(read: Reader[_Value]) -> Reader[dict[str, _Value]]:
     """Return a reader of values by the estimators that can check a reference."""
     names = dict.fromkeys(Checks().margins, read)
     return lambda what, value: read_named(f"{what}.", read_table(what, value), names)
 
 
-_seconds = partial(read_number, least=0, most=_LONGEST, whole=False)
-_count = partial(read_number, least=0, most=_MOST_SCENES)
+_seconds = partial(read_number, least=0, most=_LONGEST)
 
-#: Readers of the values of a study file: of the study, its measurements, and the
-#: checks of its references.
-_STUDY: Mapping[str, Reader] = {
+#: Readers of the values of a study file by the names of the fields that they fill: of the study,
+#: its measurements, its random scenes, and the checks of its references.
+_STUDY: Mapping[str, Reader[Any]] = {
     "name": read_word,
     "half": several(read_word, 0),
     "sizes": several(_size),
     "media": several(_medium),
-    "points": partial(read_number, least=1, most=1024),
+    "points": partial(read_whole, least=1, most=1024),
     "flip": _flip,
-    "timed": partial(read_number, least=1, most=_MOST_SCENES),
-    "limit": partial(read_number, least=1e-3, most=_LONGEST, whole=False),
-    "retries": partial(read_number, least=0, most=100),
+    "timed": partial(read_whole, least=1, most=_MOST_SCENES),
+    "limit": partial(read_number, least=1e-3, most=_LONGEST),
+    "retries": partial(read_whole, least=0, most=100),
     "checks": _checks,
-    "stability": partial(read_number, least=0, most=_MOST_RAYS),
+    "stability": partial(read_whole, least=0, most=_MOST_RAYS),
     "growth": several(partial(read_one_of, names=GROWTH), 0),
 }
-_MEASURE: Mapping[str, Reader] = {
+_MEASURE: Mapping[str, Reader[Any]] = {
     "times": partial(read_one_of, names=TIMES),
     "timed_size": _size,
     "seconds": _seconds,
@@ -524,16 +524,16 @@ _MEASURE: Mapping[str, Reader] = {
     "frame_limit": _seconds,
     "metrics": lambda what, value: read_one_of(what, value, names=("usual", "all")) == "all",
 }
-_RANDOM: Mapping[str, Reader] = {
-    "count": _count,
-    "first": partial(read_number, least=0, most=2**62),
+_RANDOM: Mapping[str, Reader[Any]] = {
+    "count": partial(read_whole, least=0, most=_MOST_SCENES),
+    "first": partial(read_whole, least=0, most=2**62),
     "ranges": read_word,
 }
-_CHECKS: Mapping[str, Reader] = {
+_CHECKS: Mapping[str, Reader[Any]] = {
     "size": _size,
-    "margins": _by_estimator(partial(read_number, least=1e-9, most=1, whole=False)),
-    "samples": _by_estimator(partial(read_number, least=1, most=_MOST_SAMPLES)),
-    "batches": partial(read_number, least=2, most=1 << 16),
+    "margins": _by_estimator(partial(read_number, least=1e-9, most=1)),
+    "samples": _by_estimator(partial(read_whole, least=1, most=_MOST_SAMPLES)),
+    "batches": partial(read_whole, least=2, most=1 << 16),
     "multiple": _pair,
     "patience": _seconds,
 }

@@ -11,7 +11,7 @@ A user's method may be in a separate process. It takes its turns as the others d
 process waits meanwhile.
 """
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -45,11 +45,9 @@ from airlight.validation.study.study import Cell, Measure
 from airlight.validation.timing import ANCHORS, FrameTimes, TimingRun, anchored
 
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the
-#: method's)``. Values that a function yields are yielded here, as they are asked for.
+#: method's)``. Its result is that of the function, whatever this is; values that a function yields
+#: are yielded here, as they are asked for.
 Apart = Callable[..., Any]
-
-#: What `turns_of` yields: `Ready`, then lists of `FrameSpent`.
-Turns = Generator[Any, None, None]
 
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little,
@@ -57,7 +55,8 @@ Turns = Generator[Any, None, None]
 SLOW = 8.0
 _PATIENCE = 1.5  # approximate time for the turns of a slow method; one is the least [s]
 _BRIEF = 0.2  # on the turns of a method that is timed briefly [s]
-# in a frame that takes less, its recording takes a part of the time that counts [s]
+# A method with shorter frames has a first turn that does not count: the time of recording would be
+# a part of its times [s].
 _RECORDED = 1.0
 
 
@@ -66,7 +65,7 @@ class CellTimes:
     """The times of a cell, and the memory that its frame takes."""
 
     times: FrameTimes | None = None
-    #: for the state of the method, where nothing else is done meanwhile
+    #: for the state of the method, where it is prepared by itself
     prepare_ms: float | None = None
     memory: float | None = None  #: as of a row [MiB]
     device: str | None = None  #: that draws a shader
@@ -83,27 +82,28 @@ class Ready:
     device: str | None = None
 
 
+#: The turns of a method as a generator: `Ready` first, then the frames of each turn.
+Turns = Generator[Ready | list[FrameSpent], None, None]
+
+
 def time_cells(
     cells: Sequence[Cell | None],
     scene_of: Callable[[Cell], Scene],
     *,
     apart: Apart | None = None,
-    anchor: Callable[[], Any] | None = None,
-    progress: Callable[[float], None] = lambda fraction: None,
+    anchor: Callable[[], object] | None = None,
 ) -> list[CellTimes]:
     """Time frames of cells of one scene, in one run.
 
     `cells`: at the size of the frames that are timed; None for what is not timed; `scene_of`:
     returns the scene of a cell at that size; `apart`: calls a user's method in a separate process;
-    `anchor`: camera rays of the first cell by default; `progress`: called with the fraction of
-    methods that are ready.
+    `anchor`: camera rays of the first cell by default.
     """
     # A method that fails has its reason in its place, and the others are timed.
     times = [CellTimes() for _ in cells]
     with ExitStack() as stack:
         pieces: dict[int, Piece[list[FrameSpent]]] = {}
         for place, cell in enumerate(cells):
-            progress(place / len(cells))
             if cell is None:
                 continue
             # Every method compiles and records before the first is timed. The generator of its
@@ -114,7 +114,7 @@ def time_cells(
                     turns = apart(turns_of_cell, cell, name=cell.chosen.method)
                 else:
                     turns = turns_of(prepared(scene_of(cell), cell.chosen), cell.measure)
-                ready = next(stack.enter_context(closing(turns)))
+                ready = _ready(stack.enter_context(closing(turns)))
             except InputError as error:
                 times[place] = CellTimes(lost=str(error))
                 continue
@@ -130,17 +130,6 @@ def time_cells(
     return times
 
 
-def time_frame(
-    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
-) -> FrameTimes:
-    """Return the times of the frames of one renderer, in a run of its own;
-    parameters as of `time_alone`.
-    """
-    times = time_alone(renderer, seconds=seconds, slow=slow).times
-    assert times is not None
-    return times
-
-
 def time_alone(
     renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
 ) -> CellTimes:
@@ -151,7 +140,7 @@ def time_alone(
     """
     measure = Measure("stages", seconds, slow=slow)
     with closing(turns_of(renderer, measure)) as turns:
-        ready = next(turns)
+        ready = _ready(turns)
         times = [CellTimes(memory=ready.memory, device=ready.device)]
         piece = _piece(turns, ready, measure, _raise)
         _run(times, {0: piece}, camera_rays(renderer.scene), object_moves(renderer.scene))
@@ -180,9 +169,7 @@ def turns_of_cell(cell: Cell) -> Turns:
 
 
 def turns_of(renderer: FrameRenderer, measure: Measure) -> Turns:
-    """Yield a `Ready`, then what the frames of a turn took, a list of `FrameSpent`,
-    as often as anybody asks.
-    """
+    """Yield a `Ready`, then the times of the frames of a turn, as often as they are asked for."""
     if not is_shader(renderer.method.name):
         yield from _turns(renderer, measure)
         return
@@ -223,8 +210,15 @@ def _turns(renderer: FrameRenderer, measure: Measure) -> Turns:
         yield turn()
 
 
+def _ready(turns: Turns) -> Ready:
+    """Let a method compile and record, and return its facts."""
+    ready = next(turns)
+    assert isinstance(ready, Ready)
+    return ready
+
+
 def _piece(
-    turns: Iterator[Any], ready: Ready, measure: Measure, lose: Callable[[Exception], None]
+    turns: Turns, ready: Ready, measure: Measure, lose: Callable[[Exception], None]
 ) -> Piece[list[FrameSpent]]:
     """Return the turns of a method as a piece of work; a method that fails in a turn
     is lost and has no more.
@@ -232,11 +226,12 @@ def _piece(
 
     def turn() -> list[FrameSpent]:
         try:
-            spent: list[FrameSpent] = next(turns, [])
-            return spent
+            spent = next(turns, list[FrameSpent]())
         except InputError as error:
             lose(error)
             return []
+        assert isinstance(spent, list)
+        return spent
 
     # A shader draws for its time by itself, and is asked once a round.
     rounds = int(np.clip(_PATIENCE / max(ready.took, 1e-9), 1, ROUNDS))
@@ -261,8 +256,8 @@ def _raise(error: Exception) -> None:
 def _run(
     times: list[CellTimes],
     pieces: dict[int, Piece[list[FrameSpent]]],
-    anchor: Callable[[], Any],
-    moves: Callable[[], Any] | None,
+    anchor: Callable[[], object],
+    moves: Callable[[], object] | None,
 ) -> None:
     """Let pieces of work take turns, and put the times of their frames in their places."""
 
@@ -293,8 +288,9 @@ def _run(
 
 
 def _cell_times(
-    known: CellTimes, spent: list[FrameSpent], moves: list[Spent], run: TimingRun
+    ready: CellTimes, spent: list[FrameSpent], moves: list[Spent], run: TimingRun
 ) -> CellTimes:
+    """Return the facts of a method before its first turn, with the times of its frames."""
     prepares = [each.prepare for each in spent if each.prepare is not None]
     prepare_ms = timing_of(prepares).median_ms if prepares else None
-    return replace(known, times=times_of(spent, moves, run), prepare_ms=prepare_ms)
+    return replace(ready, times=times_of(spent, moves, run), prepare_ms=prepare_ms)

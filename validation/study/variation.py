@@ -4,19 +4,21 @@
 *Runs.* The reference has no noise: the error of runs is bias and noise apart. Methods that draw no
 random numbers are rendered once, and stand beside the others: all of their error is bias.
 
-*Frames.* Each is held against its own reference. In a sweep the lights circle as in the animation
-of the scene; in a step they stand for `BEFORE` frames, then jump. A method that keeps something of
-its last frames gets it, as in `airlight render --frames`. Methods that draw random numbers are
+*Frames.* Each is compared with the reference of its lights. In a sweep the lights circle as in the
+animation of the scene; in a step they stand for `BEFORE` frames, then jump. A method that uses its
+last frames has them, as in `airlight render --frames`. Methods that draw random numbers are
 rendered in several runs: their numbers are means over these, with errors from the spread of the
 runs.
 """
+
+from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, cycle, islice
-from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from airlight.errors import InputError
@@ -53,7 +55,7 @@ class MethodNoise:
 
 
 def method_noise(
-    scene: Any,
+    scene: mi.Scene,
     configurations: Sequence[Configuration],
     *,
     runs: int = 16,
@@ -61,7 +63,7 @@ def method_noise(
 ) -> list[MethodNoise]:
     """Return the noise of each configuration's airlight.
 
-    `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at
+    `scene`: at its own size; `runs`: of a method that draws random numbers, at
     least two. The time of a frame is a median while nothing moves, of one run of all methods in
     turns. Raises InputError for fewer runs and a dark reference.
     """
@@ -88,8 +90,8 @@ def method_noise(
             np.mean(images, axis=0),
             np.std(images, axis=0, ddof=min(1, len(images) - 1)),
         )
-        # A mean within two standard errors of the reference is shown as the reference: what is
-        # left of a picture of the difference is bias.
+        # A mean within two standard errors of the reference is shown as the reference: a picture of
+        # the difference shows bias alone.
         biased = np.abs(mean - reference) > 2.0 / math.sqrt(count) * deviation
         rendered.append((images, np.where(biased, mean, reference), deviation))
     # All methods take turns, 0.2 s each: their times are compared.
@@ -117,7 +119,7 @@ class MethodMotion:
 
 
 def method_motion(
-    scene: Any,
+    scene: mi.Scene,
     animation: Animation,
     configurations: Sequence[Configuration],
     *,
@@ -129,7 +131,7 @@ def method_motion(
 ) -> list[MethodMotion]:
     """Return the quality of each configuration.
 
-    `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights
+    `scene`: at its own size; `animation`: that of the scene, of which the lights
     move; `turn`: frames of a whole turn of a sweep; `runs`: of a method that draws random numbers.
     Raises InputError for a scene whose lights do not move, and too few frames or runs.
     """
@@ -149,8 +151,8 @@ def method_motion(
         else _step(read, moves, frames)
     )
     total = frames * (1 + len(configurations))
-    tell = None if progress is None else lambda number, what: progress(number, total, what)
-    references = light_references(scene, places, moves, tell)
+    report = None if progress is None else lambda number, what: progress(number, total, what)
+    references = light_references(scene, places, moves, report)
     everywhere = np.ones(references[0].shape[:2], dtype=bool)
     rows = []
     for number, chosen in enumerate(configurations):
@@ -175,15 +177,15 @@ def method_motion(
 
 
 def light_references(
-    scene: Any,
+    scene: mi.Scene,
     places: Sequence[Scene],
     moves: Animation,
     progress: Callable[[int, str], None] | None = None,
 ) -> list[Array]:
-    """Return the airlight of the reference of each frame, (height, width, 3); in the
+    """Return the airlight of the reference of each frame, (height, width, 3) [W/(m^2 sr)]; in the
     end the scene is as it was.
 
-    `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves,
+    `places`: the scene of each frame, of which `moves` says what moves,
     the first as it is now; `progress`: called with the number of a frame and what. Raises
     InputError for area lights, and where nothing moves.
     """
@@ -210,8 +212,8 @@ def light_references(
 
 
 def method_frames(renderer: FrameRenderer, places: Sequence[Scene]) -> list[Array]:
-    """Return the airlight of a method in each frame, which gets what the frame before
-    leaves, (height, width, 3).
+    """Return the airlight of a method in each frame, which has the cache of the frame before,
+    (height, width, 3) [W/(m^2 sr)].
     """
     caches, images = None, []
     for place, last in zip(places, (None, *places), strict=False):

@@ -30,14 +30,14 @@ def changed(folder, change):
     ("text", "message"),
     [
         ("{", "is not valid JSON"),
-        ("[]", "has no schema, expected 'airlight-report/4'"),
+        ("[]", "has no schema, expected 'airlight-report/5'"),
         (
             '{"schema": "airlight-report/3"}',
-            "the schema 'airlight-report/3', expected 'airlight-report/4'; make the",
+            "the schema 'airlight-report/3', expected 'airlight-report/5'; make the",
         ),
         (
-            '{"schema": "airlight-report/4"}',
-            "does not keep to airlight-report/4: report: Object missing required field `created`; "
+            '{"schema": "airlight-report/5"}',
+            "does not keep to airlight-report/5: report: Object missing required field `created`; "
             "make",
         ),
     ],

@@ -194,11 +194,11 @@ def test_pixels_that_have_a_reference_keep_their_places_and_others_are_none(monk
     monkeypatch.setattr(sampled, "reference_of_pixels", of_pixels)
     some = sampled.sampled_reference(mi.load_dict(tiny_scene(size=(40, 32))))
     number = np.arange(40 * 32).reshape(32, 40)
-    assert some["mask"].sum() == 40 * 32 // 16
-    expected = np.where(some["mask"], number, 0)[..., None] * np.array([1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(some["airlight"], expected)
+    assert some.mask.sum() == 40 * 32 // 16
+    expected = np.where(some.mask, number, 0)[..., None] * np.array([1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(some.airlight, expected)
     # three standard errors
-    np.testing.assert_allclose(some["error"], 0.5 * expected + 3 * 0.1 * expected)
+    np.testing.assert_allclose(some.error, 0.5 * expected + 3 * 0.1 * expected)
 
 
 @pytest.mark.slow
@@ -218,10 +218,8 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
     for seed in range(16):
         monkeypatch.setattr(sampled, "_PLAN", replace(sampled._PLAN, seed=seed))
         some = sampled.sampled_reference(loaded.scene)
-        difference = np.abs(some["airlight"][reference.mask] - finer.airlight[0])
-        beyond.append(
-            (difference > some["error"][reference.mask] + 3 * finer.airlight_se[0]).mean()
-        )
+        difference = np.abs(some.airlight[reference.mask] - finer.airlight[0])
+        beyond.append((difference > some.error[reference.mask] + 3 * finer.airlight_se[0]).mean())
     # The error is three standard errors of eight replicates, beyond which 2.0 % of Student's law
     # lie. The pixels of a run share their points, the runs do not: four standard errors of the mean
     # over runs.

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mistakes in a scene file, by the names of its parts, and what to do about
-mistakes that Mitsuba finds.
+"""Mistakes in a scene file, by the names of its parts, and advice on the mistakes that Mitsuba
+finds.
 """
+
+from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -70,9 +71,7 @@ _COLOURS = re.compile("albedo|reflectance|color")
 
 
 def in_words(error: Exception) -> str:
-    """Return what Mitsuba says of a file that it cannot read, in one line,
-    and what to do about it.
-    """
+    """Return Mitsuba's message on a file that it cannot read in one line, with advice."""
     # Mitsuba's messages have several lines.
     reason = " ".join(str(error).split())
     reason = re.sub(r".*Traceback .*?\w*Error: ", "", reason)  # what a plugin in Python said
@@ -84,10 +83,8 @@ def in_words(error: Exception) -> str:
     return reason
 
 
-def check_files(state: Any, path: Path) -> None:
-    """Refuse files that a scene names and that are not there, and grids
-    that Mitsuba does not read.
-    """
+def check_files(state: mi.parser.ParserState, path: Path) -> None:
+    """Refuse a scene that names a missing file, or a grid that Mitsuba does not read."""
     for index in used(state):
         props = properties(state, index)
         if "filename" not in props:
@@ -126,7 +123,7 @@ def _is_grid(path: Path) -> bool:
         return stream.read(3) == b"VOL"
 
 
-def check_colours(state: Any) -> None:
+def check_colours(state: mi.parser.ParserState) -> None:
     """Refuse colours of materials and albedos of media that are above 1 or below 0."""
     for index in used(state):
         props = properties(state, index)
@@ -146,9 +143,9 @@ def check_colours(state: Any) -> None:
             )
 
 
-def _name(state: Any, index: int) -> str:
-    """Return what a user calls a node: its own id, or that of the shape, light or
-    medium that it belongs to.
+def _name(state: mi.parser.ParserState, index: int) -> str:
+    """Return the words for a node in a message: its id, or its type with the id of the shape,
+    light or medium that uses it.
     """
     props = properties(state, index)
     part = kind(state, index).lower()

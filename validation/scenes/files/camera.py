@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The camera of a file: what no command takes, and what its clip planes cut
-from Mitsuba's own images.
+"""The camera of a file: cameras that no command takes are refused, and notes say which parts of
+Mitsuba's own images the clip planes cut off.
 
 Rays of Mitsuba's camera start at its near plane and end at its far plane. The medium between the
 pinhole and the near plane scatters light into the eye all the same, and a far plane is no wall:
 references and methods leave nothing out.
 """
 
-from typing import Any
+from __future__ import annotations
 
 import mitsuba as mi
 import numpy as np
@@ -16,7 +16,7 @@ from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 
 
-def check_camera(props: Any) -> None:
+def check_camera(props: mi.Properties) -> None:
     """Refuse a camera that is no pinhole, by its properties in the file."""
     name = f"camera '{props.id()}'"
     if props.plugin_name() != "perspective":
@@ -30,7 +30,7 @@ def check_camera(props: Any) -> None:
             raise InputError(f"{name} has {key} = {float(props[key]):g}; expected none: remove it")
 
 
-def clip_notes(scene: Any) -> list[str]:
+def clip_notes(scene: mi.Scene) -> list[str]:
     """Return a note where the clip planes of the camera take something away
     from Mitsuba's own image.
     """

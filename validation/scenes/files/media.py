@@ -8,7 +8,7 @@ Files of Mitsuba 0.5 and 0.6, and of its descendants, give scattering and absorp
 or the name of a material, which is refused. The scale, which multiplies both, stays as it is.
 """
 
-from typing import Any
+from __future__ import annotations
 
 import mitsuba as mi
 import numpy as np
@@ -21,9 +21,9 @@ from airlight.validation.scenes.files.nodes import kind, of_kind, properties, re
 _OLD = ("sigma_s", "sigma_a")
 
 
-def give_extinction(state: Any) -> list[str]:
+def give_extinction(state: mi.parser.ParserState) -> list[str]:
     """Give homogeneous media extinction and albedo in place of scattering and absorption;
-    return what was changed.
+    return notes on the changes.
     """
     notes = []
     for index in of_kind(state, "Medium"):
@@ -35,27 +35,28 @@ def give_extinction(state: Any) -> list[str]:
         if "strategy" in props:  # of sampling, in version 0.6
             del props["strategy"]
         # Files of Mitsuba 3 give sigma_t: only a colour needs work, for its values above 1.
-        given = [key for key in _OLD if key in props]
-        if not given:
+        old = [key for key in _OLD if key in props]
+        if not old:
             if "sigma_t" in props and props.type("sigma_t") == mi.Properties.Type.Color:
                 _set_extinction(props, np.array(props["sigma_t"], dtype=np.float64))
             continue
         sigma_t, albedo = _extinction(props)
-        for key in given:
+        for key in old:
             del props[key]
         _set_extinction(props, sigma_t)
         props["albedo"] = mi.ScalarColor3d(*albedo.tolist())
         notes.append(
-            f"medium '{props.id()}': {' and '.join(given)} are read as sigma_t {_words(sigma_t)} "
+            f"medium '{props.id()}': {' and '.join(old)} are read as sigma_t {_words(sigma_t)} "
             "and albedo "
             f"{_words(albedo)}"
         )
     return notes
 
 
-def _set_extinction(props: Any, sigma_t: Array) -> None:
-    """Set an extinction, (3,): Mitsuba takes it for a reflectance, from 0 to 1; what is
-    above goes into the scale.
+def _set_extinction(props: mi.Properties, sigma_t: Array) -> None:
+    """Set an extinction, (3,) [1/m].
+
+    Mitsuba takes a colour for a reflectance, from 0 to 1: a larger value goes into the scale.
     """
     if not np.all(np.isfinite(sigma_t)):
         given = ", ".join(f"{value:g}" for value in sigma_t)
@@ -67,11 +68,11 @@ def _set_extinction(props: Any, sigma_t: Array) -> None:
     props["sigma_t"] = mi.ScalarColor3d(*(sigma_t / above).tolist())
 
 
-def _make_homogeneous(state: Any, props: Any) -> None:
-    """Make a heterogeneous medium homogeneous whose extinction is the same everywhere; an
-    old one calls it density.
+def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> None:
+    """Make a heterogeneous medium homogeneous if its extinction is the same everywhere.
+
+    Files of version 0.5 and 0.6 call the extinction density.
     """
-    # The name of version 0.5 and 0.6.
     if props.plugin_name() == "heterogeneous" and "density" in props and "sigma_t" not in props:
         props["sigma_t"] = props["density"]
         del props["density"]
@@ -90,12 +91,12 @@ def _make_homogeneous(state: Any, props: Any) -> None:
                 del props[key]
 
 
-def grey_densities(state: Any) -> None:
-    """Say of media whose density is height fog or a grid that they are grey.
+def grey_densities(state: mi.parser.ParserState) -> None:
+    """Mark media whose density is height fog or a grid as grey.
 
-    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), m the largest
-    density and d what is left of the way to the light, and takes 0 for it where the exponential
-    underflows: suns went out from far away.
+    Mitsuba 3.9.1 multiplies shadow rays through other media by exp(-m d)/exp(-m d), with the
+    largest density m and the rest d of the way to the light, and by 0 where the exponential
+    underflows: distant suns would not shine.
     """
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
@@ -104,7 +105,7 @@ def grey_densities(state: Any) -> None:
             props["has_spectral_extinction"] = False
 
 
-def mirrored_grids(state: Any) -> list[str]:
+def mirrored_grids(state: mi.parser.ParserState) -> list[str]:
     """Return notes on grids that their to_world mirrors, which are read as Mitsuba reads them."""
     notes = []
     for index in of_kind(state, "Medium"):
@@ -122,7 +123,7 @@ def mirrored_grids(state: Any) -> list[str]:
     return notes
 
 
-def pass_where_no_material(state: Any) -> None:
+def pass_where_no_material(state: mi.parser.ParserState) -> None:
     """Give shapes of files before version 2 that bound a medium and have no
     material the material `null`.
     """
@@ -146,7 +147,7 @@ def pass_where_no_material(state: Any) -> None:
             state.nodes.append(null)
 
 
-def _refuse_names(props: Any) -> None:
+def _refuse_names(props: mi.Properties) -> None:
     """Refuse the name of a material of Mitsuba 0.6, and a density."""
     name = f"medium '{props.id()}'"
     if "material" in props:
@@ -162,27 +163,35 @@ def _refuse_names(props: Any) -> None:
         )
 
 
-def _extinction(props: Any) -> tuple[Array, Array]:
-    """Return extinction and albedo of which two of scattering, absorption
-    and extinction are given.
+def _extinction(props: mi.Properties) -> tuple[Array, Array]:
+    """Return extinction and albedo of a medium that has two of scattering, absorption
+    and extinction.
     """
     # Any two of the three determine the third.
-    known = {
+    coefficients = {
         key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None
     }
-    if "albedo" in props or len(known) != 2:
+    if "albedo" in props or len(coefficients) != 2:
         given = ", ".join(key for key in (*_OLD, "sigma_t", "albedo") if key in props)
         raise InputError(
             f"medium '{props.id()}' has {given}; expected sigma_t and albedo, or sigma_s and "
             "sigma_a"
         )
-    extinction = known["sigma_t"] if "sigma_t" in known else known["sigma_s"] + known["sigma_a"]
-    scattering = known["sigma_s"] if "sigma_s" in known else extinction - known["sigma_a"]
+    extinction = (
+        coefficients["sigma_t"]
+        if "sigma_t" in coefficients
+        else coefficients["sigma_s"] + coefficients["sigma_a"]
+    )
+    scattering = (
+        coefficients["sigma_s"]
+        if "sigma_s" in coefficients
+        else extinction - coefficients["sigma_a"]
+    )
     # The albedo of a channel without extinction has no meaning, and is 0.
     return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
 
 
-def _numbers(props: Any, key: str) -> Array | None:
+def _numbers(props: mi.Properties, key: str) -> Array | None:
     """Return three values of a coefficient, None where it is not given."""
     if key not in props:
         return None

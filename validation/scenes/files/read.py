@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A scene file made into Mitsuba's scene: parsed, repaired, built."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import mitsuba as mi
 
@@ -47,8 +48,8 @@ _TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "volume")
 _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
-def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> Any:
-    """Read a scene file with what Mitsuba has in place of a scene where it holds none.
+def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> mi.Object:
+    """Read a scene file: an `mi.Scene`, or another object of Mitsuba where the file has no scene.
 
     Isotropic media get the mean cosines that `lobes` has for their ids. Features that no
     command can take are refused.
@@ -71,7 +72,7 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
         mi.set_file_resolver(resolver)
 
 
-def _parsed(config: Any, path: Path) -> Any:
+def _parsed(config: mi.parser.ParserConfig, path: Path) -> mi.parser.ParserState:
     """Return the nodes of a file, with the names that Mitsuba 3 gives to everything,
     and references as numbers.
 
@@ -91,7 +92,12 @@ def _parsed(config: Any, path: Path) -> Any:
     return state
 
 
-def _built(config: Any, state: Any, path: Path, lobes: Mapping[str, float]) -> Any:
+def _built(
+    config: mi.parser.ParserConfig,
+    state: mi.parser.ParserState,
+    path: Path,
+    lobes: Mapping[str, float],
+) -> mi.Object:
     if kind(state, 0) != "Scene":
         return mi.parser.instantiate(config, state)
     _mend(state, path)
@@ -118,12 +124,12 @@ def _built(config: Any, state: Any, path: Path, lobes: Mapping[str, float]) -> A
     return scene
 
 
-def _mend(state: Any, path: Path) -> None:
-    """Change what a file says into what both readers take, and say so."""
+def _mend(state: mi.parser.ParserState, path: Path) -> None:
+    """Change the nodes of a file into nodes that methods and reference read, with warnings."""
+    # Names come before checks, whose messages use them. Instances come last: copies are made of
+    # parts that are repaired already.
     _leave_out_rendering(state)
     name_nodes(state)
-    # Names come before checks, whose messages use them; copies of instances come last, of parts
-    # that are repaired already.
     check_kinds(state)
     check_files(state, path)
     for note in [*give_extinction(state), *mirrored_grids(state)]:
@@ -134,9 +140,9 @@ def _mend(state: Any, path: Path) -> None:
     write_out_instances(state)
 
 
-def _leave_out_rendering(state: Any) -> None:
-    """Leave out integrators, samplers and filters: no method uses them, and old files
-    name some that are no more.
+def _leave_out_rendering(state: mi.parser.ParserState) -> None:
+    """Leave out integrators, samplers and filters: no method uses them, and Mitsuba 3 lacks some
+    that old files name.
     """
     for node in state.nodes:
         for key, at in references(node.props):
@@ -145,19 +151,19 @@ def _leave_out_rendering(state: Any) -> None:
             elif kind(state, at) == "Film":
                 film = properties(state, at)
                 # Only the size of a film counts; its type may be one that Mitsuba 3 no longer has.
-                kept = mi.Properties("hdrfilm")
+                plain_film = mi.Properties("hdrfilm")
                 for name in _FILM:
                     if name in film:
-                        kept[name] = film[name]
-                state.nodes[at].props = kept
+                        plain_film[name] = film[name]
+                state.nodes[at].props = plain_film
 
 
-def check_kinds(state: Any) -> None:
-    """Refuse what no command takes."""
-    for part, taken in _TAKEN.items():
+def check_kinds(state: mi.parser.ParserState) -> None:
+    """Refuse lights, media, phase functions and cameras of types that no command takes."""
+    for part, types in _TAKEN.items():
         for index in of_kind(state, part):
             props = properties(state, index)
-            if props.plugin_name() not in taken:
+            if props.plugin_name() not in types:
                 name = (
                     f"{_WORDS[part]} '{props.id()}'"
                     if props.id()
@@ -165,7 +171,7 @@ def check_kinds(state: Any) -> None:
                 )
                 raise InputError(
                     f"{name} is of type '{props.plugin_name()}'; expected one of "
-                    f"{', '.join(taken)}: replace it" + " or remove it" * (part == "Emitter")
+                    f"{', '.join(types)}: replace it" + " or remove it" * (part == "Emitter")
                 )
     for index in of_kind(state, "Emitter"):
         _check_light(state, index)
@@ -174,7 +180,7 @@ def check_kinds(state: Any) -> None:
         check_camera(properties(state, sensors[0]))
 
 
-def _check_light(state: Any, index: int) -> None:
+def _check_light(state: mi.parser.ParserState, index: int) -> None:
     props = properties(state, index)
     name = f"light '{props.id()}'"
     wanted = _COLOURS.get(props.plugin_name())

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""References of opaque shapes to media: left out where they are redundant,
-refused where they contradict.
+"""References of opaque shapes to media: redundant ones are left out, contradictory ones refused.
 
 Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps.
 The camera and the bounds of media determine the medium at every place; a wall or a lamp adds
 nothing.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -17,17 +17,18 @@ import numpy as np
 from airlight.errors import InputError
 from airlight.realtime.scene.mesh_adjacency import scene_of
 from airlight.reference.scene.camera import camera_matrix
+from airlight.validation.arrays import Array
 from airlight.validation.scenes.files.nodes import child, kind, of_kind, properties, references
 from airlight.validation.scenes.files.shapes import samples
 
-_OPEN = ("Rectangle", "Disk", "Cylinder")  # which bound no medium: readers say so
+_OPEN = ("Rectangle", "Disk", "Cylinder")  # shapes that bound no medium: readers say so
 
 
-def leave_out_media(state: Any, scene: Any) -> bool:
+def leave_out_media(state: mi.parser.ParserState, scene: mi.Scene) -> bool:
     """Leave out the media of opaque shapes and of lamps; return whether there were any."""
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
-    # Light that passes a bound goes straight on: a glass with a medium inside has no method and no
-    # reference.
+    # Light that passes a bound goes straight on: no method and no reference can do a glass with a
+    # medium inside.
     for shape in scene.shapes():
         material = child(state, nodes[shape.id()], "BSDF") if shape.id() in nodes else None
         if (
@@ -42,8 +43,8 @@ def leave_out_media(state: Any, scene: Any) -> bool:
                 "expected 'null', which lets light pass straight on: replace the material, or "
                 "remove the media"
             )
-    # Opaque shapes and lamps with references to media; without a camera nobody says which medium is
-    # outside.
+    # Opaque shapes and lamps with references to media. Without a camera nothing says which medium
+    # is outside.
     shapes = [
         shape
         for shape in scene.shapes()
@@ -72,12 +73,11 @@ def leave_out_media(state: Any, scene: Any) -> bool:
     return True
 
 
-def touching(scene: Any) -> list[str]:
-    """Return notes on opaque shapes that lie in the bounds of media, of which rays that go on
-    beyond a bound miss some.
+def touching(scene: mi.Scene) -> list[str]:
+    """Return notes on opaque shapes that lie in the bounds of media.
 
-    Mitsuba's own integrators, and the estimators by random samples, lose such surfaces in part;
-    methods and quadrature do not.
+    Rays of Mitsuba's integrators, and of the estimators by random samples, start a little beyond a
+    bound and miss a part of such surfaces; methods and quadrature do not.
     """
     opaque = [shape for shape in scene.shapes() if _is_opaque(shape)]
     bounds = [
@@ -99,31 +99,31 @@ def touching(scene: Any) -> list[str]:
         np.abs(np.array(hit.n, dtype=np.float64).reshape(3, -1).T * normals).sum(axis=1)
         > 1 - touches
     )
-    found = (np.array(hit.is_valid()) & parallel).reshape(len(opaque), -1)
+    in_bound = (np.array(hit.is_valid()) & parallel).reshape(len(opaque), -1)
     return [
         f"shape '{shape.id()}' lies in the bound of a medium: Mitsuba's integrators lose a part of "
         "it; move the bound"
-        for shape, met in zip(opaque, found, strict=True)
-        if met.any()
+        for shape, touched in zip(opaque, in_bound, strict=True)
+        if touched.any()
     ]
 
 
-def _media(shape: Any) -> list[tuple[str, Any, int]]:
-    """Return the media that a shape references: which side, Mitsuba's medium, and the
-    sign of the normal there.
+def _media(shape: mi.Shape) -> list[tuple[str, mi.Medium, int]]:
+    """Return the media that a shape references: the side in words, the medium, and 1 where that
+    side is the side of the normal, else -1.
     """
     sides = (("interior", shape.interior_medium(), -1), ("exterior", shape.exterior_medium(), 1))
     return [side for side in sides if side[1] is not None]
 
 
-def _is_opaque(shape: Any) -> bool:
+def _is_opaque(shape: mi.Shape) -> bool:
     return not int(shape.bsdf().flags()) & int(mi.BSDFFlags.Null | mi.BSDFFlags.Transmission)
 
 
 class _Space:
     """The media in space: the medium around all bounds, and the media within them."""
 
-    def __init__(self, sensor: Any, bounds: Sequence[Any]) -> None:
+    def __init__(self, sensor: mi.Sensor, bounds: Sequence[mi.Shape]) -> None:
         self._bounds = scene_of(bounds) if bounds else None
         self._around = sensor.get_medium()
         if self._bounds is not None:
@@ -132,23 +132,25 @@ class _Space:
             camera = camera_matrix(sensor)[:3, 3]
             self._around = self._at(camera[None] + np.array([[1e6, 2e6, 3e6]]), camera[None])[0]
 
-    def _at(self, start: Any, towards: Any) -> list[Any]:
-        """Return the media at points, as the nearest boundary on the way to others says."""
+    def _at(self, start: Array, towards: Array) -> list[mi.Medium | None]:
+        """Return the media at points, (n, 3) [m]: the medium before the nearest bound on the way
+        to other points.
+        """
         if self._bounds is None:
             return [self._around] * len(start)
         way = np.broadcast_to(towards, start.shape) - start
         way /= np.linalg.norm(way, axis=1, keepdims=True)
         rays = mi.Ray3f(mi.Point3f(start.T), mi.Vector3f(way.T))
-        # The first bound on the way knows the media on both sides; the medium on the side of the
-        # ray's start is the one at the start.
+        # The first bound on the way has media on both sides; the medium on the side of the ray's
+        # start is the one at the start.
         hit = self._bounds.ray_intersect(rays)
         media = hit.target_medium(-rays.d)
         dr.eval(media, hit)
         met = np.array(hit.is_valid())
         return [media[number] if met[number] else self._around for number in range(len(start))]
 
-    def check(self, shape: Any) -> None:
-        """Refuse a shape that references another medium than is there, on either side."""
+    def check(self, shape: mi.Shape) -> None:
+        """Refuse a shape that references another medium than the one at its place, on each side."""
         points, normals = samples(shape)
         box = shape.bbox()
         size = float(np.linalg.norm(np.ptp([np.ravel(box.min), np.ravel(box.max)], axis=0)))
@@ -156,11 +158,11 @@ class _Space:
             # Points a little beside the shape, on the side of the reference; the direction to look
             # along is arbitrary, away from the axes.
             beside = points + sign * 1e-4 * size * normals
-            for there in self._at(beside, beside + np.array([0.3, 0.5, 0.8])):
-                if there != medium:
-                    found = f"medium '{there.id()}'" if there is not None else "no medium"
+            for actual in self._at(beside, beside + np.array([0.3, 0.5, 0.8])):
+                if actual != medium:
+                    words = f"medium '{actual.id()}'" if actual is not None else "no medium"
                     raise InputError(
                         f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as "
                         f"{side}, where there "
-                        f"is {found}; expected no medium on it, or the one that it stands in"
+                        f"is {words}; expected no medium on it, or the one that it stands in"
                     )

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes of files made into shapes that all readers know.
+"""Shapes of files made into shapes that all readers can read.
 
 Instances are written out, lamps on boxes become rectangles, and windows of rooms full of fog the
 boxes of that fog. Cylinders become meshes: every method and estimator then has the same triangles,
 whose shadows are exact.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -18,38 +19,37 @@ from airlight.reference.scene.transforms import matrix_of
 from airlight.validation.arrays import Array
 from airlight.validation.scenes.files.nodes import kind, of_kind, properties, references
 
-# of a quad's size: corners beyond a plane, sides that are no parallelogram, sides off a right angle
+# How far the corners of a rectangle may be off one plane, off a parallelogram and off right angles,
+# as a fraction of its size; float32 rounds its coordinates by 6e-8.
 _FLAT = 1e-5
 
 _SIDES = 256  # of the mesh of a cylinder: it differs from it by 8e-5 of the radius
-_POINTS = 16  # of a shape, at which it is looked at
+_POINTS = 16  # samples of a shape that decide where it lies
 
 
-def write_out_instances(state: Any) -> None:
-    """Put shapes in the place of instances of shape groups, and of merged ones: the same
-    image, with shapes all know.
+def write_out_instances(state: mi.parser.ParserState) -> None:
+    """Replace instances of shape groups, and merged shapes, by plain shapes: the image is the same.
 
-    A group of one shape gives a shape with the name of the instance, others add the
-    names of the group's shapes.
+    The copy of a group's only shape has the name of the instance; copies of several shapes
+    have the names of the instance and of the shape.
     """
-    written = [
+    copies = [
         copy for _, index in references(properties(state, 0)) for copy in _copies(state, index)
     ]
-    for node in written:  # by now nothing holds a node: to append one may move them all
+    # Only now are nodes appended, which may move all nodes: nothing refers to one any more.
+    for node in copies:
         state.nodes.append(node)
     # Properties are looked up again: the nodes may have moved in memory.
     scene = properties(state, 0)
     for key, index in references(scene):
         if properties(state, index).plugin_name() in ("shapegroup", "instance", "merge"):
             del scene[key]
-    for number in range(len(state.nodes) - len(written), len(state.nodes)):
+    for number in range(len(state.nodes) - len(copies), len(state.nodes)):
         scene[f"_written_out_{number}"] = mi.Properties.ResolvedReference(number)
 
 
-def _copies(state: Any, index: int) -> Iterator[Any]:
-    """Yield the shapes of an instance, or of a merge, as nodes of their
-    own; none of other shapes.
-    """
+def _copies(state: mi.parser.ParserState, index: int) -> Iterator[mi.parser.SceneNode]:
+    """Yield copies of the shapes of an instance or a merge; of other shapes none."""
     instance = properties(state, index)
     if instance.plugin_name() == "merge":
         yield from (
@@ -81,9 +81,9 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
         yield node
 
 
-def cylinders_as_meshes(state: Any, folder: Path) -> list[str]:
-    """Put meshes in the place of cylinders, written into a folder for Mitsuba to read;
-    return notes that say so.
+def cylinders_as_meshes(state: mi.parser.ParserState, folder: Path) -> list[str]:
+    """Replace cylinders by meshes, which are written into a folder for Mitsuba to read; return
+    notes on them.
     """
     notes = []
     for index in list(of_kind(state, "Shape")):
@@ -142,23 +142,23 @@ def _write_cylinder(path: Path, first: Array, last: Array, radius: float) -> Non
     path.write_bytes(header.encode() + corners.astype("<f4").tobytes() + rows.tobytes())
 
 
-def lamps_as_rectangles(state: Any, shapes: Iterable[Any]) -> bool:
-    """Make lamps on meshes rectangles where their triangles are halves of some;
-    return whether there were any.
+def lamps_as_rectangles(state: mi.parser.ParserState, shapes: Iterable[mi.Shape]) -> bool:
+    """Replace lamps on meshes by rectangles where their triangles are halves of rectangles;
+    return whether there was such a lamp.
 
-    A lamp of one rectangle keeps its name; to others a number is added.
+    A lamp of one rectangle keeps its name; the rectangles of others have numbers after it.
     """
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
     lamps = [shape for shape in shapes if shape.is_emitter() and shape.id() in nodes]
-    placed = {nodes[shape.id()]: matrices for shape in lamps if (matrices := _rectangles(shape))}
-    for index, matrices in placed.items():
+    by_node = {nodes[shape.id()]: matrices for shape in lamps if (matrices := _rectangles(shape))}
+    for index, matrices in by_node.items():
         _write_rectangles(state, index, matrices)
-    return bool(placed)
+    return bool(by_node)
 
 
-def _rectangles(shape: Any) -> list[Array]:
-    """Return the transforms that make Mitsuba's rectangles the mesh of a lamp; none where
-    its triangles are others.
+def _rectangles(shape: mi.Shape) -> list[Array]:
+    """Return the transforms from Mitsuba's rectangle to the rectangles of a lamp's mesh, (4, 4)
+    each [m]; none where its triangles make no rectangles.
     """
     parameters = mi.traverse(shape)
     if "faces" not in parameters:
@@ -166,14 +166,14 @@ def _rectangles(shape: Any) -> list[Array]:
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
     # Vertices with the same coordinates are one: exporters write each triangle's corners apart.
-    used, same = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
+    points, numbers = np.unique(corners[faces.ravel()], axis=0, return_inverse=True)
     halves: dict[tuple[int, int], list[list[int]]] = {}
-    for face in same.reshape(-1, 3).tolist():
+    for face in numbers.reshape(-1, 3).tolist():
         # The side that both halves of a rectangle share is the longest of each; last is
         # the corner across from it.
         sides = [(face[i], face[(i + 1) % 3], face[(i + 2) % 3]) for i in range(3)]
         first, second, last = max(
-            sides, key=lambda side: float(np.linalg.norm(used[side[0]] - used[side[1]]))
+            sides, key=lambda side: float(np.linalg.norm(points[side[0]] - points[side[1]]))
         )
         halves.setdefault((min(first, second), max(first, second)), []).append(
             [first, second, last]
@@ -181,16 +181,20 @@ def _rectangles(shape: Any) -> list[Array]:
     # All triangles must pair into rectangles, and Mitsuba must sample the same surface: otherwise
     # the lamp stays a mesh.
     side = -1.0 if shape.has_flipped_normals() else 1.0
-    matrices = [_rectangle(used, pair, side) for pair in halves.values()]
-    found = [matrix for matrix in matrices if matrix is not None]
+    rectangles = [_rectangle(points, pair, side) for pair in halves.values()]
+    matrices = [matrix for matrix in rectangles if matrix is not None]
     most = 64  # rectangles of a lamp
-    if len(found) < len(matrices) or len(found) > most or not _shine_alike(shape, found):
+    if len(matrices) < len(rectangles) or len(matrices) > most:
         return []
-    return found
+    return matrices if _shine_alike(shape, matrices) else []
 
 
 def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | None:
-    """Return the transform of the rectangle of two triangles, None where they make none."""
+    """Return the transform of the rectangle of two triangles, (4, 4); None where they make none.
+
+    `corners`: of the mesh, (points, 3) [m]; `pair`: of each triangle the numbers of its corners,
+    both ends of the longest side first; `side`: 1, or -1 where the normals are flipped.
+    """
     if len(pair) != 2:
         return None
     first, second, start = corners[pair[0]]
@@ -213,7 +217,7 @@ def _rectangle(corners: Array, pair: list[list[int]], side: float) -> Array | No
     return matrix
 
 
-def samples(shape: Any) -> tuple[Any, Any]:
+def samples(shape: mi.Shape) -> tuple[Array, Array]:
     """Return points of a shape and the normals there, evenly spread, (points, 3) each."""
     number = np.arange(_POINTS)
     # An additive recurrence with the golden ratio: spread evenly over the unit square without
@@ -226,24 +230,24 @@ def samples(shape: Any) -> tuple[Any, Any]:
     return points, np.broadcast_to(normals, points.shape)
 
 
-def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
-    """Return whether points that Mitsuba samples on a lamp lie on rectangles,
-    with the normals of these.
+def _shine_alike(shape: mi.Shape, matrices: list[Array]) -> bool:
+    """Return whether points that Mitsuba samples on a lamp lie on rectangles and have
+    their normals.
     """
     points, normals = samples(shape)
     size = max(float(np.linalg.norm(matrix[:3, :2])) for matrix in matrices)
-    found = np.zeros(_POINTS, dtype=bool)
+    covered = np.zeros(_POINTS, dtype=bool)
     for matrix in matrices:
         # Coordinates in the rectangle's own frame, in which it is the square from -1 to 1 at height
         # 0.
         local = np.linalg.solve(matrix[:3, :3], (points - matrix[:3, 3]).T)
         inside = (np.abs(local[:2]) < 1 + 1e-3).all(axis=0) & (np.abs(local[2]) < 1e-3 * size)
-        found |= inside & (normals @ matrix[:3, 2] > 1 - 1e-4)
-    return bool(found.all())
+        covered |= inside & (normals @ matrix[:3, 2] > 1 - 1e-4)
+    return bool(covered.all())
 
 
-def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
-    """Put rectangles in the place of a lamp: the first in its node, each with its own emitter."""
+def _write_rectangles(state: mi.parser.ParserState, index: int, matrices: list[Array]) -> None:
+    """Replace a lamp by rectangles: the first takes its node, and each has an emitter."""
     name = properties(state, index).id()
     parts = list(references(properties(state, index)))
     for number, matrix in enumerate(matrices):
@@ -264,24 +268,26 @@ def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
         state.nodes[len(state.nodes) - 1 if number else index].props = rectangle
 
 
-def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
-    """Make windows of rooms full of fog the boxes of that fog, and return notes on them.
+def rooms_as_boxes(state: mi.parser.ParserState, shapes: Iterable[mi.Shape]) -> list[str]:
+    """Replace windows of rooms full of fog by boxes of that fog, and return notes on them.
 
     A window is a rectangle without a material that bounds a medium on one side, where opaque
-    rectangles are the other five faces of a box. The box reaches a little beyond these: a surface
-    in a bound is lost to rays in part.
+    rectangles are the other five faces of a box. The box reaches a little beyond the walls:
+    Mitsuba's rays lose a part of a surface that lies in a bound.
     """
     nodes = {properties(state, index).id(): index for index in of_kind(state, "Shape")}
-    known = [shape for shape in shapes if shape.id() in nodes and shape.class_name() == "Rectangle"]
-    walls = [_corners(_matrix(shape)) for shape in known if not _is_null(shape)]
+    rectangles = [
+        shape for shape in shapes if shape.id() in nodes and shape.class_name() == "Rectangle"
+    ]
+    walls = [_corners(_matrix(shape)) for shape in rectangles if not _is_null(shape)]
     notes = []
-    for shape in known:
-        inside = [
+    for shape in rectangles:
+        media = [
             medium
             for medium in (shape.interior_medium(), shape.exterior_medium())
             if medium is not None
         ]
-        if not _is_null(shape) or len(inside) != 1:
+        if not _is_null(shape) or len(media) != 1:
             continue
         # The interior medium of a rectangle lies on the side that its normal points away from.
         room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
@@ -302,11 +308,11 @@ def rooms_as_boxes(state: Any, shapes: Iterable[Any]) -> list[str]:
     return notes
 
 
-def _is_null(shape: Any) -> bool:
+def _is_null(shape: mi.Shape) -> bool:
     return bool(int(shape.bsdf().flags()) & int(mi.BSDFFlags.Null))
 
 
-def _matrix(shape: Any) -> Array:
+def _matrix(shape: mi.Shape) -> Array:
     return matrix_of(mi.traverse(shape)["to_world"])
 
 
@@ -317,8 +323,11 @@ def _corners(matrix: Array) -> Array:
 
 
 def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
-    """Return the transform that makes Mitsuba's cube the room behind a window, None
+    """Return the transform from Mitsuba's cube to the room behind a window, (4, 4) [m]; None
     where walls are missing.
+
+    `window`: the transform of its rectangle; `side`: -1 where the room lies on the side that the
+    normal points away from, else 1; `walls`: corners, (4, 3) each [m].
     """
     front = _corners(window)
     normal = np.cross(window[:3, 0], window[:3, 1])

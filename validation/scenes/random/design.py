@@ -26,9 +26,11 @@ from airlight.errors import InputError
 from airlight.validation.arrays import Array
 from airlight.validation.readers import Reader, read_named, read_number, read_table, read_toml
 
-#: of ranges as they are drawn without a file of one's own
+#: The ranges that are drawn from where a user gives no file.
 FILE = Path(__file__).with_name("ranges.toml")
 
+#: The distributions of a random scene by name, as a file has them: of a range its two ends; of a
+#: choice the weights by word; `meshes` is a folder, or empty.
 Ranges = dict[str, Any]
 
 PREFIX = "random:"
@@ -52,7 +54,7 @@ class Draws:
         self._point = point(seed) if not part else {}
 
     def of(self, part: str) -> "Draws":
-        """Return the stream of a part of the scene: what one part draws does not move the others.
+        """Return the stream of a part of the scene: the draws of one part do not move the others.
 
         The name of the part is a seed: with another name, old seeds would be other scenes.
         """
@@ -78,9 +80,7 @@ class Draws:
         return min(math.floor(self.logarithmic(low + 0.5, high + 1.5, name=name) - 0.5), int(high))
 
     def few(self, low: float, high: float, *, name: str = "") -> int:
-        """Return a whole number from `low` to `high`, of which small ones come
-        more often than by `count`.
-        """
+        """Return a whole number from `low` to `high`; small ones are likelier than by `count`."""
         # Evenly in the logarithm of the number would be `count`; the square of the fraction favours
         # small numbers.
         span = math.log((high + 1.5) / (low + 0.5))
@@ -90,10 +90,10 @@ class Draws:
 
     def pick(self, weights: Mapping[str, float], name: str = "") -> str:
         """Return one of several words by their weights."""
-        left = self.fraction(name) * sum(weights.values())
+        remainder = self.fraction(name) * sum(weights.values())
         for word, weight in weights.items():
-            left -= weight
-            if left < 0:
+            remainder -= weight
+            if remainder < 0:
                 return word
         # Rounding may leave a remainder of 0 after the last weight.
         return [word for word, weight in weights.items() if weight > 0][-1]
@@ -146,15 +146,15 @@ def read_ranges(path: Path) -> Ranges:
     return ranges_from(table, str(path))
 
 
-def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
-    """Return the usual ranges with what a table says in their place.
+def ranges_from(table: Mapping[str, object], where: str = "ranges") -> Ranges:
+    """Return the usual ranges, with those of a table in their place.
 
     Unknown names, ranges that are empty or beyond what can be drawn, and weights of which
     none is above 0 are refused.
     """
     usual, limits = _defaults()
     # A name with limits is a range; every other name is a table of weights.
-    readers: dict[str, Reader] = {"meshes": _folder}
+    readers: dict[str, Reader[object]] = {"meshes": _folder}
     readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
     readers |= {
         name: partial(_weights, names=tuple(usual[name])) for name in usual if name not in readers
@@ -165,23 +165,23 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
         raise InputError(f"{where}: {error}") from None
 
 
-def _folder(what: str, value: Any) -> str:
+def _folder(what: str, value: object) -> str:
     if not isinstance(value, str) or (value and not Path(value).is_dir()):
         raise InputError(f"{what} is {value!r}; expected a folder of .obj and .ply files")
     return value
 
 
-def _range(what: str, value: Any, *, limits: tuple[float, float]) -> tuple[float, float]:
+def _range(what: str, value: object, *, limits: tuple[float, float]) -> tuple[float, float]:
     pair = value if isinstance(value, list | tuple) else [value, value]
-    found = tuple(float(read_number(what, each, *limits, whole=False)) for each in pair)
-    if len(found) != 2 or found[0] > found[1]:
+    ends = [float(read_number(what, end, *limits)) for end in pair]
+    if len(ends) != 2 or ends[0] > ends[1]:
         raise InputError(f"{what}: got {value!r}, expected [from, to]")
-    return found[0], found[1]
+    return ends[0], ends[1]
 
 
-def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, float]:
+def _weights(what: str, value: object, *, names: tuple[str, ...]) -> dict[str, float]:
     heaviest = 1e9  # weight of a choice
-    read = partial(read_number, least=0, most=heaviest, whole=False)
+    read = partial(read_number, least=0, most=heaviest)
     weights = read_named(f"{what}.", read_table(what, value), dict.fromkeys(names, read))
     if not any(weights.values()):
         raise InputError(f"{what}: no weight is above 0; expected one at least")

@@ -108,10 +108,11 @@ def _bounded(
     balls: list[tuple[Array, float]] = []
     for number in range(count):
         stream = draws.of(f"medium-{number}")
-        # The point speaks for the first medium of the scene; others are of the stream.
-        own = draws if first and number == 0 else stream
+        # The numbers of the first medium of the scene are coordinates of the point; those of others
+        # come from the stream.
+        source = draws if first and number == 0 else stream
         for _ in range(12):
-            # The first one's kind and size are of the point too; a stream has no names.
+            # Kind and size of the first bounded medium are coordinates of the point too.
             kind = (draws if number == 0 else stream).pick(ranges["bounds_kinds"], "bounds_kind")
             around, within = _BALLS[kind]
             size = (draws if number == 0 else stream).logarithmic(*ranges["bounds"], name="bounds")
@@ -149,8 +150,8 @@ def _bounded(
         else:
             continue
         balls.append((centre, ball))
-        depth = own.logarithmic(*ranges["optical_depth"], name="optical_depth")
-        filling = _filling(own, stream, ranges, depth / (2 * float(half.mean())))
+        depth = source.logarithmic(*ranges["optical_depth"], name="optical_depth")
+        filling = _filling(source, stream, ranges, depth / (2 * float(half.mean())))
         turn = stream.vector(), stream.between(3.0, 177.0)
         name = f"medium-{len(media) + 1 + (not first)}"
         media.append(Medium(name, kind, *filling, depth, holds_camera, centre, half, turn))
@@ -196,7 +197,7 @@ def unit_airlight(
     middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     points = camera + middle[:, None] * directions[:, None]
     # Attenuation from camera to point, later from point to light; inverse square in between.
-    left = np.exp(-depths(media, np.broadcast_to(camera, points.shape), points))
+    transmittance = np.exp(-depths(media, np.broadcast_to(camera, points.shape), points))
     toward = light - points
     distance = np.linalg.norm(toward, axis=-1)
     depth = depths(media, points, np.broadcast_to(light, points.shape))
@@ -219,4 +220,4 @@ def unit_airlight(
         # Values of phase functions have the mean 1; over 4 pi they are per steradian.
         phase = phase_from_words(medium.phase)(np.clip(cosine, -1, 1)) / (4 * np.pi)
         total += (inside * phase * spread)[..., None] * (medium.sigma_t * medium.albedo)
-    return float((total * np.exp(-depth) * lengths[:, None] * left).sum(axis=1).max())
+    return float((total * np.exp(-depth) * lengths[:, None] * transmittance).sum(axis=1).max())

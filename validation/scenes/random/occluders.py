@@ -250,8 +250,8 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return a plate between the camera and a light, across the way."""
     way = light.position - camera
     length = float(np.linalg.norm(way))
-    # Nearer to the camera than a directional light is, and beyond what an
-    # area light reaches around.
+    # Nearer to the camera than a directional light, and not so near to an area light that its light
+    # reaches around the plate.
     distance = min(stream.between(0.31, 0.57) * length, stream.between(0.9, 1.7))
     # The plate may touch neither the camera nor the light; it is large enough to cover an area
     # light as seen from the camera, as far as there is room.
@@ -318,8 +318,8 @@ def draw_ground(
     if kind == "room" and directional:
         kind = "floor-and-wall"
     near = [light for light in lights if light.kind != "directional"]
-    # Floor and room leave free what they must not cut: the camera, the lights, and the inner part
-    # of occluders, which may be cut by the ground.
+    # Floor and room must not cut the camera, the lights, and the inner parts of occluders; they may
+    # cut the outer parts.
     balls = [(camera, 0.13), *((light.position, light.ball + 0.07) for light in near)]
     balls += [(occluder.position, 0.31 * occluder.radius) for occluder in occluders]
     if kind == "room":

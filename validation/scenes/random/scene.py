@@ -9,10 +9,11 @@ All is drawn in radii of a stage about the origin, then scaled and moved to
 an arbitrary place, once.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -22,12 +23,16 @@ from airlight.validation.columns import plain
 from airlight.validation.properties.view import LightPlace, distance, lit_points
 from airlight.validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
 from airlight.validation.scenes.parts import (
+    Plugin,
+    area_lamp,
     camera,
     fog,
-    light,
     medium_boundary,
     mitsuba_mesh,
     phase_function,
+    point_light,
+    spot_light,
+    sun,
 )
 from airlight.validation.scenes.random.design import (
     Draws,
@@ -83,12 +88,12 @@ def random_record(name: str) -> SceneRecord:
     )
 
 
-def drawn_values(name: str) -> dict[str, Any]:
+def drawn_values(name: str) -> dict[str, object]:
     """Return the drawn values of a random scene, as plain data without
     meshes; lengths are in metres.
     """
-    drawn: dict[str, Any] = plain(_lit(*_parse(name))[0])
-    return drawn
+    values: dict[str, object] = plain(_lit(*_parse(name))[0])
+    return values
 
 
 def _parse(name: str) -> tuple[int, Ranges]:
@@ -99,7 +104,7 @@ def _parse(name: str) -> tuple[int, Ranges]:
 # Drawing ------------------------------------------------------------------------------------------
 
 
-def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, Any]]:
+def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, mi.Shape]]:
     """Return the first draw that lets enough light through, or the best, with the Mitsuba
     shapes of its occluders.
     """
@@ -116,8 +121,8 @@ def _lit(seed: int, ranges: Ranges) -> tuple[RandomScene, dict[str, Any]]:
 
 
 def draw_scene(seed: int, ranges: Ranges, attempt: int = 0) -> RandomScene:
-    """Return the scene of a seed; for another attempt its point is the same, and
-    places and shapes are others.
+    """Return the scene of a seed; another attempt has the same point of the design, and other
+    places and shapes.
     """
     draws = Draws(seed, attempt)
     scale = draws.logarithmic(*ranges["scale"], name="scale")
@@ -167,17 +172,14 @@ def _draw_view(draws: Draws, ranges: Ranges) -> tuple[Array, Array, float]:
     return origin, 0.37 * stream.in_ball(), draws.between(*ranges["fov"], name="fov")
 
 
-def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
-    """Return the scene with what light reaches past the occluders, an
-    `mi.Scene`, in an image of 4 to 3.
-    """
+def with_reach(drawn: RandomScene, occluders: mi.Scene) -> RandomScene:
+    """Return the scene with the fractions `lit` and `near`, of an image of 4 to 3."""
     directions = _directions(drawn)
     away = float(np.linalg.norm(drawn.origin - drawn.centre))
     hit = distance(occluders, np.broadcast_to(drawn.origin, directions.shape), directions)
     # Rays that meet nothing end behind the stage.
     free = np.minimum(hit, away + drawn.scale)
-    # The middles of equal parts of the free way of each ray, the points at which light is looked
-    # for.
+    # The points are the middles of equal parts of each ray before its surface.
     along = 3  # points on each ray
     fraction = (np.arange(along) + 0.5) / along
     points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(
@@ -230,7 +232,7 @@ def _purpose(drawn: RandomScene) -> str:
     )
 
 
-def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
+def _build(drawn: RandomScene, shapes: Mapping[str, mi.Shape]) -> Plugin:
     fillings = {medium.name: _filling(medium) for medium in drawn.media}
     # Media are built once and shared: the camera, and both sides of each bound, reference the same
     # medium.
@@ -240,10 +242,10 @@ def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
     )
     # Mitsuba's clip planes in proportion to the scene, of any size.
     sensor |= {"near_clip": 1e-5 * drawn.scale, "far_clip": 1e5 * drawn.scale}
-    own = fillings.get(drawn.inside, around)
+    inside = fillings.get(drawn.inside, around)
     return {
         "type": "scene",
-        "sensor": sensor | ({} if own is None else {"medium": own}),
+        "sensor": sensor if inside is None else sensor | {"medium": inside},
         **{each.name: _light(each) for each in drawn.lights},
         **{
             medium.name: _boundary(medium, fillings[medium.name], around)
@@ -254,7 +256,7 @@ def _build(drawn: RandomScene, shapes: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _filling(medium: Medium) -> Any:
+def _filling(medium: Medium) -> mi.Medium:
     sigma_t = medium.sigma_t.tolist()
     described = fog(
         sigma_t[0] if medium.grey else sigma_t,
@@ -264,47 +266,58 @@ def _filling(medium: Medium) -> Any:
     return mi.load_dict(described | {"id": f"{medium.name}-medium"})
 
 
-def _ball(position: Array, radius: float) -> Any:
+def _ball(position: Array, radius: float) -> mi.ScalarTransform4f:
+    """Return the transform from the unit sphere to a sphere at a `position`, (3,), [m]."""
     return mi.ScalarTransform4f().translate(position.tolist()).scale(float(radius))
 
 
-def _boundary(medium: Medium, filling: Any, around: Any) -> Any:
+def _boundary(medium: Medium, filling: mi.Medium, around: mi.Medium | None) -> Plugin | mi.Mesh:
     if medium.bounds == "sphere":
-        outside = {} if around is None else {"exterior": around}
-        ball = _ball(medium.centre, medium.half[0])
-        return {
+        sphere: Plugin = {
             "type": "sphere",
-            "to_world": ball,
+            "to_world": _ball(medium.centre, medium.half[0]),
             "bsdf": {"type": "null"},
             "interior": filling,
-        } | outside
-    # Bodies of half sizes 1, which `half` scales; `media._BALLS` knows the radii of the balls about
+        }
+        return sphere if around is None else sphere | {"exterior": around}
+    # Bodies of half sizes 1, which `half` scales; `media._BALLS` has the radii of the balls about
     # and within them.
     mesh = {"box": box((2.0, 2.0, 2.0)), "gem": gem(9, 4), "ellipsoid": icosphere(1)}[medium.bounds]
     mesh = placed(scaled(mesh, medium.half), medium.centre, rotation(*medium.turn))
     return medium_boundary(medium.name, mesh, filling, around)
 
 
-def _light(drawn: Light) -> dict[str, Any]:
-    colour = drawn.colour.tolist()
-    where: dict[str, Any] = {"position": drawn.position.tolist(), "target": drawn.target.tolist()}
+def _light(drawn: Light) -> Plugin:
+    colour, position, target = (
+        values.tolist() for values in (drawn.colour, drawn.position, drawn.target)
+    )
     direction = drawn.target - drawn.position
     if drawn.kind == "directional":
-        return light("sun", colour, direction=direction)
+        return sun(direction.tolist(), colour)
+    if drawn.kind == "point":
+        return point_light(position, colour)
     if drawn.kind in AREA_KINDS:
         size = drawn.size if len(drawn.size) == 2 else drawn.size[0]
-        lamp = light(drawn.kind, colour, **where, size=size, opaque=drawn.black)
-        # Mitsuba takes the rounding of the turn of a large one for shear, and warns
+        lamp = area_lamp(drawn.kind, position, target, size, colour)
+        if not drawn.black:
+            lamp["material"] = {"type": "null"}
+        # Mitsuba takes the rounding of the turn of a large sphere for shear, and warns.
         if drawn.kind == "sphere":
             lamp["to_world"] = _ball(drawn.position, drawn.size[0])
         return lamp
     # A spot that shines along the vertical needs another direction up.
     upright = abs(direction[2]) < 0.99 * np.linalg.norm(direction)
-    cone = {"cutoff": drawn.cutoff, "beam": drawn.beam, "up": [0, 0, 1] if upright else [1, 0, 0]}
-    return light(drawn.kind, colour, **where, **cone)
+    return spot_light(
+        colour,
+        position=position,
+        target=target,
+        cutoff=drawn.cutoff,
+        beam=drawn.beam,
+        up=[0, 0, 1] if upright else [1, 0, 0],
+    )
 
 
-def _shape(occluder: Occluder) -> Any:
+def _shape(occluder: Occluder) -> mi.Shape:
     if occluder.kind != "ball":
         return mitsuba_mesh(occluder.name, occluder.mesh, occluder.reflectance.tolist())
     diffuse = {
