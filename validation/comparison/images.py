@@ -286,7 +286,7 @@ def _error_layer(path: str, image: Image, layer: str) -> tuple[Array, Kind] | No
         return np.asarray(image.layers[f"{layer}_error"], dtype=np.float64), "estimated"
     if f"{layer}_bound" not in image.layers:
         return None
-    kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
+    kinds: dict[str, Kind] = {"proven": "proven", "estimated": "estimated"}
     said = image.attributes.get(BOUND, "estimated")
     if not isinstance(said, str) or said not in kinds:
         raise InputError(
