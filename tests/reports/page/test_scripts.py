@@ -155,7 +155,7 @@ def view():
 
 def test_an_error_that_is_not_known_is_not_shown_as_none(view):
     """As in the dark, where the reference has no mean to be relative to."""
-    unknown = dict.fromkeys(("relative_rmse", "interval", "relative_bias", "p99", "bound"))
+    unknown = dict.fromkeys(("relative_rmse", "interval", "relative_bias", "p99", "own_error"))
     error = json.dumps(unknown | {"known": 7, "pixels": 9})
     view.eval(f'hear.error({{failure: "", done: false, frames: 2, mean: null, error: {error}}})')
     words = asked(view, '$("#error").textContent')

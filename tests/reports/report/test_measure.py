@@ -4,6 +4,7 @@ again, and efforts add parts.
 """
 
 import errno
+import importlib
 import json
 import os
 import time
@@ -221,9 +222,9 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 
     # Half the time: what `fresh` tells one estimator it tells both.
     checks = replace(TINY.checks, margins={"single-scatter": 0.2}, samples={"single-scatter": 4})
-    monkeypatch.setattr(
-        "airlight.reference.quadrature.reference.quadrature_image", counted(quadrature_image)
-    )
+    # by its name in `sys.modules`: `airlight.reference` is a function too
+    module = importlib.import_module("airlight.reference.quadrature.reference")
+    monkeypatch.setattr(module, "quadrature_image", counted(quadrature_image))
     monkeypatch.setattr(
         "airlight.validation.estimates.monte_carlo.single_scatter_batch",
         counted(single_scatter_batch),
