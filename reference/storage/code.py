@@ -61,8 +61,8 @@ def code_digest(starts: Iterable[Path]) -> str:
 
 @lru_cache(maxsize=1024)
 def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
-    """Return a digest of the code of a file, and the names and words in it, among which are the names
-    of the modules that it imports.
+    """Return a digest of the code of a file, and the names and words in it, among which are the
+    names of the modules that it imports.
     """
     names: set[str] = set()
     try:
@@ -85,8 +85,8 @@ def _bare(code: CodeType, names: set[str]) -> CodeType:
 
 
 def _words(constants: Iterable[object]) -> Iterator[str]:
-    """Yield the words among constants, also those in tuples and sets: a registry may name modules by
-    them.
+    """Yield the words among constants, also those in tuples and sets: a registry may name modules
+    by them.
     """
     for each in constants:
         if isinstance(each, str):

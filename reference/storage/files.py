@@ -114,8 +114,8 @@ def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator
     """
     target = ensure_writable(path)
     sweep_hidden(target.parent)
-    # Files of `tempfile` would stay readable by their owner alone. Systems limit the bytes of a name,
-    # and a letter has up to four bytes.
+    # Files of `tempfile` would stay readable by their owner alone. Systems limit the bytes of a
+    # name, and a letter has up to four bytes.
     stem = os.fsdecode(os.fsencode(target.stem)[:100])
     temporary = target.with_name(f".{stem}-{uuid.uuid4().hex}{target.suffix}")
     try:

@@ -98,8 +98,8 @@ def flights(
 ) -> Iterator[tuple[float, Vectors, Vectors]]:
     """Yield the flights of a batch of photons, order by order, until all have left.
 
-    Yields the weight, the fraction that absorption lets through; x, y and the depth z of the photons;
-    and the components of their directions, the third downwards, (photons,) each.
+    Yields the weight, the fraction that absorption lets through; x, y and the depth z of the
+    photons; and the components of their directions, the third downwards, (photons,) each.
     """
     place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
