@@ -78,10 +78,8 @@ def single_batch(
     if wrong.any():
         raise InputError(
             f"the samples of {int(wrong.sum())} of {wrong.size} pixels are not finite, first of "
-            "pixel "
-            f"{int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number of the "
-            "scene be too large "
-            "for float32: move the light, or use other units"
+            f"pixel {int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number "
+            "of the scene be too large for float32: move the light, or use other units"
         )
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None], layers)
 
@@ -112,13 +110,13 @@ def combined_moments(
 ) -> tuple[Array, Array]:
     """Return mean and sum of squared deviations of two sets of numbers together.
 
-    The squares are those within each set and those between their means (Chan, Golub
-    and LeVeque 1983, eq. 2.1).
+    The sum has the squares within each set and those between the means of both (Chan, Golub and
+    LeVeque 1983, eq. 2.1).
 
-    `first`, `second`: of each set: how many numbers there are, their mean, and the sum of their
-    squared deviations from it. The arrays have one shape; the mean is in any unit, here [W/(m^2
-    sr)], the squares in its square. Returns `mean`, `squares`: of all numbers, in the same shape
-    and units.
+    `first`, `second`: of each set the count of numbers, their mean, and the sum of their squared
+    deviations from the mean. The arrays have one shape; the mean is in any unit, here [W/(m^2 sr)],
+    the squares in its square. Returns `mean`, `squares`: of all numbers, in the same shape and
+    units.
     """
     # Squared deviations within both sets, and of both means from the common one, n m/(n + m) times
     # the square of their difference.

@@ -127,8 +127,8 @@ def _check_far(reference: ReferenceScene) -> None:
     """Refuse fog in which Mitsuba would cut light paths from infinity, whose length is twice the
     radius of all shapes.
 
-    Light of a sky comes from all directions. Its paths must leave height fog down to 60 degrees from
-    the zenith; lower ones may be cut, and then miss the thin upper part of the fog.
+    Light of a sky comes from all directions. Its paths must leave height fog down to 60 degrees
+    from the zenith; lower ones may be cut, and then miss the thin upper part of the fog.
     """
     if not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
         raise InputError(
@@ -289,7 +289,8 @@ def _set_values(plugin: "mi.Medium", sigma_t: float, albedo: Array) -> None:
 def volpath_orders_batch(
     clouds: CloudScene, seed: int, samples: int, *, sets: Sequence[tuple[str, tuple[int, float]]]
 ) -> Batches:
-    """Trace one batch of the layers `airlight` and `surface`, and of a layer for each set of orders.
+    """Trace one batch of the layers `airlight` and `surface`, and of a layer for each set of
+    orders.
 
     `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`:
     samples a pixel, at most 256; `sets`: names of sets of orders with their first and last order,

@@ -158,7 +158,7 @@ def holds(bounds: Bounds, point: Array) -> bool:
 
 
 def in_surface(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point, (3,) [m], lies in the surface of bounds to the rounding of float32."""
+    """Return whether a point, (3,) [m], lies in the surface of bounds, up to float32 rounding."""
     margin = 1e-6 * float(np.abs(point).max())
     if isinstance(bounds, Sphere):
         return bool(

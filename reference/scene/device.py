@@ -3,8 +3,8 @@
 are nor on where their memory lies.
 
 Types of Mitsuba and Dr.Jit stand in quotes, here and in all of `reference`: they exist once a
-variant is chosen. The name says the precision, `mi.Float64` and `mi.Vector3d` double, `mi.Float` and
-`mi.Vector3f` that of Mitsuba's variant, single; an array has an entry for each lane.
+variant is chosen. The name says the precision, `mi.Float64` and `mi.Vector3d` double, `mi.Float`
+and `mi.Vector3f` single; an array has an entry for each lane.
 """
 
 from collections.abc import Callable
@@ -48,7 +48,7 @@ def vectors(kind: Callable[..., DeviceArray], rows: ArrayLike) -> DeviceArray:
 
 
 def as_rows(values: "mi.Vector3f | mi.Vector3d | mi.Color3f") -> NDArray[np.float64]:
-    """Return vectors or colours as rows, (n, 3), each component copied by itself, as in `vectors`."""
+    """Return vectors or colours as rows, (n, 3); each component is copied by itself."""
     dr.eval(values)
     components = [np.array(component, dtype=np.float64) for component in values]
     return np.stack(np.broadcast_arrays(*components), axis=1)

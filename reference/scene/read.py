@@ -302,7 +302,7 @@ def _read_ambient(
     media: tuple[BoundedMedium, ...],
     boundaries: "list[mi.Shape]",
 ) -> ReferenceMedium | VaryingMedium:
-    """Return the medium around all bounds; refuse a camera or a shape that references another one."""
+    """Return the medium around all bounds; refuse a camera or a shape that names another."""
     camera_medium = sensor.get_medium()
     # The camera may be in one of the bounded media: the medium around is then the exterior of that
     # shape.

@@ -30,5 +30,8 @@ def stretch(matrix: Array) -> float:
 def outwards(matrix: Array) -> str:
     """Return what to do about a sphere whose normals point inwards."""
     if np.linalg.det(matrix[:3, :3]) < 0:
-        return "no negative scale, which turns a sphere inside out: make it positive, a mirrored sphere is the same"
+        return (
+            "no negative scale, which turns a sphere inside out: make it positive, a mirrored "
+            "sphere is the same"
+        )
     return "normals that point outwards: remove flip_normals"

@@ -152,7 +152,8 @@ def is_grid(medium: "mi.Medium | None") -> bool:
 
 
 def read_grid(medium: "mi.Medium", albedo: Array, phase: PhaseFunction) -> GridMedium:
-    """Read a grid around the camera with an albedo, RGB, and a phase function that were read before.
+    """Read a grid around the camera with an albedo, RGB, and a phase function that were read
+    before.
 
     Raises InputError for a grid that `grid_values` refuses, or whose extinctions in Mitsuba differ
     from those of `GridMedium`.

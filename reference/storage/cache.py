@@ -119,8 +119,8 @@ def store_arrays(key: str, arrays: Mapping[str, ArrayLike]) -> None:
 
     Then the files that were used longest ago are removed until the cache is no larger than its
     limit. The size of the cache is looked at by chance, the more often the larger the file is. With
-    a limit of 0 nothing is written. If the folder cannot be written, a note on the error stream says
-    so, and the program goes on. Raises OSError if the disk is full.
+    a limit of 0 nothing is written. If the folder cannot be written, a note on the error stream
+    says so, and the program goes on. Raises OSError if the disk is full.
     """
     limit = cache_limit()
     if limit == 0:
@@ -144,8 +144,8 @@ def store_arrays(key: str, arrays: Mapping[str, ArrayLike]) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    # Not flushed, which takes half the time of a small file: one that a loss of power
-    # damages counts as missing.
+    # The file is not flushed, which would take half the time of a small file: a file that a loss of
+    # power damages counts as missing.
     try:
         write_bytes(path, data, flush=False)
     except FileNotFoundError:  # the folder was empty, and another process has just removed it
@@ -162,8 +162,8 @@ def _note_unwritable(folder: Path) -> None:
 
 
 def is_stored(key: str) -> bool:
-    """Return whether there is a file under a key, damaged or not; none where the
-    limit of the cache is 0.
+    """Return whether there is a file under a key, damaged or not; False if the limit of the cache
+    is 0.
     """
     return cache_limit() > 0 and _path(key).exists()
 
@@ -199,8 +199,8 @@ def cache_entries() -> list[Entry]:
 
 
 def _listed(folder: Path) -> list[Path]:
-    """Return the contents of a folder, none once another process removed it
-    (`Path.glob` of Python 3.11 raises).
+    """Return the contents of a folder; none if another process has removed it, for which
+    `Path.glob` of Python 3.11 raises.
     """
     try:
         return list(folder.iterdir())
@@ -209,8 +209,8 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def remove_oldest(limit: int) -> tuple[int, int]:
-    """Remove the files that were used longest ago until the others take `limit` bytes;
-    return how many, and bytes.
+    """Remove the files that were used longest ago until the others take at most `limit` bytes;
+    return how many files were removed, and their bytes.
     """
     entries = cache_entries()
     excess, files, freed = sum(entry.size for entry in entries) - limit, 0, 0

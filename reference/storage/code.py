@@ -2,10 +2,10 @@
 """Digests of code: the code that computes a result is an input of it.
 
 A module counts with all modules of ours that it imports, directly or not, as Python compiles them,
-without comments, docstrings and line numbers: rewording one throws nothing away. Data count with
-the code that may read them: the files in the folders of these modules (tables of scenes, certified
-values, claims), and files beside a module of the user's that it names. The versions of Mitsuba,
-Dr.Jit, NumPy and SciPy count too.
+without comments, docstrings and line numbers: a new wording of these makes no result old. Data
+count with the code that may read them: the files in the folders of these modules (tables of scenes,
+certified values, claims), and the files beside a module of the user's that the module names. The
+versions of Mitsuba, Dr.Jit, NumPy and SciPy count too.
 """
 
 import hashlib
@@ -33,20 +33,21 @@ def source_digest(*modules: str) -> str:
 
 
 def code_digest(starts: Iterable[Path]) -> str:
-    """Return a digest of the code of some files and of all that they import, as far as
-    it is ours or the user's.
+    """Return a digest of the code of some files and of all code of ours or the user's that they
+    import.
 
-    From a file of the user's, which may lie anywhere, the modules beside it are followed,
-    and the modules of its package.
+    A file of the user's may lie anywhere; it may import the modules beside it and those of its
+    package.
     """
     # Follow imports from file to file.
-    waiting, digests = [path.resolve() for path in starts], dict[Path, bytes]()
+    paths = [path.resolve() for path in starts]
+    digests: dict[Path, bytes] = {}
     data: set[Path] = set()
-    while waiting:
-        path = waiting.pop()
+    while paths:
+        path = paths.pop()
         if path not in digests:
             digests[path], names = _compiled(path, path.stat().st_mtime_ns)
-            waiting += _imported(path, names)
+            paths += _imported(path, names)
             data |= set(_data(path.parent) if _is_ours(path) else _named_data(path.parent, names))
     digests |= {path: hashlib.sha256(_source(path)).digest() for path in data}
 
@@ -60,8 +61,8 @@ def code_digest(starts: Iterable[Path]) -> str:
 
 @lru_cache(maxsize=1024)
 def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
-    """Return a digest of the code of a file, and the names and words in it,
-    names of modules among them.
+    """Return a digest of the code of a file, and the names and words in it, among which are the
+    names of the modules that it imports.
     """
     names: set[str] = set()
     try:
@@ -75,9 +76,7 @@ def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
 
 
 def _bare(code: CodeType, names: set[str]) -> CodeType:
-    """Return code without its places in the file, and add the names and
-    the words that it mentions.
-    """
+    """Return code without its places in the file, and add its names and words to `names`."""
     names.update(code.co_names, _words(code.co_consts))
     constants = tuple(
         _bare(each, names) if isinstance(each, CodeType) else each for each in code.co_consts
@@ -86,8 +85,8 @@ def _bare(code: CodeType, names: set[str]) -> CodeType:
 
 
 def _words(constants: Iterable[object]) -> Iterator[str]:
-    """Yield the words among constants, those in tuples and sets too: a registry
-    may name modules by them.
+    """Yield the words among constants, also those in tuples and sets: a registry may name modules
+    by them.
     """
     for each in constants:
         if isinstance(each, str):
@@ -121,8 +120,8 @@ def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """Yield the files of a folder of ours that are no modules, those of folders
-    without modules below it too.
+    """Yield the files of a folder of ours that are no modules, also those in folders below it that
+    have no modules.
     """
     for path in folder.iterdir():
         if path.is_dir() and path.name != "__pycache__" and not any(path.glob("*.py")):
@@ -132,7 +131,7 @@ def _data(folder: Path) -> Iterator[Path]:
 
 
 def _named_data(folder: Path, names: Iterable[str]) -> Iterator[Path]:
-    """Yield the files beside a module of the user's that it names, modules apart."""
+    """Yield the files beside a module of the user's that it names and that are no modules."""
     for path in folder.iterdir():
         if path.name in names and path.suffix not in _CODE and path.is_file():
             yield path
@@ -144,7 +143,7 @@ def _source(path: Path) -> bytes:
 
 @lru_cache(maxsize=1)
 def _modules() -> dict[str, Path]:
-    """Return the files of our modules by name, those of packages too."""
+    """Return the files of our modules and packages by name."""
     paths = [path for folder in _FOLDERS for path in (_ROOT / folder).rglob("*.py")]
     parts = {path: path.relative_to(_ROOT).with_suffix("").parts for path in paths}
     return {

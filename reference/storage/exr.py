@@ -405,8 +405,8 @@ def _float32(values: NDArray[np.floating], name: str) -> NDArray[np.float32]:
 
 
 def _check_finite(image: Image) -> None:
-    """Refuse layers with NaN or infinity, and depths with NaN: where a ray hits nothing the depth is
-    infinite.
+    """Refuse layers with NaN or infinity, and depths with NaN: where a ray hits nothing the depth
+    is infinite.
     """
     layers = dict(image.layers)
     if image.depth is not None:

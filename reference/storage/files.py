@@ -33,9 +33,8 @@ _STALE = 3600.0  # seconds after which an unfinished file belongs to nobody
 def ensure_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder with its parents, and prove that files can be written into it.
 
-    Call this before any work is done: it costs one empty temporary file. Permission bits are not
-    asked, because they say nothing about a read-only or full disk, nor about what the superuser may
-    do.
+    Call this before any work is done: it costs one empty temporary file. Permission bits would say
+    nothing about a read-only or full disk, nor about the superuser.
 
     `path`: the folder; it may exist already. Returns Path: the folder. Raises InputError if the
     path is not a folder, or the folder cannot be made or written.
@@ -92,8 +91,7 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
         mode = target.stat().st_mode if target.exists() else stat.S_IFREG
     except (OSError, ValueError) as error:
         raise InputError(f"cannot write the file {path!r}: {error}; give another name") from error
-    # Moving a file over a device such as /dev/null replaces the device, if it is
-    # the superuser who does it.
+    # If the superuser moves a file over a device such as /dev/null, the device is replaced.
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
         raise InputError(f"cannot write the file {path}: it is {kind}; give the name of a file")
@@ -116,8 +114,8 @@ def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator
     """
     target = ensure_writable(path)
     sweep_hidden(target.parent)
-    # Not tempfile's: its files are readable by their owner alone and would stay so.
-    # Systems count the bytes of a name, of which a letter has up to four.
+    # Files of `tempfile` would stay readable by their owner alone. Systems limit the bytes of a
+    # name, and a letter has up to four bytes.
     stem = os.fsdecode(os.fsencode(target.stem)[:100])
     temporary = target.with_name(f".{stem}-{uuid.uuid4().hex}{target.suffix}")
     try:

@@ -102,7 +102,7 @@ def description_digest(state: "mi.parser.ParserState") -> str | None:
 
 
 def is_whole(scene: "mi.Object") -> bool:
-    """Return whether Mitsuba tells every property of a scene, or of another object, that is built."""
+    """Return whether Mitsuba tells every property of a scene or of another object."""
     return {part.class_name() for part in mi.traverse(scene).hierarchy} <= _WHOLE
 
 

@@ -62,8 +62,8 @@ class LitIntervals:
     #: relative uncertainty of the distance of an edge from its light, or of coordinates
     edge: float = EXACT_EDGE
     random_checks: RandomChecks = field(default_factory=RandomChecks)
-    #: undecided parts of rays: numbers of the rays, and sizes of the parts, angles at the light [rad]
-    #: or lengths [m]
+    #: undecided parts of rays: numbers of the rays, and sizes of the parts, angles at the light
+    #: [rad] or lengths [m]
     doubt: tuple[Index, Array] = field(default_factory=lambda: (np.empty(0, np.int64), np.empty(0)))
 
 

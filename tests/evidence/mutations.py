@@ -609,8 +609,8 @@ _TRACED_WIDE = _all(
         ),
         "traced-area-even-density": Rewrite(
             _TRACED,
-            "dr.select(counts_, density, 0)",
-            "dr.select(counts_, 1 / self.area, 0)",
+            "dr.select(counts, density, 0)",
+            "dr.select(counts, 1 / self.area, 0)",
             times=2,
         ),
         "traced-area-chord-density": Rewrite(

@@ -242,8 +242,7 @@ def observation_of(
             "expected homogeneous media "
             "or height fog: compare with the reference alone, without --fit and --diagnose"
         )
-    if reference.sky is not None:
-        assert reference.background is not None
+    if reference.background is not None and reference.sky is not None:
         raise InputError(
             f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not "
             "know; expected "

@@ -96,7 +96,8 @@ class Tabulated:
     def down(self, sampler: "mi.Sampler", active: "mi.Bool") -> "mi.Float":
         """Return sin^2 of half a random scattering angle."""
         number = dr.minimum(mi.UInt32(sampler.next_1d(active) * self._last), self._last - 1)
-        # The alias method: a fraction of the draws of a cell stays with it, the rest go to its alias.
+        # The alias method: a fraction of the draws of a cell stays with it, the rest go to its
+        # alias.
         stays = sampler.next_1d(active) < dr.gather(mi.Float, self._fraction, number, active)
         cell = dr.select(stays, number, dr.gather(mi.UInt32, self._other, number, active))
         low = dr.gather(mi.Float, self._values, cell, active)

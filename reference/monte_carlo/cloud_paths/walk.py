@@ -164,8 +164,8 @@ def _turn(
     rays: "mi.Ray3f",
     side: float,
 ) -> "tuple[Paths, mi.Sampler]":
-    """Cast the ray of every lane, add the light that arrives, and return the state of the paths with
-    their next rays.
+    """Cast the ray of every lane, add the light that arrives, and return the state of the paths
+    with their next rays.
     """
     active = paths.remaining > 0
     lanes = dr.width(rays.d)
@@ -202,8 +202,8 @@ def _turn(
     stays = thins = mi.Bool(False)
     if scene.densities:
         # Delta and ratio tracking in clouds with a density: a shadow ray takes a new free length on
-        # each stretch. Where a flight or a free length ends, rho is looked up: a flight goes on with
-        # the probability 1 - rho, a shadow ray with the factor 1 - rho.
+        # each stretch. Where a flight or a free length ends, rho is looked up: a flight goes on
+        # with the probability 1 - rho, a shadow ray with the factor 1 - rho.
         uneven, free = scene.uneven(within), -dr.log(1 - sampler.next_1d(active))
         thins = shadow & uneven & (free < optical)
         place = o + d * (free / dr.maximum(sigma_t, dr.smallest(mi.Float)) - gap)

@@ -331,8 +331,8 @@ def emitting(light: ReferenceAreaLight) -> Emitting:
     if light.kind == "sphere":
         return Ball(centre, light.radius)
     corners = light.triangles
-    # A mesh for the ray casts, with the triangles in the order of the tables: the number of a hit is
-    # the row of its triangle.
+    # A mesh for the ray casts, with the triangles in the order of the tables: the number of a hit
+    # is the row of its triangle.
     mesh = mi.Mesh("light", vertex_count=3 * len(corners), face_count=len(corners))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(corners.ravel())

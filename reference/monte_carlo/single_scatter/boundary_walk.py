@@ -12,9 +12,9 @@ point lies.
 
 Stretches are measured along the one straight ray, from the light to the point. A continued ray
 starts a little beyond a boundary, so that it does not meet the boundary again; the optical depth
-counts that little way too. Visibility rays stop a relative 1e-5 before the point, since a point on a surface
-must not be hidden by that surface; the attenuation counts the whole distance (volpath's does not,
-DESIGN section 6.1).
+counts that little way too. Visibility rays stop a relative 1e-5 before the point, since a point on
+a surface must not be hidden by that surface; the attenuation counts the whole distance (volpath's
+does not, DESIGN section 6.1).
 """
 
 from dataclasses import dataclass

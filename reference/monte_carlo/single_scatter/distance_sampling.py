@@ -111,9 +111,9 @@ def cone_ends(
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
         return mi.Float64(-infinity), mi.Float64(infinity)
-    # By how much samples may fall beside the cone [rad]: above the rounding of double precision, and
-    # so little that hardly any sample does. (A wider strip with a sample in 1 of 100 batches would
-    # be a bias in the other 99.)
+    # By how much samples may fall beside the cone [rad]: above the rounding of double precision,
+    # and so little that hardly any sample does. (A wider strip with a sample in 1 of 100 batches
+    # would be a bias in the other 99.)
     margin = 1e-8
     height = approach.height
     along, across = dr.dot(axis, direction), dr.dot(axis, approach.normal)
@@ -137,8 +137,8 @@ def equi_angular_range(span: Span) -> "mi.Float64":
 
 
 def equi_angular(u: "mi.Float64", span: Span) -> "mi.Float64":
-    """Return distances y from the start of the span [m], uniform in the angle at the light, for u in
-    [0, 1).
+    """Return distances y from the start of the span [m], uniform in the angle at the light, for u
+    in [0, 1).
     """
     return _distance(u * equi_angular_range(span), span)
 
@@ -150,8 +150,8 @@ def equi_angular_pdf(y: "mi.Float64", span: Span) -> "mi.Float64":
 
 
 def _distance(angle: "mi.Float64", span: Span) -> "mi.Float64":
-    """Return y, the distance from the start of the span to the point that the light sees at an angle
-    [rad] from the start [m].
+    """Return y, the distance from the start of the span to the point that the light sees at an
+    angle [rad] from the start [m].
     """
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
@@ -226,7 +226,9 @@ class Mixture:
 
 
 def mixture_of(span: Span, sigma_t: "Sequence[mi.Float]") -> Mixture:
-    """Return the mixture of both techniques; one extinction for all channels, or one for each [1/m]."""
+    """Return the mixture of both techniques for one common extinction, or one of each channel
+    [1/m].
+    """
     flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
     return Mixture(span, equi_angular_range(span), flights)
 
@@ -240,8 +242,8 @@ def mixture_pdfs(y: "mi.Float64", mixture: Mixture) -> "tuple[mi.Float64, mi.Flo
 
 
 def _terms(y: "mi.Float64", mixture: Mixture) -> "list[tuple[mi.Float64, mi.Float64]]":
-    """Return the terms of equi-angular sampling and of free flights in the distribution function and
-    the density [1/m].
+    """Return the terms of equi-angular sampling and of free flights in the distribution function
+    and the density [1/m].
     """
     h, s = mixture.span.height, mixture.span.start + y
     flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]

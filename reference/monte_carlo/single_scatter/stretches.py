@@ -159,8 +159,8 @@ def cell_of(number: "mi.UInt32", shift: "mi.Float", count: int) -> "tuple[mi.Flo
 
     All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift`
     in [0, 1) says. The edge of a shadow therefore lies anywhere in its cell from batch to batch. In
-    cells that stay, few batches would have a sample beyond an edge close to the end of its cell, and
-    the spread between the others would not show it.
+    cells that stay, few batches would have a sample beyond an edge close to the end of its cell,
+    and the spread between the others would not show it.
     """
     if count == 1:
         return mi.Float(0), mi.Float(1)

@@ -11,9 +11,9 @@ For a layer
 
 If both heights are nearly equal, the depth is the density between them times l. (The quadrature
 takes the lower end and (1 - e^-u)/u.) A free flight has the density sigma exp(-tau)/(1 -
-exp(-tau_end)): tau is inverted by bisection. Under a sun every sample is a free flight: the estimate
-is the transmittance of its path, and bounded. Under a light at a place one half of the samples are
-equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
+exp(-tau_end)): tau is inverted by bisection. Under a sun every sample is a free flight: the
+estimate is the transmittance of its path, and bounded. Under a light at a place one half of the
+samples are equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
 
 **Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own
 majorant m (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson
@@ -236,8 +236,8 @@ class _GridPart(Part):
         sampler: "mi.Sampler",
         active: "mi.Bool",
     ) -> "tuple[mi.Float, mi.Sampler]":
-        """Return estimates of the transmittance along lines, given by origin [m], unit direction and
-        length [m], and the sampler.
+        """Return estimates of the transmittance along lines, given by origin [m], unit direction
+        and length [m], and the sampler.
         """
         origin, direction, distance = line
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))

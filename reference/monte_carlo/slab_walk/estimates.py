@@ -44,11 +44,11 @@ def slab_estimate(
 ) -> SlabEstimate:
     """Estimate the light of a slab by a walk of photons.
 
-    `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for a set
-    without end; order 0 is the beam; `photons`: at least two; they are walked in batches of at most
-    25 000, at least 64 if there are as many photons; `seed`: the same seed gives the same numbers,
-    whatever the number of workers; `workers`: threads; `progress`: called with (fraction done,
-    what).
+    `slab`: the slab; `sets`: first and last order of each set, the last `math.inf` for an unbounded
+    set; order 0 is the beam; `photons`: at least two, in at least 64 batches (fewer for fewer
+    photons) of at most 25 000 photons; `seed`: the same seed gives the same numbers, whatever the
+    number of workers; `workers`: threads; `progress`: called with the fraction that is done and a
+    word about it.
     """
     # The arrays of 25 000 photons fit into the cache of a core. With 64 batches at least, standard
     # errors are known to 9 %.

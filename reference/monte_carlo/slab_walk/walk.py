@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Photons through a slab, one flight after the other, counted by order with their distance
-from the point of entry.
+"""Photons through a slab, one flight after the other, counted by order of scattering with their
+distances from the point of entry.
 
 A photon enters a slab of thickness tau at the origin, flies an exponentially distributed optical
 length, is scattered by the phase function, and so on until it leaves. All photons of a batch are
@@ -73,7 +73,7 @@ class Counts:
 def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
     """Follow a batch of photons until all have left.
 
-    `slab`: the slab; `photons`: number of photons; `random`: where numbers come from.
+    `slab`: the slab; `photons`: number of photons; `random`: the source of random numbers.
     """
     rows: list[Array] = []
     for weight, (x, y, z), direction in flights(slab, photons, random):
@@ -96,11 +96,10 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
 def flights(
     slab: Slab, photons: int, random: np.random.Generator
 ) -> Iterator[tuple[float, Vectors, Vectors]]:
-    """Yield the flights of a batch of photons, order by order, until all have
-    left, for tallies to count.
+    """Yield the flights of a batch of photons, order by order, until all have left.
 
-    Yields the fraction left by absorption; x, y and the depth z of the photons; and the components
-    of their directions, the third downwards, (photons,) each.
+    Yields the weight, the fraction that absorption lets through; x, y and the depth z of the
+    photons; and the components of their directions, the third downwards, (photons,) each.
     """
     place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
@@ -116,8 +115,8 @@ def flights(
 def _next_scattering(
     slab: Slab, place: Vectors, direction: Vectors, random: np.random.Generator
 ) -> tuple[Vectors, Vectors]:
-    """Return the photons that scatter in the slab once more: where they do, and
-    where they go from there.
+    """Return the places where photons scatter in the slab once more, and their directions from
+    there.
     """
     (x, y, z), (u, v, w) = place, direction
     flight = random.standard_exponential(x.size)
@@ -137,7 +136,7 @@ def _passages(
     which: NDArray[np.bool_],
     depth: float,
 ) -> tuple[Array, Array]:
-    """Return the expected moments of passages of some photons through a depth before
+    """Return the expected moments of the passages of some photons through a depth that lies before
     them, and the same over |mu|.
     """
     u, v, w = (part[which] for part in direction)
