@@ -233,7 +233,7 @@ def _trace_pixels(
     dr.eval(pixel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, dr.width(pixel))
-    start = mi.Point3f(*(float(c) for c in traced.origin))
+    start = mi.Point3f(*traced.origin.tolist())
     ray = mi.Ray3f(start, dr.gather(mi.Vector3f, direction, pixel))
     radiance, _, _ = integrator.sample(traced.scene, sampler, mi.RayDifferential3f(ray), medium)
     dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again

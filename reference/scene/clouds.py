@@ -217,7 +217,7 @@ def _enclosing(shapes: "list[mi.Shape]", point: Array) -> int:
     # Only boundaries are in this scene: an opaque shape must not hide one from the rays.
     scene = scene_from(shapes)
     for direction in ((0.2672, 0.5345, 0.8018), (-0.6247, 0.3714, 0.6868)):
-        ray = mi.Ray3f(mi.Point3f(*(float(c) for c in point)), mi.Vector3f(*direction))
+        ray = mi.Ray3f(mi.Point3f(*point.tolist()), mi.Vector3f(*direction))
         dr.make_opaque(ray)
         si = scene.ray_intersect(ray)
         dr.eval(si)

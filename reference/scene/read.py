@@ -450,7 +450,7 @@ def _read_phase(phase: "mi.PhaseFunction") -> PhaseFunction:
     if name == "HGPhaseFunction":
         return HenyeyGreenstein(float(parameters["g"][0]))
     if name == "TabulatedPhaseFunction":
-        return Tabulated(tuple(float(v) for v in np.array(parameters["values"])))
+        return Tabulated(tuple(np.array(parameters["values"]).tolist()))
     raise InputError(
         f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase"
     )
@@ -490,7 +490,7 @@ def _read_light(emitter: "mi.Emitter") -> ReferenceLight:
     # Mitsuba's own answer at a far point on the axis, where positions lose no digits that matter.
     distance = 1024.0 * max(1.0, float(np.abs(position).max()))
     interaction = dr.zeros(mi.Interaction3f)
-    interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
+    interaction.p = mi.Point3f(*(position + distance * axis).tolist())
     dr.make_opaque(interaction)  # one kernel for all lights of a kind
     # Irradiance times the squared distance is the intensity.
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))

@@ -319,7 +319,7 @@ def reached_by_shadow_rays(
     (3,) [m]; `reached`: whether it reaches the surface points themselves, by exact geometry,
     (rays,); `scene`, `shapes`: the occluders, for ray casts and as numbers.
     """
-    ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
+    ray = interaction.spawn_ray_to(mi.Point3f(*light.tolist()))
     valid = np.array(interaction.is_valid(), dtype=bool)
     cast = ~np.array(scene.ray_test(ray, interaction.is_valid()), dtype=bool)
     differs = np.flatnonzero(valid & (cast != reached))

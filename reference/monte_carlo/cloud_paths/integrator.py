@@ -78,7 +78,7 @@ def cloud_paths_batch(
             directions = dr.normalize(
                 mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T)
             )
-            rays = mi.Ray3f(mi.Point3f(*(float(c) for c in clouds.origin)), directions)
+            rays = mi.Ray3f(mi.Point3f(*clouds.origin.tolist()), directions)
             dr.make_opaque(rays)  # one kernel for all cameras
             side = SIDE if scene.has_suns else 0.0  # flights are drawn about suns
             walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)

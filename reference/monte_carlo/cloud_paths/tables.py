@@ -149,7 +149,7 @@ def _chosen(number: "mi.UInt32", values: list[Value]) -> Value:
 
 
 def _numbers(values: NDArray[np.float64]) -> Three:
-    first, second, third = (float(value) for value in values)
+    first, second, third = values.tolist()
     return first, second, third
 
 

@@ -317,7 +317,7 @@ Emitting = Triangles | Flat | Ball
 def emitting(light: ReferenceAreaLight) -> Emitting:
     """Return the emitting surface of an area light, as numbers on the device."""
     centre, across, up, normal = (
-        mi.Vector3d(*map(float, vector)) for vector in (light.centre, *light.frame)
+        mi.Vector3d(*vector.tolist()) for vector in (light.centre, *light.frame)
     )
     if light.kind in ("rectangle", "disk"):
         return Flat(

@@ -53,7 +53,7 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)
         ray = double_ray(
-            mi.Point3d(*(float(c) for c in reference.origin)),
+            mi.Point3d(*reference.origin.tolist()),
             mi.Vector3d(reference.direction[chunk].T),
         )
         layers = dr.zeros(mi.Spectrum, count), dr.zeros(mi.Spectrum, count)

@@ -253,7 +253,7 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     """Return the lights of a scene."""
     emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
     area = [
-        AreaSource(emitting(light), mi.Color3f(*map(float, light.radiance)))
+        AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()))
         for light in reference.area
     ]
     return (*map(_source, emitters), *area)

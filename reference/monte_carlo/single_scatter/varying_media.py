@@ -50,7 +50,7 @@ def varying_part(
     """Return the part of camera rays in a medium, up to the surface at a distance [m]."""
     plugin = mi.MediumPtr(medium.plugin)
     if isinstance(medium, HeightMedium):
-        up = mi.Vector3d(*(float(each) for each in medium.up))
+        up = mi.Vector3d(*medium.up.tolist())
         height, rise = dr.dot(ray.origin_double, up), dr.dot(ray.direction_double, up)
         ends = [(z - height) / rise for z in (medium.floor, medium.cap)]
         # The ray is in the fog between its passages through floor and cap. A level ray is in the
