@@ -130,6 +130,17 @@ def time_cells(
     return times
 
 
+def time_frame(
+    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
+) -> FrameTimes:
+    """Return the times of the frames of one renderer, in a run of its own;
+    parameters as of `time_alone`.
+    """
+    times = time_alone(renderer, seconds=seconds, slow=slow).times
+    assert times is not None
+    return times
+
+
 def time_alone(
     renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
 ) -> CellTimes:
