@@ -35,7 +35,7 @@ from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.scenes.registry import SCENES
 from airlight.validation.study.configuration import configuration, parse_settings, prepared
-from airlight.validation.study.turns import time_alone
+from airlight.validation.study.turns import time_frame
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDER = DOCS / "gallery"
@@ -216,9 +216,7 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     colours = error_map(reference, np.asarray(frame.airlight, dtype=np.float64))
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     whole = read_scene(load_scene(picture.scene, SMALL).scene)
-    times = time_alone(prepared(whole, chosen)).times
-    assert times is not None
-    milliseconds = times.frame.median_ms
+    milliseconds = time_frame(prepared(whole, chosen)).frame.median_ms
     picture_of = _with_scale(
         colours.repeat(coarser, axis=0).repeat(coarser, axis=1), error, milliseconds
     )

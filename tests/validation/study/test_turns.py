@@ -16,7 +16,7 @@ from airlight.validation.clock import Piece, in_turns, time_in_turns, time_repea
 from airlight.validation.study import turns as module
 from airlight.validation.study.configuration import configuration
 from airlight.validation.study.study import Cell, Measure
-from airlight.validation.study.turns import time_alone, time_cells
+from airlight.validation.study.turns import time_cells, time_frame
 from airlight.validation.timing import ANCHORS, anchored
 from tests.helpers.scenes import tiny_scene
 
@@ -109,7 +109,7 @@ def test_a_slow_frame_is_timed_a_few_times(scene, monkeypatch, spent, turns):
     """A frame that takes minutes must not be rendered thirty times."""
     monkeypatch.setattr(module, "_PATIENCE", spent)
     renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)
-    times = time_alone(renderer, seconds=0.0, slow=-1.0).times
+    times = time_frame(renderer, seconds=0.0, slow=-1.0)
     assert {each.repetitions for each in times.measured.values()} == {turns}
     assert len(times.measured) == 7
     assert all(
