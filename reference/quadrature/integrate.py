@@ -143,7 +143,7 @@ def sum_stretches(
     rays, stretches, terms
         See `reference.quadrature.fields.Field.sums`.
     source
-        What the medium scatters along the pieces of some stretches.
+        A function of pieces of stretches: the light that the medium scatters along them.
     rtol
         Relative tolerance of the sum of a ray and a light [1], where `terms` has none.
     step

@@ -99,8 +99,9 @@ def change_scene(scene: mi.Scene, changes: Mapping[str, Sequence[float]]) -> Non
     Raises InputError for a name that the scene does not have, and a value that it cannot have: then
     nothing is changed.
     """
-    # All values are checked before any is set. What a part refuses of values together, such as
-    # numbers of height fog without a bound, is known only then: all parts get their old values.
+    # All values are checked before any is set. A part may refuse some values together, such as
+    # numbers of height fog without a bound, only when they are set: all parts then get their old
+    # values.
     checked = checked_changes(scene, changes)
     changed = []
     for kind, parts, change in (
