@@ -80,7 +80,7 @@ class _FogPart(Part):
 
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,
@@ -202,7 +202,7 @@ class _GridPart(Part):
 
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,
