@@ -114,8 +114,8 @@ class _FogPart(Part):
         # The density of free flights, and of both techniques together.
         x = low + y
         transmittance = dr.exp(before - self._depth_to(x))
-        density = self._density(self.height + self.rise * x) * transmittance / probability
-        flights = dr.select(probability > 0, density, 0)
+        pdf = self._density(self.height + self.rise * x) * transmittance / probability
+        flights = dr.select(probability > 0, pdf, 0)
         return y, flights if span is None else 0.5 * (flights + equi_angular_pdf(y, span))
 
     def transmittance(
