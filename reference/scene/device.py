@@ -4,7 +4,8 @@ are nor on where their memory lies.
 
 Types of Mitsuba and Dr.Jit stand in quotes, here and in all of `reference`: they exist once a
 variant is chosen. The name says the precision, `mi.Float64` and `mi.Vector3d` double, `mi.Float`
-and `mi.Vector3f` single; an array has an entry for each lane.
+and `mi.Vector3f` single; an array has an entry for each lane. Mitsuba's arithmetic turns points
+into vectors and back: a type says which of the two is meant.
 """
 
 from collections.abc import Callable

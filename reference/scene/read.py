@@ -60,7 +60,7 @@ class ReferenceLight:
     @property
     def is_soft(self) -> bool:
         """Whether the intensity falls off within the cone."""
-        return self.cosine or (self.axis is not None and self.beam < self.cutoff)
+        return self.cosine or (self.axis is not None and bool(self.beam < self.cutoff))
 
 
 @dataclass(frozen=True)

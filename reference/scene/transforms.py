@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 SAME = 1e-5  #: scales and angles of a float32 transform that differ by less are meant to be equal
 
 
-def matrix_of(transform: "mi.Transform4f | mi.ScalarTransform4f") -> Array:
+def matrix_of(
+    transform: "mi.Transform4f | mi.ScalarTransform4f | mi.ScalarTransform4d",
+) -> Array:
     """Return a transform of Mitsuba as a matrix, (4, 4)."""
     return np.array(transform.matrix, dtype=np.float64).reshape(4, 4)
 

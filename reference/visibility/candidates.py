@@ -79,7 +79,8 @@ def near_shapes(
     lists: list[tuple[Index, Index]] = []
     for rays, numbers in _tiles(light, origin, direction, length, solids):
         lists.append((rays, numbers))
-    ends = np.cumsum([0, len(shapes.triangles), len(shapes.radius), len(shapes.disks.radius)])
+    counts = [len(shapes.triangles), len(shapes.radius), len(shapes.disks.radius)]
+    ends = np.cumsum([0, *counts]).tolist()
     return Near(*(_of_kind(lists, len(direction), ends[k], ends[k + 1]) for k in range(3)))
 
 

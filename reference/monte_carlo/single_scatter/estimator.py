@@ -190,7 +190,7 @@ def _surface(
     sampler: "mi.Sampler",
     ray: Ray,
     hit: "mi.SurfaceInteraction3f",
-    x: "mi.Float",
+    x: "mi.Float | mi.Float64",
     part: Part,
     active: "mi.Bool",
 ) -> Estimate:

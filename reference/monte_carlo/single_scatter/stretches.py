@@ -77,7 +77,7 @@ class Part(ABC):
     @abstractmethod
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,
@@ -114,7 +114,7 @@ class Stretch(Part):
 
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,

@@ -80,7 +80,7 @@ class _FogPart(Part):
 
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,
@@ -114,8 +114,8 @@ class _FogPart(Part):
         # The density of free flights, and of both techniques together.
         x = low + y
         transmittance = dr.exp(before - self._depth_to(x))
-        density = self._density(self.height + self.rise * x) * transmittance / probability
-        flights = dr.select(probability > 0, density, 0)
+        pdf = self._density(self.height + self.rise * x) * transmittance / probability
+        flights = dr.select(probability > 0, pdf, 0)
         return y, flights if span is None else 0.5 * (flights + equi_angular_pdf(y, span))
 
     def transmittance(
@@ -202,7 +202,7 @@ class _GridPart(Part):
 
     def distances(
         self,
-        u: "mi.Float",
+        u: "mi.Float | mi.Float64",
         low: "mi.Float64",
         length: "mi.Float64",
         span: Span | None,
