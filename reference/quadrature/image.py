@@ -379,8 +379,10 @@ def _image(
     replicates: Array | None,
     kind: ErrorKind,
 ) -> ReferenceImage:
-    """Return the image of layers and errors, see `_layers` and `_errors`; distances, angles and
-    checks are those of the centres, and `kind` is that of the error of the airlight.
+    """Return the image of layers and errors, see `_layers` and `_errors`.
+
+    Distances, angles and checks come from the values at the `centre`; `kind` says what the error of
+    the airlight is.
     """
     shape, checked = (reference.height, reference.width), centre.random_checks
     image = ReferenceImage(

@@ -106,7 +106,6 @@ def reference_image(
     ------
     InputError
         For radiance that is not finite.
-
     """
     inputs = ReferenceInputs(scene_content(scene), checks, shadow_scale, pixel, points)
     return reference_result(scene, inputs, progress=progress).value

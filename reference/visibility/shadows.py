@@ -79,7 +79,7 @@ class _Solids:
     """The shapes of one kind, and the lists of those that can stand in the light of each ray."""
 
     shadow: "Callable[[_Lanes, mi.Float64, mi.UInt32], Interval]"  #: of the shape of a number
-    values: "mi.Float64"  #: of all shapes, those of one shape after those of the one before
+    values: "mi.Float64"  #: of all shapes, one shape after another
     numbers: "mi.UInt32"  #: the lists of all rays, one after the other
     begin: Index  #: where the list of each ray begins, (rays,)
     end: Index  #: where it ends, (rays,)

@@ -92,8 +92,8 @@ class Reference:
 
     mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
     relative_error: Number = column(
-        meaning="its error over that mean, three standard errors of area lights added; `relative_bound` in reports "
-        "of 1.0.0"
+        meaning="its error over that mean, three standard errors of area lights added; `relative_bound` in files "
+        "of version 4"
     )
     kind: str | None = column(
         meaning="of that error: `proven`, `estimated` (density grids) or `statistical` (area lights, skies); `null` in "
@@ -102,7 +102,7 @@ class Reference:
     )
     surface_error: Number = column(
         meaning="the error of the surface over its mean, standard errors of area lights added; `null` in the dark and "
-        "in reports of 1.0.0",
+        "in files of version 4",
         default=None,
     )
     surface_kind: str | None = column(

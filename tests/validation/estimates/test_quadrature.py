@@ -132,8 +132,8 @@ def test_variances_of_the_total_add_up():
         surface_se=4 * layer,
     )
     assert reference_error(plain, "total") is None
-    # The error of the airlight is not that of all layers: where that of surfaces is not known, that
-    # of the sum is not.
+    # The error of the airlight says nothing of surfaces. Where the error of surfaces is not known,
+    # the error of the sum is not known either.
     assert known_to(plain, "airlight") == Estimate(float(layer.mean()), 0.0, "proven")
     for unknown in ("surface", "total"):
         assert known_to(plain, unknown).error is None
