@@ -197,7 +197,6 @@ def quadrature_image(
     ------
     InputError
         For another word in `pixel`.
-
     """
     shapes = read_shapes(reference.occluders)
     if pixel == "area":
@@ -254,7 +253,6 @@ def ray_values(
     RayValues
         Radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals were
         checked.
-
     """
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     # The cast distance, in float32, is what the caller gets: all methods share that surface. The

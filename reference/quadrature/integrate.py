@@ -143,7 +143,7 @@ def sum_stretches(
     rays, stretches, terms
         See `reference.quadrature.fields.Field.sums`.
     source
-        A function of pieces of stretches: the light that the medium scatters along them.
+        Returns the integrand along the pieces of lit stretches, None where nothing scatters.
     rtol
         Relative tolerance of the sum of a ray and a light [1], where `terms` has none.
     step
@@ -154,7 +154,6 @@ def sum_stretches(
     tuple
         The airlight of each ray, and its error, (rays, 3) each, [1/m^2] for places and [1] for
         directions; infinite where a ray meets a light in a medium that scatters.
-
     """
     ray, x0, x1 = stretches
     count, rtol = len(rays.foot), terms.rtol or rtol
