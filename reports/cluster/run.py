@@ -164,6 +164,7 @@ def _all(group: Group, status: str, reason: str, attempts: int = 1) -> list[Outc
 def do_group(group: Group, made: Any, topic: str, key: str) -> list[Outcome]:
     """Do the tasks of a group one after the other, each within its time."""
     from distributed import get_worker
+    from distributed.utils import sync
 
     worker = get_worker()
     # A worker with several threads would run several groups at once: kernels have the
@@ -173,11 +174,11 @@ def do_group(group: Group, made: Any, topic: str, key: str) -> list[Outcome]:
             _check(worker, made)
 
         # The timer is faulthandler's: a thread in C ends the process although Python may hang in a
-        # kernel. The report of the beginning must leave before the work does, or a death would not
-        # name its task.
+        # kernel. The scheduler must have the report of the beginning before the work begins, or a
+        # death would not name its task: `worker.log_event` returns before anything is sent.
         def done(task: Task, *values: Any) -> Outcome:
-            worker.log_event(topic, {"key": key, "task": task.name})
-            time.sleep(0.004)  # twice the interval of Dask's batches [s]
+            begin = {"key": key, "task": task.name}
+            sync(worker.loop, worker.scheduler.log_event, topic=topic, msg=begin)
             with open(os.devnull, "w") as nowhere:
                 faulthandler.dump_traceback_later(task.limit, exit=True, file=nowhere)
                 try:
