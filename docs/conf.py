@@ -17,10 +17,8 @@ release = version = __version__
 
 extensions = [
     "myst_parser",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "mathml",
-    "generated",
+    "pages",
 ]
 exclude_patterns = ["_ext", "data", "tools"]
 source_suffix = {".md": "markdown", ".ipynb": "markdown"}
@@ -28,15 +26,6 @@ highlight_language = "none"  # what is indented is a formula
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 suppress_warnings = ["myst.header"]
-
-autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
-autodoc_typehints = "none"  # shapes and units are in the words
-napoleon_google_docstring = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
-default_role = "code"
-toc_object_entries = False
 
 html_theme = "furo"
 html_title = f"airlight {__version__}"

@@ -2,9 +2,9 @@
 """Data of a report for the documentation: `python docs/tools/measured_data.py
 [--report DIR] [--kernels FILE]`.
 
-It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on
-which machine), `claims`, `scenes` (each with `counts`, `reference`, `multiple` and `methods`) and
-`kernels` (costs and errors of `airlight study kernels`, or null).
+It writes `docs/data/report.json`: `report` (when, by which command, on which machine), `claims`,
+`scenes` (each with `counts`, `reference`, `multiple` and `methods`) and `kernels` (costs and errors
+of `airlight study kernels`, or null). `fill_pages.py` then writes the tables of the pages.
 """
 
 import argparse
@@ -18,9 +18,7 @@ from airlight.reference.storage.files import write_text
 from airlight.reports.data.records import read_json, read_report
 from airlight.reports.machine.environment import activate
 
-DOCS = Path(__file__).resolve().parents[1]
-DATA, README = DOCS / "data" / "report.json", DOCS.parent / "README.md"
-SHOWN = "colonnade"  #: in the README
+DATA = Path(__file__).resolve().parents[1] / "data" / "report.json"
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 _METHOD = (
@@ -56,34 +54,6 @@ def refresh(report: Path | None, kernels: Path | None) -> None:
         costs = _read_object(kernels, "what `airlight study kernels -o FILE.json` writes")
         kept["kernels"] = kept_of_kernels(costs, kernels)
     write_text(DATA, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    before, rest = README.read_text(encoding="utf-8").split("<!-- results: begin -->\n")
-    after = rest.split("<!-- results: end -->")[1]
-    write_text(
-        README, f"{before}<!-- results: begin -->\n{results(kept)}<!-- results: end -->{after}"
-    )
-
-
-def results(kept: dict[str, Any]) -> str:
-    """Return the table of the README: one configuration of each method in one scene."""
-    scene = next(scene for scene in kept["scenes"] if scene["name"] == SHOWN)
-    report, chosen = kept["report"], {}
-    for entry in scene["methods"]:
-        if entry["times"] and entry["error"] and entry["kernel"] in (None, "exact"):
-            chosen.setdefault(entry["method"], entry)
-    lines = [
-        f"The scene `{SHOWN}`, {' x '.join(map(str, report['timed']))} pixels, "
-        f"{report['processor']}, "
-        f"{report['threads']} threads, {report['created'][:10]}, by `airlight report`: the median "
-        "time of a frame, and "
-        "the error of its airlight against the reference.",
-        "",
-        "| method | frame \\[ms\\] | relative RMSE |",
-        "| --- | ---: | ---: |",
-    ]
-    for entry in chosen.values():
-        frame, error = entry["times"]["frame"]["median_ms"], entry["error"]["relative_rmse"]
-        lines.append(f"| {entry['label']} | {frame:.3g} | {error:.2g} |")
-    return "\n".join([*lines, ""])
 
 
 def _read_object(path: Path, what: str) -> dict[str, Any]:
@@ -130,7 +100,7 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
 
 def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
     times = (
-        {name: entry["times"][name] for name in ("frame", "airlight", "light_moved")}
+        {name: entry["times"][name] for name in ("frame", "airlight", "light_moved", "run")}
         if entry["times"]
         else None
     )

@@ -38,7 +38,13 @@ class Frame:
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
-    """Render one frame and bring it to the host."""
+    """Render one frame and bring it to the host.
+
+    Parameters
+    ----------
+    renderer
+        The stages of the frame, from `frame_renderer`.
+    """
     state, frame = renderer.prepare(renderer.scene), None
     for part in parts(renderer):
         cast, surface = run_cast_and_shade(part)

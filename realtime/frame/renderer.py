@@ -135,13 +135,25 @@ def frame_renderer(
 ) -> FrameRenderer:
     """Prepare the stages of a frame.
 
-    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an
-    airlight kernel; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have
-    the further layers that the method names, which puts all lights into one group; never in a scene
-    with area lights; `parameters`: values of the method's parameters, and of
-    `realtime.area_lights.points.LightSamples`; the others have their defaults. Raises InputError
-    for a parameter that the method does not have, a missing kernel, and a scene that the method
-    refuses; refusals that depend on the rays come with the first frame.
+    Parameters
+    ----------
+    scene
+        A scene that `read_scene` has read.
+    method
+        A method, as `find_method` returns it.
+    kernel
+        One of `KERNELS`; needed where `method.uses_kernel` says so.
+    extra_layers
+        Whether frames have the further layers that the method names, which puts all lights into one
+        group; never in a scene with area lights.
+    parameters
+        Parameters of the method, and of light samples; the others have their defaults.
+
+    Raises
+    ------
+    InputError
+        For a parameter that the method does not have, a missing kernel, and a scene that the method
+        refuses. Refusals that depend on the rays come with the first frame.
     """
     # The method refuses what it does not render, before anything is computed.
     chosen, samples = method_parameters(method, parameters)

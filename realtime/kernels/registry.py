@@ -91,6 +91,7 @@ class Kernel:
         return replace(self, name=f"{self.name}-{size}", parameters=self.parameters | {first: size})
 
 
+#: The kernels by name, each with its function and how large it is by default.
 KERNELS: dict[str, Kernel] = {
     "exact": Kernel(
         "exact",

@@ -67,6 +67,7 @@ class _Methods(Mapping[str, type[Method]]):
         return len(_CLASSES)
 
 
+#: The methods by name; the module of a method is imported when it is asked for.
 METHODS: Mapping[str, type[Method]] = _Methods()
 
 

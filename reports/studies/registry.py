@@ -127,7 +127,7 @@ def with_environment(**data: Any) -> dict[str, Any]:
     return {"environment": describe_environment(), **plain(data)}
 
 
-#: Study -> the module of its function, which has the same name; imported when one is asked for.
+#: The studies by name, with the module of each; a study is imported when it is asked for.
 STUDIES = {
     "methods": "methods",
     "decomposition": "methods",

@@ -26,9 +26,15 @@ FILES = {
 def certified_data(name: str = "certified_fog.json") -> Path:
     """Return the path of a file of certified values.
 
-    `name`: one of `FILES`; the scenes of fog by default.
+    Parameters
+    ----------
+    name
+        Its name, such as `certified_integral.csv`; the scenes of fog by default.
 
-    Raises InputError for another name.
+    Raises
+    ------
+    InputError
+        For a name that is no file of certified values: the message lists them.
 
     Examples
     --------

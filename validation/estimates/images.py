@@ -49,7 +49,10 @@ USUAL_BATCH = 64  #: samples a pixel
 class Budget:
     """When to stop: exactly one of the three is given.
 
-    Raises InputError if none or more than one is given, or one is no positive number.
+    Raises
+    ------
+    InputError
+        If none or more than one is given, or one is no positive number.
     """
 
     samples: int | None = None  #: a pixel, at least

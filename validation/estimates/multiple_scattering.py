@@ -27,10 +27,21 @@ def multiple_scattering_fraction(
 ) -> MultipleScattering:
     """Return the fraction of multiple scattering in the image of a Mitsuba scene at its own size.
 
-    `max_depth` is the largest number of edges of a path, 3 at least. After n scatterings at most
-    albedo^n of the light remains: 64 edges lack little unless the medium is thick and its albedo
-    close to 1. Valid for scenes that volpath can trace. A light close to a camera ray makes heavy
-    tails, and the interval of few batches too narrow.
+    Valid for scenes that volpath can trace. A light close to a camera ray makes heavy tails, and
+    the interval of few batches too narrow.
+
+    Parameters
+    ----------
+    scene
+        An `mi.Scene`.
+    max_depth
+        The largest number of edges of a path, 3 at least. After n scatterings at most albedo^n of
+        the light remains: 64 edges lack little unless the medium is thick and its albedo close
+        to 1.
+    batches
+        How many images of each depth are rendered: their spread gives the interval.
+    samples
+        Paths per pixel of each image.
     """
     # The same seeds for both depths: the noise of paths of one scattering is in both and cancels.
     single, whole = (

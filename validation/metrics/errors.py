@@ -82,8 +82,14 @@ def error_metrics(
 ) -> Metrics:
     """Compare a test image with a reference (formulae: see the module).
 
-    `reference`, `test`: radiance [W/(m^2 sr)], (height, width) or (height, width, channels);
-    `mask`: pixels to compare, (height, width) of truth values; all by default.
+    Parameters
+    ----------
+    reference
+        Radiance, (height, width) or (height, width, channels) [W/(m^2 sr)].
+    test
+        The image to judge, of the same shape [W/(m^2 sr)].
+    mask
+        Pixels to compare, (height, width) of truth values; all by default.
 
     Returns
     -------
@@ -91,8 +97,10 @@ def error_metrics(
         In float64. If no pixel is finite in both images, every error is None; if the reference is
         black, the relative ones are. Quantiles are linear between order statistics.
 
-    Raises InputError if the sizes differ, an image is empty, or the mask does
-    not fit or leaves nothing.
+    Raises
+    ------
+    InputError
+        If the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
     """
     ref, tst, chosen = compared(reference, test, mask)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)

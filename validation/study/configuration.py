@@ -87,13 +87,23 @@ def configuration(
 ) -> Configuration:
     """Return a configuration, checked.
 
-    `method`: a name of `realtime.methods.registry.METHODS`, a user's method as 'module:function',
-    'path/to/file.py:function' or 'path/to/file.glsl', or a function itself; `kernel`: see
-    `find_kernel`; 'exact' by default for methods that call a kernel; `parameters`: of the method.
+    Parameters
+    ----------
+    method
+        A name of `METHODS`, a user's method as 'module:function', 'path/to/file.py:function' or
+        'path/to/file.glsl', or a function itself.
+    kernel
+        A name of `KERNELS`, 'name-N' for the size N, or a user's as 'module:function';
+        'exact' by default for methods that call a kernel.
+    parameters
+        Parameters of the method by name.
 
-    Raises InputError for an unknown method, kernel or parameter (the nearest is named), a value of
-    the wrong type or outside its range, values that contradict one another, and a user's method
-    that cannot be loaded.
+    Raises
+    ------
+    InputError
+        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type
+        or outside its range, values that contradict one another, and a user's method that cannot be
+        loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     chosen, light_samples = method_parameters(find_method(method), parameters or {})

@@ -133,8 +133,16 @@ def time_cells(
 def time_frame(
     renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None
 ) -> FrameTimes:
-    """Return the times of the frames of one renderer, in a run of its own;
-    parameters as of `time_alone`.
+    """Return the times of the frames of one renderer, in a run of its own.
+
+    Parameters
+    ----------
+    renderer
+        The stages of the frame, from `frame_renderer`.
+    seconds
+        How long each stage is timed [s].
+    slow
+        A frame that takes longer with its preparation is timed in few frames [s].
     """
     times = time_alone(renderer, seconds=seconds, slow=slow).times
     assert times is not None

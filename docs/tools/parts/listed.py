@@ -1,13 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
+"""The commands, methods, parameters and kernels of the program, and the keys of a report."""
 
-import ast
-import inspect
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from airlight.reports.commands.list import list as list_
@@ -15,7 +11,6 @@ from airlight.reports.data.records import meanings, record_types
 from airlight.reports.tables.drawing import markdown
 from airlight.reports.tables.table import Name, Row, Table
 
-ROOT = Path(__file__).resolve().parents[2]
 #: Words in the help of parameters, and the pages that they link to.
 LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
@@ -26,79 +21,6 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
     """
     rule = ["---" if number < words else "---:" for number in range(len(headers))]
     return "\n".join("| " + " | ".join(row) + " |" for row in [headers, rule, *rows]) + "\n"
-
-
-#: Results of the functions of `import airlight`.
-_RESULTS = (
-    "airlight.reports.api.results.Rendering",
-    "airlight.reports.api.results.Reference",
-    "airlight.reports.api.comparisons.ImageComparison",
-    "airlight.reports.api.comparisons.SceneComparison",
-    "airlight.reports.api.comparisons.Fitted",
-    "airlight.reports.api.report.Report",
-    "airlight.reports.studies.registry.Study",
-    "airlight.reports.studies.methods.MethodsStudy",
-    "airlight.reports.studies.kernels.Integrals",
-    "airlight.reports.studies.clouds.SlabStudy",
-)
-
-
-def _public() -> dict[str, Any]:
-    """Return the public names of `airlight` with their values."""
-    import airlight
-
-    return {name: getattr(airlight, name) for name in sorted(_homes(), key=str.lower)}
-
-
-def _homes() -> dict[str, str]:
-    """Return the module of each public name."""
-    import airlight
-
-    # The stub lists what is public; values are imported when somebody asks for them.
-    stub = ast.parse(Path(airlight.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-    lines = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
-    return {name.name: f"airlight.{line.module}" for line in lines for name in line.names}
-
-
-def _documented(value: Any) -> bool:
-    return inspect.isfunction(value) or inspect.isclass(value)
-
-
-def names() -> str:
-    """Return the public names of `airlight`, each with a sentence and a link to its signature."""
-    homes = _homes()
-    rows = [
-        (f"{{py:obj}}`{name} <{value.__module__}.{value.__name__}>`", _sentence(value))
-        if _documented(value)
-        else (f"`{name}`", f"see `{homes[name]}`")
-        for name, value in _public().items()
-    ]
-    return table(("name", "what it is"), rows, 2)
-
-
-def signatures() -> str:
-    """Return the functions and classes of `import airlight` with their docstrings, and the
-    results that they return.
-    """
-    # Classes that functions return belong to the reference of the API, though nobody imports them.
-    paths = {
-        f"{each.__module__}.{each.__name__}": each
-        for each in _public().values()
-        if _documented(each)
-    }
-    classes = {path: inspect.isclass(value) for path, value in paths.items()} | dict.fromkeys(
-        _RESULTS, True
-    )
-    shown = [
-        f".. autoclass:: {path}\n   :members:" if is_class else f".. autofunction:: {path}"
-        for path, is_class in classes.items()
-    ]
-    return "```{eval-rst}\n" + "\n\n".join(shown) + "\n```"
-
-
-def _sentence(value: Any) -> str:
-    """Return the first sentence of a docstring, as a cell of a table."""
-    return _cell((inspect.getdoc(value) or "").split("\n\n")[0])
 
 
 def _cell(words: str) -> str:
@@ -197,7 +119,6 @@ def sweep_columns() -> str:
     return table(("column", "unit", "meaning"), rows, 3)
 
 
-@cache
 def commands() -> str:
     """Return every command and every study with its arguments, options and words."""
     from airlight.reports.commands.main import command_names, find_command

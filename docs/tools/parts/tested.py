@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The part of a page that lists every claim with the tests that protect it, and
-the last run of all tests.
-"""
+"""Every claim with the tests that protect it, and the last run of all tests."""
 
 import ast
 import json
@@ -9,16 +7,14 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-from sphinx.errors import ExtensionError
-
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def tested_claims() -> str:
     """Return the claims of `docs/claims.toml` by topic, each with its tests, their
     tier and what they allow.
 
-    A claim without a test, or a test of a claim that is not listed, ends the build.
+    A claim without a test, or a test of a claim that is not listed, ends the work.
     """
     topics = tomllib.loads((ROOT / "docs/claims.toml").read_text(encoding="utf-8"))
     tests: dict[str, list[str]] = {}
@@ -28,7 +24,7 @@ def tested_claims() -> str:
             tests.setdefault(claim, []).append(line)
     listed = {claim for claims in topics.values() for claim in claims}
     if wrong := sorted(listed ^ set(tests)):
-        raise ExtensionError(
+        raise SystemExit(
             f"docs/claims.toml: claims without a test, or tests of no claim: {', '.join(wrong)}"
         )
     # Topics and claims in the order of the file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of pages that print what a report measured, from `docs/data/report.json`."""
+"""Tables of what was measured, from the report and the records in `docs/data`."""
 
 import json
 from collections.abc import Mapping
@@ -8,21 +8,22 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from listed import table
-from shown import scene_picture
-
 from airlight.reports.data import records
 from airlight.reports.tables.agreement import left_out_table
 from airlight.reports.tables.costs import cost_table
 from airlight.reports.tables.drawing import markdown
 from airlight.reports.tables.methods import COLUMNS, fastest_table, method_row
+from airlight.reports.tables.papers import count_words, paper_tables
 from airlight.reports.tables.table import Column, Name, Row, Table, number
 from airlight.validation.columns import record_of
 from airlight.validation.kernels.records import KernelCost
+from airlight.validation.papers.claims import Claim
 from airlight.validation.statistics.records import Fraction, MultipleScattering
 from airlight.validation.study.row import Row as CellRow
+from parts.listed import table
+from parts.shown import scene_picture
 
-DATA = Path(__file__).resolve().parents[1] / "data"
+DATA = Path(__file__).resolve().parents[2] / "data"
 _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
 
 
@@ -97,6 +98,37 @@ def fastest() -> str:
     return markdown(replace(fastest_table(kept_scenes(), code=True), title=""))
 
 
+def expected(name: str) -> str:
+    """Return the time and the error of one configuration of each method in one scene."""
+    scene = next(each for each in kept_scenes() if each.name == name)
+    report, chosen = data()["report"], dict[str, CellRow]()
+    for entry in scene.methods:
+        if entry.times and entry.error and entry.kernel in (None, "exact"):
+            chosen.setdefault(entry.method, entry)
+    said = (
+        f"The scene `{name}`, {' x '.join(map(str, report['timed']))} pixels, "
+        f"{report['processor']}, {report['threads']} threads, {report['created'][:10]}, by "
+        "`airlight report`: the median time of a frame, and the error of its airlight against the "
+        "reference."
+    )
+    shown = Table("", _columns_of_methods(), tuple(_row(entry) for entry in chosen.values()))
+    return f"{said}\n\n{markdown(shown.only('label', 'frame', 'relative_rmse'))}"
+
+
+def _columns_of_methods() -> tuple[Column, ...]:
+    """Return the columns of methods in a scene."""
+    return (
+        Column("scene", "scene", words=True),
+        Column("label", "configuration", words=True),
+        *list(COLUMNS.values())[1:],
+    )
+
+
+def _row(entry: CellRow, **named: Any) -> Row:
+    """Return the numbers of a configuration, and words that stand with them."""
+    return Row(method_row(entry).values | {"label": entry.label} | named)
+
+
 def method(name: str) -> str:
     """Return a method's costs and errors in every scene."""
     rows, notes = [], []
@@ -111,16 +143,10 @@ def method(name: str) -> str:
                     f"- {scene.name}, {label}: {entry.reason or entry.note or 'not measured'}"
                 )
             else:
-                row = method_row(entry)
-                rows.append(Row(row.values | {"scene": Name(scene.name), "label": label}))
+                rows.append(_row(entry, scene=Name(scene.name), label=label))
     if not rows:
         return f"The report at hand did not measure `{name}`."
-    columns = (
-        Column("scene", "scene", words=True),
-        Column("label", "configuration", words=True),
-        *list(COLUMNS.values())[1:],
-    )
-    shown = Table("", columns, tuple(rows)).only("scene", "label", *_METHOD)
+    shown = Table("", _columns_of_methods(), tuple(rows)).only("scene", "label", *_METHOD)
     parts = [markdown(shown)]
     if notes:
         parts.append("Refused or left out:\n\n" + "\n".join(notes))
@@ -199,6 +225,35 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
             f"- Single scattering leaves out {_percent(kept.multiple.medium)} of the airlight."
         )
     return "\n".join([*words, ""])
+
+
+@cache
+def _judged() -> dict[str, Any]:
+    """Return what `airlight paper --json` printed."""
+    return json.loads((DATA / "papers.json").read_text(encoding="utf-8"))
+
+
+def verdicts() -> str:
+    """Return the verdict on every claim of the papers, a section for each."""
+    rows = [record_of(row, Claim) for row in _judged()["papers"] if row["verdict"]]
+    parts = []
+    for shown in paper_tables(rows, plain=False):
+        parts.append(f"## {shown.title}\n\n{shown.explanation}")
+        parts.append(markdown(replace(shown, title="", explanation="")))
+    return "\n\n".join(parts)
+
+
+def judged() -> str:
+    """Return how many claims have each verdict, and what measured them."""
+    record = _judged()
+    made = record["environment"]
+    rows = [record_of(row, Claim) for row in record["papers"] if row["verdict"]]
+    rest = f" {record['left_out']} more were not measured." if record["left_out"] else ""
+    return (
+        f"{count_words(rows)}.{rest} Measured {record['measured'][:10]} by `airlight paper`, commit "
+        f"{made['build']['commit'][:12]}, on {made['processor']}, {made['threads']} threads, "
+        f"mitsuba {made['versions']['mitsuba']}, drjit {made['versions']['drjit']}."
+    )
 
 
 def cycles() -> str:

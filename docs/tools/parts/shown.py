@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of pages that show pictures of the gallery, `docs/gallery/`, each with
-the command that makes it.
-"""
+"""Pictures of the gallery, `docs/gallery/`, each with the command that makes it."""
 
 import json
 from functools import cache
@@ -10,7 +8,7 @@ from typing import Any
 
 from airlight.reports.tables.table import number
 
-FOLDER = Path(__file__).resolve().parents[1] / "gallery"
+FOLDER = Path(__file__).resolve().parents[2] / "gallery"
 _METHODS = ("sketch", "method", "error")  # in the order of a page
 
 
@@ -37,10 +35,10 @@ def pictures(method: str) -> str:
         "error": f"The relative error of {method}",
         "sketch": f"How {method} works, seen from the side",
     }
-    images = "\n".join(
-        f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items()
-    )
-    return f"```{{container}} {('card', 'pair', 'triple')[len(present) - 1]}\n{images}\n```\n\n*{_caption(present)}*"
+    # A table puts pictures side by side in every viewer.
+    cells = [f"![{words[kind]}](gallery/{entry['file']})" for kind, entry in present.items()]
+    row, rule = " | ".join(cells), " | ".join(["---"] * len(cells))
+    return f"| {row} |\n| {rule} |\n\n*{_caption(present)}*"
 
 
 def _of_method(method: str, kind: str) -> dict[str, Any] | None:
@@ -64,7 +62,7 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
     if "sketch" not in present:
         return text[0].upper() + text[1:]
     how = "How it works, in `sphere-spot` seen from the side: some rays of the camera, what is lit in yellow."
-    return f"{how} Beside it {text}"
+    return f"{how} Next to it: {text}"
 
 
 def scene_picture(name: str) -> str:
