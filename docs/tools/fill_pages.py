@@ -20,7 +20,7 @@ from parts import api, listed, measured, shown, tested
 
 ROOT = Path(__file__).resolve().parents[2]
 _PART = re.compile(
-    r"^<!-- part: ([a-z-]+)((?: [\w-]+)*) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE
+    r"^<!-- part: ([a-z-]+)((?: [\w./-]+)*) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE
 )
 
 

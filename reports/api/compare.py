@@ -23,11 +23,11 @@ from airlight.reports.api.inputs import (
     listed,
     one_error,
     output_files,
-    scene_names,
     several,
     telling,
 )
 from airlight.validation.readers import named_values
+from airlight.validation.scenes.names import check_scene, is_random, scene_names
 
 if TYPE_CHECKING:
     from airlight.reference.storage.exr import Image
@@ -157,6 +157,7 @@ def compare(
         )
     if fit is not None:
         exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
+    check_scene(scene)
     # Several files: frames of an animation with frames.json, or independent renders of one frame.
     # Both are judged as a whole, so that a choice of pixels or a diagnosis of one image has no
     # place.
@@ -234,7 +235,7 @@ def _is_scene(word: Any) -> bool:
     # A name without suffix that no file has is meant as a scene: a misspelt scene is then answered
     # with the names of scenes and not with a missing file.
     path, name = Path(word), str(word)
-    known = name in scene_names() or name.startswith("random:")
+    known = name in scene_names() or is_random(name)
     return known or _is_xml(word) or not (path.suffix or path.exists())
 
 

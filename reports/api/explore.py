@@ -23,6 +23,7 @@ from airlight.reports.api.inputs import (
     pixels_of,
 )
 from airlight.reports.tables.record import Said
+from airlight.validation.scenes.names import check_scene
 
 
 @one_error
@@ -53,8 +54,9 @@ def describe(
     InputError
         For a scene without a reference, with the name of what is in the way.
     """
-    # The names of the files are checked before Mitsuba starts.
+    # Names are checked before Mitsuba starts.
     files = output_files(output, ".glb", ".vol")
+    check_scene(scene)
     from airlight.reports.machine.environment import activate
 
     activate()
@@ -157,6 +159,7 @@ def view(
             f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535"
         )
     # Mistakes in words are found before Mitsuba starts.
+    check_scene(scene)
     chosen = configuration_of(method, kernel, parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()

@@ -10,7 +10,6 @@ makes the command of a function.
 import functools
 import os
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from numbers import Integral
@@ -94,19 +93,6 @@ def with_kernels(function: Callable[_P, _R]) -> Callable[_P, _R]:
         return function(*arguments, **named)
 
     return one_error(wrapped)
-
-
-@functools.cache
-def scene_names() -> tuple[str, ...]:
-    """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""
-    # A scene is a table with a purpose. Its TOML file is read here, because the registry of scenes
-    # imports Mitsuba and `airlight --help` must not.
-    files = (Path(__file__).resolve().parents[2] / "validation" / "scenes").glob("*.toml")
-    tables = (
-        item for file in files for item in tomllib.loads(file.read_text(encoding="utf-8")).items()
-    )
-    # parameters of engines have none
-    return tuple(sorted(name for name, table in tables if "purpose" in table))
 
 
 def several(things: Any) -> list[Any]:

@@ -25,6 +25,7 @@ from airlight.reports.api.inputs import (
     telling,
     whole_numbers,
 )
+from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
     from airlight.reports.api.results import Reference
@@ -168,6 +169,7 @@ def reference(
     else:
         exclude("quadrature", "draws no samples", {**budgets, "seed": seed or None})
     # All words are checked; now Mitsuba starts.
+    check_scene(scene)
     changes = changes_of(change)
     from airlight.reports.machine.environment import activate
 

@@ -34,8 +34,8 @@ from airlight.reports.api.inputs import (
     several,
     telling,
     whole_numbers,
-    with_kernels,
 )
+from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
     from airlight.reports.api.results import RenderedFrames, Rendering
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
 
-@with_kernels
+@one_error
 def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     """Load a scene.
 
@@ -72,6 +72,10 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     >>> scene.plan()["lights"]
     '1 point'
     """
+    check_scene(scene)
+    from airlight.reports.machine.environment import activate
+
+    activate()
     from airlight.reports.api.scenes import opened
 
     return opened(scene, size)
@@ -168,6 +172,7 @@ def render(
             raise InputError(
                 f"{name}: got {number}, expected a whole number from 0 up to, but not, {2**31}"
             )
+    check_scene(scene)
     from airlight.reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported

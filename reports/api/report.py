@@ -30,6 +30,7 @@ from airlight.reports.api.inputs import (
 from airlight.reports.tables.drawing import html
 from airlight.reports.tables.record import Result, Said, block, bullets
 from airlight.reports.tables.table import Table
+from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
     from airlight.reports.data import records
@@ -341,6 +342,15 @@ def _measured(
         from airlight.reports.cluster.connect import connected, parse_place
 
         place = parse_place(cluster)
+    # Scenes are opened twice, and by other processes: by their names. A misspelt one is refused
+    # before Mitsuba starts.
+    for each in scenes:
+        if not isinstance(each, str | os.PathLike):
+            raise InputError(
+                f"scenes: got {type(each).__name__}, expected the name or the path of a scene"
+            )
+        if not os.fspath(each).endswith(".toml"):
+            check_scene(each)
     activate()
     from airlight.realtime.methods.shader.source import is_users
     from airlight.reports.api.render import asked_configurations
@@ -348,12 +358,6 @@ def _measured(
     from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
     from airlight.validation.study.study import RandomScenes, standard_study
 
-    # Scenes are opened twice, and by other processes: by their names.
-    for each in scenes:
-        if not isinstance(each, str | os.PathLike):
-            raise InputError(
-                f"scenes: got {type(each).__name__}, expected the name or the path of a scene"
-            )
     # A study file replaces the effort: it says scenes, sizes and methods.
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
@@ -425,7 +429,7 @@ def _scenes_of_images(
     if images is None:
         return list(asked or usual), {}
     from airlight.validation.engine.images import find_images
-    from airlight.validation.scenes.loading import scene_stem
+    from airlight.validation.scenes.names import scene_stem
     from airlight.validation.scenes.registry import SCENES
 
     # A file is matched by the stem of a scene: the built-in scenes, and the files that the command

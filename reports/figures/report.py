@@ -6,6 +6,7 @@ They are drawn from report.json and the EXR files beside it, without Mitsuba.
 """
 
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -242,14 +243,19 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     # Inches and points. Each image has a picture, two insets of half its width below, and an error
     # map.
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
-    figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + 0.55)
+    # A character is about half as wide as the letters are high: titles keep to their column.
+    letters = int(72 * wide / len(images) / (0.55 * size))
+    titles = [_words(entry, scene, letters) for entry in (None, *methods)]
+    lines = max(title.count("\n") for title in titles) + 1
+    above = lines * 1.25 * size / 72 + 0.2
+    figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + above)
     grid = figure.add_gridspec(
         3, 2 * len(images), height_ratios=[height / width, 0.5, height / width]
     )
-    for at, (entry, image) in enumerate(zip([None, *methods], images)):
+    for at, (entry, title, image) in enumerate(zip([None, *methods], titles, images)):
         picture = tone_mapped(image, factor)
         panel = figure.add_subplot(grid[0, 2 * at : 2 * at + 2])
-        _show(panel, picture, _words(entry, scene), size)
+        _show(panel, picture, title, size)
         for corner, colour, place in zip(corners, _FRAMES, (0, 1)):
             _mark(panel, corner, side, colour)
             inset = figure.add_subplot(grid[1, 2 * at + place])
@@ -268,13 +274,14 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     return figure
 
 
-def _words(entry: CellRow | None, scene: str) -> str:
-    """Return a label, broken before its parameters, with the error and the time."""
+def _words(entry: CellRow | None, scene: str, letters: int) -> str:
+    """Return a label, its parameters, the error and the time, in lines of so many letters."""
     if entry is None:
         return f"reference\n\n{scene}"
     name, _, rest = entry.label.partition(" (")
     time = f", {number(entry.times.frame.median_ms)} ms" if entry.times else ""
-    return "\n".join((name, rest.rstrip(")"), f"RMSE {_rmse(entry):.1e}{time}"))
+    parts = (name, rest.rstrip(")"), f"RMSE {_rmse(entry):.1e}{time}")
+    return "\n".join(textwrap.fill(part, letters) for part in parts)
 
 
 def _show(

@@ -20,8 +20,8 @@ from airlight.reference.scene.read import (
 )
 from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
-from airlight.validation.scenes.loading import LoadedScene, scene_stem
-from airlight.validation.scenes.random.design import is_random
+from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.names import is_random, scene_stem
 from airlight.validation.scenes.random.scene import drawn_values
 
 Array = NDArray[np.float64]

@@ -25,6 +25,7 @@ from airlight.reports.page.filters import (
 )
 from airlight.reports.page.images import SceneImages, page_images
 from airlight.reports.plotting.pictures import signed_colours, unsigned_colours
+from airlight.reports.tables.methods import headline
 
 if TYPE_CHECKING:
     import jinja2
@@ -72,6 +73,7 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
         report=report,
         viewers=viewers,
         lead=lead,
+        headline="" if lead is None else headline(report.scenes[lead]),
         trust=trust_words(report.scenes),
         chart=Markup(speed_error_chart(report.scenes)) if report.scenes else "",
         css=template_text("report.css"),

@@ -42,7 +42,7 @@ from airlight.reports.report.claims import claims, growth_claims, own_fault, uns
 from airlight.reports.report.others import other_parts, paper_rows
 from airlight.reports.report.scene import folder_of, write_scene
 from airlight.validation.columns import record_of
-from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.scenes.names import scene_stem
 from airlight.validation.scenes.registry import FOG_SCENES
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.run import PROBE, frame_of

@@ -19,7 +19,7 @@ from airlight.reports.plotting.pictures import error_map, exposure, png_bytes, t
 from airlight.validation.columns import record_of
 from airlight.validation.estimates.images import layered_reference
 from airlight.validation.estimates.quadrature import known_to, relative_error
-from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.scenes.names import scene_stem
 from airlight.validation.study.reference import of_image
 from airlight.validation.study.scene import Judged, SceneResult
 

@@ -123,10 +123,11 @@ class MethodsStudy(Study):
         scene
             Its name; all scenes by default.
         """
-        from airlight.reports.tables.methods import fastest_within
+        from airlight.reports.tables.methods import within
 
-        found = fastest_within(error, [row for row in self.rows if scene in (None, row.scene)])
-        return found and found[0]
+        return next(
+            iter(within(error, [row for row in self.rows if scene in (None, row.scene)])), None
+        )
 
 
 @with_kernels

@@ -2,7 +2,7 @@
 """Costs and errors of methods: a table of studies, the page, the documentation and papers."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 
 from airlight.realtime.methods.shader.source import is_shader
@@ -160,27 +160,86 @@ def rate_words(milliseconds: float) -> str:
     return f"{digits_of(1000 / milliseconds, COLUMNS['frame_rate'])} frames/s"
 
 
-def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, float] | None:
-    """Return the row of the fastest frame [ms] among those with at most a relative RMSE;
-    None where there is none.
+def raced(entries: Iterable[CellRow]) -> list[CellRow]:
+    """Return the rows whose times can be compared, the fastest first.
 
     Shaders run on another device, and engines in a run of their own: both are in no race with
     others. Pixels that are not finite are left out of the RMSE: a method that has any must not win
     by it.
     """
+    return sorted(
+        (
+            entry
+            for entry in entries
+            if not entry.device
+            and (entry.times is not None and entry.times.run is not None)
+            and (entry.error is not None and entry.error.relative_rmse is not None)
+            and not entry.error.nonfinite
+        ),
+        key=_milliseconds,
+    )
 
-    def reaches(entry: CellRow) -> bool:
-        # Another device, no error or no time in the common run: no race.
-        if entry.device or entry.error is None or entry.error.relative_rmse is None:
-            return False
-        if entry.times is None or entry.times.run is None:
-            return False
-        return entry.error.relative_rmse <= error and not entry.error.nonfinite
 
-    raced = [
-        (entry, entry.times.frame.median_ms) for entry in entries if entry.times and reaches(entry)
+def within(error: float, entries: Iterable[CellRow]) -> list[CellRow]:
+    """Return the rows of a race with at most a relative RMSE, the fastest first."""
+    return [entry for entry in raced(entries) if _rmse(entry) <= error]
+
+
+def alike(fastest: Sequence[CellRow]) -> list[CellRow]:
+    """Return the first of a race and those whose quartiles reach into its own."""
+    return [
+        entry
+        for entry in fastest
+        if _frame(entry).low_ms <= _frame(fastest[0]).high_ms or entry is fastest[0]
     ]
-    return min(raced, key=lambda pair: pair[1], default=None)
+
+
+def _frame(entry: CellRow) -> Timing:
+    assert entry.times is not None
+    return entry.times.frame
+
+
+def _milliseconds(entry: CellRow) -> float:
+    return _frame(entry).median_ms
+
+
+def _rmse(entry: CellRow) -> float:
+    assert entry.error is not None
+    assert entry.error.relative_rmse is not None
+    return entry.error.relative_rmse
+
+
+def headline(scene: Scene) -> str:
+    """Return the result of a scene in a sentence, empty where nothing was measured in one run:
+    which methods have the smallest error that any reaches, and the fastest of them.
+    """
+    entries = raced(scene.methods)
+    if not entries:
+        return ""
+    count = len({entry.method for entry in entries})
+    # The strictest error that a method reaches decides.
+    for target in sorted(TARGETS):
+        near = within(target, entries)
+        if not near:
+            continue
+        names, error = {entry.method for entry in near}, f"{100 * target:g} %"
+        if len(names) == 1:
+            only = f" the only method of {count}" if count > 1 else ""
+            said = f"In {scene.name}, {near[0].method} is{only} within {error}"
+            return f"{said}: {_frame_words(near)}."
+        return (
+            f"In {scene.name}, {len(names)} of {count} methods are within {error}; the fastest: "
+            f"{_name_and_time(near)}."
+        )
+    nearest = min(entries, key=_rmse)
+    return (
+        f"In {scene.name}, no method of {count} is within {100 * max(TARGETS):g} %; the nearest is "
+        f"{nearest.label}: {100 * _rmse(nearest):.2g} %, {_frame_words([nearest])}."
+    )
+
+
+def _frame_words(entries: Sequence[CellRow]) -> str:
+    return f"{number(_milliseconds(entries[0]))} ms a frame"
 
 
 def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
@@ -194,14 +253,13 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     rows = (
         (
             Name(scene.name) if code else scene.name,
-            *(_name_and_time(fastest_within(target, scene.methods)) for target in TARGETS),
+            *(_name_and_time(within(target, scene.methods)) for target in TARGETS),
         )
         for scene in scenes
     )
     explanation = (
         "Relative RMSE of the airlight; median time of a frame with static geometry. The times of "
-        "a scene are of one "
-        "run."
+        "a scene are of one run; methods whose quartiles overlap share the place."
     )
     return table(
         "The fastest method within an error",
@@ -211,11 +269,17 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     )
 
 
-def _name_and_time(found: tuple[CellRow, float] | None) -> str:
-    if found is None:
+def _name_and_time(fastest: Sequence[CellRow]) -> str:
+    """Return the fastest of a race in words; methods whose quartiles overlap share the place."""
+    if not fastest:
         return "none"
-    entry, milliseconds = found
-    return f"{entry.label}: {number(milliseconds)} ms, {rate_words(milliseconds)}"
+    # Of a method that has the place with several configurations one is enough.
+    shared = dict[str, str]()
+    for entry in alike(fastest):
+        shared.setdefault(entry.method, entry.label)
+    names = " and ".join(shared.values())
+    milliseconds = _milliseconds(fastest[0])
+    return f"{names}: {number(milliseconds)} ms, {rate_words(milliseconds)}"
 
 
 #: By kernel, the paper and what it leaves wrong.

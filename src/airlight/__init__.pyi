@@ -22,6 +22,7 @@ from .reports.api.compare import compare as compare
 from .reports.api.explore import describe as describe
 from .reports.api.explore import view as view
 from .reports.api.export import export as export
+from .reports.api.rays import rays as rays
 from .reports.api.reference import reference as reference
 from .reports.api.render import load_scene as load_scene
 from .reports.api.render import render as render

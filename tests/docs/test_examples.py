@@ -114,6 +114,16 @@ def test_a_method_and_an_image_are_validated_as_the_page_says(
     assert image["times"] is None
 
 
+@pytest.mark.slow
+def test_a_method_that_makes_an_array_is_judged_as_the_page_says(variant, tmp_path, capsys):
+    page = DOCS / "validate-your-method.md"
+    (code,) = (each for each in blocks(page, "python") if "airlight.rays" in each)
+    exec(compile(code, str(page), "exec"), {})
+    bias, rmse = re.findall(r"[+-]?\d+\.\d(?=%)", capsys.readouterr().out)
+    assert abs(float(bias)) <= 0.1
+    assert float(rmse) <= 0.5
+
+
 @pytest.mark.claim("notebook-cells")
 @pytest.mark.slow
 def test_the_notebook_runs_and_prints_what_it_says(variant, tmp_path, monkeypatch, capsys):

@@ -4,6 +4,7 @@
 Read in this order:
 
 - `fog.toml`, `height_fog.toml`, `density_grid.toml`, `clouds.toml`: the built-in scenes as data;
+- `names.py`: the names of scenes, and the refusal of others;
 - `registry.py`: their records by name, and the Mitsuba dictionaries that the data stand for;
 - `parts.py`: shapes of meshes, media, lights and cameras for such dictionaries;
 - `meshes.py`: meshes by their parameters;

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import time
 from collections.abc import Mapping, Sequence
@@ -16,7 +15,7 @@ from types import MappingProxyType
 
 import mitsuba as mi
 
-from airlight.errors import InputError, nearest
+from airlight.errors import InputError
 from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
 from airlight.validation.scenes.bodies import check_bodies
@@ -27,9 +26,10 @@ from airlight.validation.scenes.changes import (
     scene_with_lobes,
 )
 from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.names import PREFIX, is_random, random_parts, scene_file
 from airlight.validation.scenes.numbers import check_numbers
 from airlight.validation.scenes.random.design import FILE as RANGES
-from airlight.validation.scenes.random.design import PREFIX, is_random, random_parts, read_ranges
+from airlight.validation.scenes.random.design import read_ranges
 from airlight.validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
@@ -79,7 +79,7 @@ def load_scene(
             record.name, built, record.purpose, record.published, animation=record.animation
         )
     else:
-        path = _existing(name_or_path)
+        path = scene_file(name_or_path)
         loaded = LoadedScene(
             path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
         )
@@ -116,15 +116,6 @@ def find_record(name: str) -> SceneRecord | None:
     from airlight.validation.scenes.random.scene import random_record
 
     return random_record(name)
-
-
-def scene_stem(name_or_path: str) -> str:
-    """Return the stem of the names of a scene's files: its name, the stem of
-    its path, or 'random-7'.
-    """
-    if is_random(name_or_path):
-        return f"{PREFIX[:-1]}-{random_parts(name_or_path)[0]}"
-    return Path(name_or_path).stem
 
 
 def scene_identity(scene: str) -> str:
@@ -172,30 +163,6 @@ def parse_size(text: str) -> tuple[int, int]:
             f"size: got {text!r}, expected WIDTHxHEIGHT in pixels, for example 800x600"
         )
     return int(match[1]), int(match[2])
-
-
-def _existing(name_or_path: str) -> Path:
-    path = Path(name_or_path)
-    if name_or_path.strip() and path.is_dir():
-        raise InputError(
-            f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML file in it"
-        )
-    if path.is_file():
-        return path
-    # A name with an extension or a separator was meant as a path; anything else as a name, whose
-    # spelling the message then helps with.
-    looks_like_path = path.suffix or os.sep in name_or_path
-    if looks_like_path:
-        raise InputError(
-            f"scene: there is no file {name_or_path}; expected a Mitsuba XML file, random:SEED or "
-            "one of "
-            f"{', '.join(SCENES)}"
-        )
-    raise InputError(
-        f"scene: got {name_or_path!r}, expected one of {', '.join(SCENES)}, random:SEED or the "
-        "path of a "
-        "Mitsuba XML file" + nearest(name_or_path, SCENES)
-    )
 
 
 def _check_films(loaded: LoadedScene) -> None:

@@ -52,6 +52,7 @@ from airlight.validation.arrays import Array
 from airlight.validation.scenes import cloud_meshes, meshes
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
+from airlight.validation.scenes.names import FILES
 from airlight.validation.scenes.parts import (
     Plugin,
     camera,
@@ -64,10 +65,6 @@ from airlight.validation.scenes.parts import (
 )
 
 MOVES = ("light", "objects", "medium", "colour")
-FILES = tuple(
-    Path(__file__).with_name(f"{name}.toml")
-    for name in ("fog", "many_lights", "height_fog", "density_grid", "clouds")
-)
 
 #: A table of a scene's file, with the keys of the module: their values are numbers, words, lists
 #: and tables, as the function of a key takes them.

@@ -11,7 +11,7 @@ from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.store import Content, Inputs
 from airlight.validation.properties.properties import scene_properties
 from airlight.validation.scenes.loading import scene_identity
-from airlight.validation.scenes.random.design import is_random
+from airlight.validation.scenes.names import is_random
 from airlight.validation.scenes.registry import SCENES
 from airlight.validation.study.configuration import Configuration, user_code
 from airlight.validation.study.reference import cell_reference

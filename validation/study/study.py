@@ -53,11 +53,9 @@ from airlight.validation.readers import (
 )
 from airlight.validation.scenes.changes import change_words
 from airlight.validation.scenes.loading import parse_size
+from airlight.validation.scenes.names import PREFIX, is_random, random_name
 from airlight.validation.scenes.random.design import (
     LARGEST_SEED,
-    PREFIX,
-    is_random,
-    random_name,
     read_ranges,
 )
 from airlight.validation.scenes.registry import FOG_SCENES, SCENES

@@ -7,6 +7,6 @@ Read in this order:
 - `listed`: the commands, methods, parameters and kernels of the program, and the keys of a report
 - `api`: the functions and classes of `import airlight`, by topic
 - `measured`: tables of the report and of the records in `docs/data`
-- `shown`: pictures of the gallery
+- `shown`: files of the project, and pictures of the gallery
 - `tested`: the claims with their tests, and the last run of all tests
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of `import airlight`: every public function and class, by topic, from its docstring."""
+"""The public functions and classes of `airlight` by topic, from their docstrings."""
 
 import ast
 import importlib
@@ -16,17 +16,20 @@ from airlight.reports.data import records
 #: The purposes of readers, and the names that serve each; a public name in none of them
 #: ends the build.
 TOPICS = {
-    "Render and judge": "render reference compare error_metrics multiple_scattering_fraction Budget",
+    "Render and judge": (
+        "render reference compare error_metrics multiple_scattering_fraction Budget"
+    ),
     "Measure": "report diff study STUDIES sweep paper configuration time_frame",
     "Scenes": "load_scene describe view SCENES certified_data",
     "Methods and kernels": "METHODS find_method KERNELS export",
-    "A method of your own": "Method Layers parameter marched_steps light_tables light_choice",
+    "A method of your own": "rays Method Layers parameter marched_steps light_tables light_choice",
     "Frames without files": "activate read_scene frame_renderer render_frame",
     "Images": "read_exr write_exr",
     "The program and the machine": "list doctor versions InputError MissingError",
 }
-#: Classes that these functions return or are given: their members are documented, nobody imports them.
+#: Classes that these functions return or are given: nobody imports them.
 _RESULTS = (
+    "reports.api.rays.CameraRays",
     "reports.api.results.Rendering",
     "reports.api.results.Reference",
     "reports.api.comparisons.ImageComparison",
@@ -171,7 +174,7 @@ def _commented(value: type) -> dict[str, str]:
 
 
 def _own(member: Any) -> bool:
-    """Return whether a member of a class is documented itself: values have the words of their type."""
+    """Return whether a member has words of its own: a value has those of its type."""
     return inspect.isfunction(member) or type(member).__name__ in ("property", "cached_property")
 
 

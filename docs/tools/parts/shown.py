@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of the gallery, `docs/gallery/`, each with the command that makes it."""
+"""Files of the project, and pictures of the gallery, each with the command that makes it."""
 
 import json
 from functools import cache
@@ -10,6 +10,14 @@ from airlight.reports.tables.table import number
 
 FOLDER = Path(__file__).resolve().parents[2] / "gallery"
 _METHODS = ("sketch", "method", "error")  # in the order of a page
+
+
+def source(path: str) -> str:
+    """Return a file of the project as code, without its licence line."""
+    text = (FOLDER.parents[1] / path).read_text(encoding="utf-8")
+    language = {".py": "python"}.get(Path(path).suffix, Path(path).suffix[1:])
+    lines = [line for line in text.splitlines() if "SPDX-License-Identifier" not in line]
+    return "\n".join([f"```{language}", *lines, "```"])
 
 
 @cache

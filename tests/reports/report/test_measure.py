@@ -24,7 +24,7 @@ from airlight.reports.report.measure import staged, write_report
 from airlight.reports.report.others import other_parts
 from airlight.reports.report.scene import file_stems, folder_of, reference_record
 from airlight.validation.kernels.records import Stability
-from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.scenes.names import scene_stem
 from airlight.validation.study.configuration import Configuration, configuration
 from airlight.validation.study.run import PROBE
 from airlight.validation.study.study import STUDIES, Checks, Measure, Study, standard_study

@@ -16,6 +16,7 @@ from airlight.reports.tables.methods import (
     COLUMNS,
     TIMES,
     fastest_table,
+    headline,
     method_row,
     methods_table,
     times_words,
@@ -77,6 +78,35 @@ def fastest_of(*methods):
     """The cells of the table of the fastest methods for a scene."""
     (row,) = fastest_table([replace(record_of(scene("fog", []), Scene), methods=methods)]).rows
     return tuple(row.values.values())
+
+
+def test_methods_whose_quartiles_overlap_share_the_first_place():
+    first, slower = entry("a (exact)", method="a", frame=9.0), entry("b", method="b", frame=10.0)
+    twice, late = entry("a (map)", method="a", frame=9.2), entry("c", method="c", frame=12.0)
+    assert fastest_of(late, slower, twice, first)[1] == "a (exact) and b: 9 ms, 111 frames/s"
+    assert fastest_of(late, first)[1] == "a (exact): 9 ms, 111 frames/s"
+
+
+def test_the_headline_says_which_methods_reach_the_smallest_error():
+    def words(*methods):
+        return headline(replace(record_of(scene("fog", []), Scene), methods=methods))
+
+    near, exact = entry("b", rmse=0.004, method="b"), entry("a (k)", rmse=1e-4, method="a")
+    far, shader = entry("c", rmse=0.2, method="c", frame=3.0), entry("d", device="llvmpipe")
+    assert (
+        words(far, near, exact) == "In fog, a is the only method of 3 within 0.1 %: 2 ms a frame."
+    )
+    assert words(near) == "In fog, b is within 1 %: 2 ms a frame."
+    other = entry("e", rmse=0.001, method="e", frame=8.0)
+    assert (
+        words(other, near, exact)
+        == "In fog, 2 of 3 methods are within 0.1 %; the fastest: a (k): 2 ms, 500 frames/s."
+    )
+    assert (
+        words(far, shader)
+        == "In fog, no method of 1 is within 1 %; the nearest is c: 20 %, 3 ms a frame."
+    )
+    assert words(shader) == ""
 
 
 @pytest.mark.claim("times-of-one-run")

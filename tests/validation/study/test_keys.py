@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airlight.validation.metrics.errors import Metrics
-from airlight.validation.scenes.random.design import random_name, random_parts
+from airlight.validation.scenes.names import random_name, random_parts
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.keys import Made, cell_key, scene_identities
 from airlight.validation.study.row import COLUMNS, arrow_schema, property_names, row_values

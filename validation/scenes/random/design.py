@@ -18,7 +18,6 @@ from collections.abc import Mapping
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
 
 import numpy as np
 
@@ -32,9 +31,6 @@ FILE = Path(__file__).with_name("ranges.toml")
 #: The distributions of a random scene by name, as a file has them: of a range its two ends; of a
 #: choice the weights by word; `meshes` is a folder, or empty.
 Ranges = dict[str, Any]
-
-PREFIX = "random:"
-_SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', '.', '-' and '~'
 
 #: The names of the coordinates of a point.
 COORDINATES: tuple[str, ...] = tuple(tomllib.loads(FILE.read_text(encoding="utf-8"))["coordinates"])
@@ -186,33 +182,3 @@ def _weights(what: str, value: object, *, names: tuple[str, ...]) -> dict[str, f
     if not any(weights.values()):
         raise InputError(f"{what}: no weight is above 0; expected one at least")
     return {name: float(weights.get(name, 0.0)) for name in names}
-
-
-# Names --------------------------------------------------------------------------------------------
-
-
-def is_random(name: str) -> bool:
-    """Return whether a name names a random scene."""
-    return name.startswith(PREFIX)
-
-
-def random_name(seed: int | str, ranges: Path | None = None) -> str:
-    """Return the name of a random scene, which may be drawn from a file of ranges."""
-    return f"{PREFIX}{seed}" + (
-        f",ranges={quote(str(ranges.resolve()), safe=_SAFE)}" if ranges else ""
-    )
-
-
-def random_parts(name: str) -> tuple[int, Path | None]:
-    """Return the seed in a name, and the file of ranges that it goes on with."""
-    seed, comma, option = name.removeprefix(PREFIX).partition(",")
-    if not (seed.isascii() and seed.isdecimal()):
-        raise InputError(
-            f"scene: got {name!r}, expected {PREFIX}SEED, a whole number, for example {PREFIX}7"
-        )
-    key, _, value = option.partition("=")
-    if comma and (key != "ranges" or not value or "," in value):
-        raise InputError(
-            f"scene: got {option!r} in {name!r}, expected ranges=FILE.toml after the seed"
-        )
-    return int(seed), Path(unquote(value)) if comma else None

@@ -22,6 +22,7 @@ from airlight.validation.arrays import Array
 from airlight.validation.columns import plain
 from airlight.validation.properties.view import LightPlace, distance, lit_points
 from airlight.validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
+from airlight.validation.scenes.names import random_parts
 from airlight.validation.scenes.parts import (
     Plugin,
     area_lamp,
@@ -37,7 +38,6 @@ from airlight.validation.scenes.parts import (
 from airlight.validation.scenes.random.design import (
     Draws,
     Ranges,
-    random_parts,
     ranges_from,
     read_ranges,
 )
