@@ -26,7 +26,6 @@ from airlight.reports.api.inputs import (
     several,
     telling,
 )
-from airlight.validation.readers import named_values
 from airlight.validation.scenes.names import check_scene, is_random, scene_names
 
 if TYPE_CHECKING:
@@ -387,6 +386,8 @@ def _fit(
     progress: Any,
     **how: Any,
 ) -> "Fitted":
+    from airlight.validation.readers import named_values
+
     # sigma_t=0.1 is a parameter and where its search starts; a name alone starts at the scene.
     words = listed("fit", parameters)
     names = [word.partition("=")[0].strip() for word in words]

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.export`: an airlight kernel as shader code."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -119,6 +118,8 @@ def _head(kernel: str, language: str, phase: str, measured: str) -> str:
 
 def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
     """Return the largest error of a kernel that was measured, and a sentence."""
+    import json
+
     from airlight.realtime.export.text import CONFORMING
 
     # Errors are per kernel and phase function; a pair that the file lacks was not measured.

@@ -17,7 +17,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import cyclopts
 import docstring_parser
@@ -49,9 +49,28 @@ from airlight.reports.tables.record import Result, colours_wanted, print_json, t
 
 DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 
+
+def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
+    """Print what completes commands and options in a shell.
+
+    bash: airlight completion bash > ~/.local/share/bash-completion/completions/airlight
+
+    zsh: airlight completion zsh > _airlight, in a folder of fpath
+
+    fish: airlight completion fish > ~/.config/fish/completions/airlight.fish
+
+    Parameters
+    ----------
+    shell
+        The shell.
+    """
+    print(make_app(whole=True).generate_completion(shell=shell))
+    return DONE
+
+
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
-    "Start": (doctor, list_, render, view),
+    "Start": (doctor, list_, render, view, completion),
     "Measure": (report, diff, sweep, run_study),
     "Images": (reference, compare, describe, export),
     "Papers": (paper,),
@@ -156,7 +175,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     # Commands whose result is a file have -o added here; others declare `output` themselves. A
     # study writes its data by -o and has no --json; neither have three commands.
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
-    if function not in (view, run_tests, export) and ".json" not in endings:
+    if function not in (view, run_tests, export, completion) and ".json" not in endings:
         extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False
@@ -233,9 +252,9 @@ def _version() -> str:
     return f"airlight {build().words}"
 
 
-def make_app(words: Sequence[str] = ()) -> App:
+def make_app(words: Sequence[str] = (), *, whole: bool = False) -> App:
     """Return the command line; only the command that is asked for is more than its
-    name and its first sentence.
+    name and its first sentence, unless all are wanted.
     """
     how: dict[str, Any] = {
         "help_format": "plaintext",
@@ -257,17 +276,17 @@ def make_app(words: Sequence[str] = ()) -> App:
         group = Group(title, sort_key=number)
         for at, function in enumerate(functions):
             name = _NAMES.get(function, function.__name__)
-            asked = name in words[:1]
+            asked = whole or name in words[:1]
             sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=at, **how)
             if asked and function is run_study:
-                _add_studies(sub, words[1:])
+                _add_studies(sub, words[1:], whole=whole)
             elif asked:
                 sub.default(_command(function, endings=_ENDINGS.get(function, ())))
             app.command(sub)
     return app
 
 
-def _add_studies(app: App, words: Sequence[str]) -> None:
+def _add_studies(app: App, words: Sequence[str], *, whole: bool) -> None:
     """Add the studies to `airlight study`."""
     group = Group("Studies", sort_key=0)
     how: dict[str, Any] = {"help_format": "plaintext", "version_flags": ()}
@@ -275,7 +294,7 @@ def _add_studies(app: App, words: Sequence[str]) -> None:
     # A study is a command of its own under `airlight study`.
     for number, name in enumerate(STUDIES):
         function = find_study(name)
-        asked = name in words[:1]
+        asked = whole or name in words[:1]
         sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=number, **how)
         if asked:
             sub.default(_command(function, endings=endings_of(name)))

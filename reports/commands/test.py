@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from xml.etree import ElementTree
 
 RECORD = "docs/data/full_run.json"  #: of the last run of all tiers, in the checkout
 WORKER_MEMORY = 4e9  #: [bytes]: the largest worker of a run of all tiers held 3.1 GB
@@ -72,6 +71,8 @@ def _workers() -> int:
 
 def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
+    from xml.etree import ElementTree
+
     from airlight.analytic.clock import stopwatch
     from airlight.reference.storage.build import build
     from airlight.reference.storage.files import temporary_folder, write_text

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from airlight.analytic.clock import stopwatch
-from airlight.realtime.child_process import EndedError
 from airlight.reference.storage.build import build
 from airlight.reports.machine.environment import (
     MissingError,
@@ -30,8 +29,6 @@ from airlight.reports.machine.environment import (
 )
 from airlight.reports.machine.gpu import cuda_status, optix_status
 from airlight.reports.machine.llvm import find_llvm
-from airlight.reports.machine.opengl import opengl_status
-from airlight.reports.machine.own_process import in_own_process
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, table, words
 
@@ -220,6 +217,9 @@ def diagnose() -> Machine:
     """Examine this machine."""
     import platform
 
+    from airlight.realtime.child_process import EndedError
+    from airlight.reports.machine.opengl import opengl_status
+
     # The first thing that fails is the problem; all checks are listed whatever fails.
     variant, used, problem, kernel = None, None, None, None
     try:
@@ -266,6 +266,8 @@ def try_kernel(variant: str) -> Kernel:
     """Run a kernel in a separate process; raises EndedError or
     MissingError where it does not work.
     """
+    from airlight.reports.machine.own_process import in_own_process
+
     # The time includes the start of the process and its imports. The first kernel on a GPU also
     # compiles OptiX's own, and gets three minutes for it.
     took = stopwatch()

@@ -273,7 +273,7 @@ def _name_and_time(fastest: Sequence[CellRow]) -> str:
     """Return the fastest of a race in words; methods whose quartiles overlap share the place."""
     if not fastest:
         return "none"
-    # Of a method that has the place with several configurations one is enough.
+    # One configuration of a method is enough for the place.
     shared = dict[str, str]()
     for entry in alike(fastest):
         shared.setdefault(entry.method, entry.label)

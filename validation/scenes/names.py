@@ -6,7 +6,6 @@ the built-in scenes imports it.
 """
 
 import os
-import tomllib
 from functools import cache
 from pathlib import Path
 from urllib.parse import quote, unquote
@@ -25,6 +24,8 @@ _SAFE = "/:\\"  # stands in a path as it is, besides letters, digits, '_', '.', 
 @cache
 def scene_names() -> tuple[str, ...]:
     """Return the names of the built-in scenes in their order."""
+    import tomllib  # `airlight --help` needs none
+
     tables = (item for file in FILES for item in tomllib.loads(file.read_text("utf-8")).items())
     # A scene is a table with a purpose; parameters of engines have none.
     return tuple(name for name, table in tables if "purpose" in table)

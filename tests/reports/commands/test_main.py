@@ -4,6 +4,7 @@
 import json
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -258,3 +259,26 @@ def test_every_public_name_can_be_imported(variant):
         assert getattr(airlight, name) is not None
     with pytest.raises(AttributeError, match="no_such_name"):
         airlight.no_such_name  # noqa: B018 - to look it up is the test
+
+
+def test_the_script_of_a_shell_completes_commands_studies_and_options(capfd, tmp_path):
+    assert cli.run(["completion", "bash"]) == 0
+    script = tmp_path / "completion.bash"
+    script.write_text(capfd.readouterr().out)
+
+    def completed(*words):
+        line = " ".join(words)
+        code = f"""source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
+            COMP_LINE='{line}'; _airlight airlight '{words[-1]}' '{words[-2]}'
+            echo "${{COMPREPLY[@]}}" """
+        ran = subprocess.run(["bash", "-c", code], capture_output=True, text=True, check=True)
+        return ran.stdout.split()
+
+    assert completed("airlight", "ref") == ["reference"]
+    assert completed("airlight", "study", "nois") == ["noise"]
+    assert completed("airlight", "render", "--meth") == ["--method"]
+    assert completed("airlight", "reference", "hall", "--estimator", "vol") == ["volpath"]
+    for shell in ("zsh", "fish"):
+        assert cli.run(["completion", shell]) == 0
+        assert "--estimator" in capfd.readouterr().out.replace("-l estimator", "--estimator")
+    assert cli.run(["completion", "tcsh"]) == 2
