@@ -5,7 +5,7 @@ with it, which fog fits.
 
 import dataclasses
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,7 +18,9 @@ from airlight.reports.api.inputs import (
     Mask,
     Progress,
     SceneLike,
+    Values,
     Words,
+    changes_of,
     exclude,
     listed,
     one_error,
@@ -40,6 +42,7 @@ def compare(
     test: ImageLike,
     layer: str | None = None,
     *,
+    change: Values = (),
     pixel: Literal["centre", "area"] | None = None,
     mask: Mask | None = None,
     margin: float | None = None,
@@ -75,6 +78,8 @@ def compare(
     layer
         Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight. With a scene NAME=airlight,
         =surface or =total says what it contains; by default what its name says.
+    change
+        With a scene: change its camera, a light or a medium, such as medium.sigma_t=0.1; may be given several times.
     pixel
         With a scene: whether pixels are values at their centre or means over their area. By default
         both are tried, which takes several times as long.
@@ -143,6 +148,7 @@ def compare(
     if scene is None:
         of_scenes = {
             "the content of the layer": holds,
+            "change": several(change),
             "pixel": pixel,
             "diagnose": diagnose,
             "fit": fit,
@@ -171,19 +177,28 @@ def compare(
             "compare", "several files are judged together", about | {"mask": mask, "margin": None}
         )
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
+        how["changes"] = changes_of(change)
         return _several(str(scene), test, frames, progress=progress, **how)
     # One image from here on.
     files = output_files(output, ".exr (values)", ".png (a picture)")
     # A fit activates Mitsuba itself, once it has read the image.
     if fit is not None:
         return _fit(
-            scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress
+            scene,
+            test,
+            fit,
+            changes=changes_of(change),
+            layer=layer,
+            holds=holds,
+            pixel=pixel,
+            mask=mask,
+            progress=progress,
         )
     # Two images need no Mitsuba, whose start takes seconds.
     options: dict[str, Any] = {"mask": mask, "margin": margin, "all_metrics": all_metrics}
     if scene is None:
         return _two_images(reference, test, layer, files=files, **options)
-    how = {"layer": layer, "holds": holds, "pixel": pixel}
+    how = {"layer": layer, "holds": holds, "pixel": pixel, "changes": changes_of(change)}
     # The diagnosis and the comparison with a scene read files; an array is written to one.
     with _as_file(test) as (path, name):
         from airlight.reference.storage.exr import read_exr
@@ -381,6 +396,7 @@ def _fit(
     image: Any,
     parameters: Any,
     *,
+    changes: Mapping[str, Sequence[float]],
     layer: str | None,
     mask: Any,
     progress: Any,
@@ -407,7 +423,7 @@ def _fit(
 
     # The scene is loaded at the size of the image, whose pixels the fit explains.
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
-    loaded = scene_of_size(str(scene), size, name)
+    loaded = scene_of_size(str(scene), size, name, changes)
     with telling(progress, "fit") as tell:
         result = fit_image(
             layers,

@@ -2,7 +2,7 @@
 """`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,12 @@ from airlight.validation.scenes.names import check_scene
 
 @one_error
 def describe(
-    scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None
+    scene: SceneLike,
+    *,
+    change: Values = (),
+    size: Size | None = None,
+    output: Files = (),
+    progress: Progress = None,
 ) -> Said:
     """Describe everything that another renderer needs to render a scene.
 
@@ -41,6 +46,8 @@ def describe(
     scene
         A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
         `load_scene` takes or returns.
+    change
+        Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
@@ -57,6 +64,7 @@ def describe(
     # Names are checked before Mitsuba starts.
     files = output_files(output, ".glb", ".vol")
     check_scene(scene)
+    changes = changes_of(change)
     from airlight.reports.machine.environment import activate
 
     activate()
@@ -64,24 +72,34 @@ def describe(
     from airlight.reports.interchange.gltf import write_gltf
     from airlight.reports.interchange.scene import describe_scene
 
-    loaded = opened(scene, size)
+    loaded = opened(scene, size, changes)
     # A .vol file holds a medium that varies, sampled to a grid; every other file is glTF.
     described = describe_scene(loaded)
     volumes = [path for path in files if path.suffix.lower() == ".vol"]
     written = [write_gltf(path, loaded) for path in files if path not in volumes]
     grids = [_write_grid(path, loaded.scene) for path in volumes]
     note(progress, described["notes"])
-    return _said(described, written[-1] if written else None, grids[-1] if grids else "")
+    return _said(described, changes, written[-1] if written else None, grids[-1] if grids else "")
 
 
-def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid: str) -> Said:
+def _said(
+    described: Mapping[str, Any],
+    changes: Mapping[str, Sequence[float]],
+    written: Mapping[str, Any] | None,
+    grid: str,
+) -> Said:
     """Return a description, with the glTF file and the medium that reads
     the volume file, as XML.
     """
     from airlight.reports.interchange.words import description_table
+    from airlight.validation.scenes.changes import change_words
 
     # The next step of the user, who renders the scene elsewhere and judges the image here.
-    command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
+    changed = change_words(changes)
+    options = [word for change in changed for word in ("--change", change)]
+    command = shlex.join(
+        ["airlight", "compare", described["source"], described["file"]["name"], *options]
+    )
     lines = [f"to judge it: {command}"]
     if written is not None:
         # glTF knows triangles only: shapes that Mitsuba intersects in closed form have become
@@ -92,7 +110,8 @@ def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid:
     lines += [f"the fog as a grid: {grid}"] if grid else []
     files = ({} if written is None else {"gltf": written}) | ({"grid": grid} if grid else {})
     tables = (description_table(described),)
-    return Said(name=described["scene"], data={**described, **files}, tables=tables, lines=lines)
+    data = {**described, **({"changes": changed} if changed else {}), **files}
+    return Said(name=described["scene"], data=data, tables=tables, lines=lines)
 
 
 def _write_grid(path: Path, scene: Any) -> str:

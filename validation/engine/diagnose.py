@@ -36,6 +36,7 @@ from airlight.validation.engine.observation import (
 from airlight.validation.engine.prediction import Predictor, SceneLight
 from airlight.validation.engine.search import Explanation
 from airlight.validation.engine.stages import QUICK, Attempt
+from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
 
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
@@ -136,6 +137,7 @@ def diagnose_file(
     holds: str | None = None,
     pixel: str | None = None,
     light: SceneLight | None = None,
+    changes: Changes = UNCHANGED,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both.
@@ -152,10 +154,12 @@ def diagnose_file(
         Which layer, and what it holds, see `validation.engine.observation.judged_layer`.
     pixel, light, progress
         See `diagnose_image`.
+    changes
+        See `validation.engine.judge.compare_scene`.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
-    loaded = scene_of_size(scene, several[0].size, path)
+    loaded = scene_of_size(scene, several[0].size, path, changes)
     reference_of = references(loaded)
     diagnoses = [
         diagnose_image(

@@ -62,6 +62,7 @@ from airlight.validation.estimates.quadrature import (
     reference_layer,
 )
 from airlight.validation.metrics.errors import FLOOR
+from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.statistics.comparison import block_sums, check_margin
 from airlight.validation.statistics.estimate import Estimate
@@ -159,6 +160,7 @@ def compare_scene(
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
     all_metrics: bool = False,
+    changes: Changes = UNCHANGED,
     progress: Progress | None = None,
 ) -> EngineComparison:
     """Compare an EXR file with the reference of a scene at the file's size.
@@ -181,13 +183,15 @@ def compare_scene(
         with them that its bias is within it.
     all_metrics
         See `validation.comparison.images.compare_images`.
+    changes
+        Values by name that replace those of the scene, see `validation.scenes.changes`.
     progress
         Called with (fraction done, what).
     """
     # The layer, the scene at the size of the image, and the pixels that file and mask have.
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    loaded = scene_of_size(scene, judged.size, path)
+    loaded = scene_of_size(scene, judged.size, path, changes)
     chosen = image.with_data(None if mask is None else read_mask(mask))
     return judge_image(
         image,

@@ -5,7 +5,7 @@ of its pixels take part.
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -33,6 +33,7 @@ from airlight.validation.fog_model.view import (
     view_of,
 )
 from airlight.validation.metrics.errors import wrong_pixels
+from airlight.validation.scenes.changes import UNCHANGED, Changes, change_words
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 
 Result = TypeVar("Result")  #: the result of an attempt at an image
@@ -389,8 +390,13 @@ def needed_samples(reference: ReferenceScene) -> int:
     return samples
 
 
-def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
-    """Return a scene at the size of an image of it."""
+def scene_of_size(
+    scene: str,
+    size: tuple[int, int],
+    path: str | os.PathLike[str],
+    changes: Changes = UNCHANGED,
+) -> LoadedScene:
+    """Return a scene at the size of an image of it; one that was changed says so in its name."""
     # The shape of the image must be that of the scene, to a pixel in either direction.
     loaded = load_scene(scene)
     width, height = (
@@ -408,4 +414,6 @@ def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str
             f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or a "
             "fraction of it"
         )
-    return load_scene(scene, size)
+    loaded = load_scene(scene, size, changes)
+    words = " and ".join(change_words(changes))
+    return replace(loaded, name=f"{loaded.name} with {words}") if changes else loaded

@@ -46,7 +46,7 @@ from airlight.validation.motion.blocks import BLOCK
 from airlight.validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from airlight.validation.motion.lag import SURE, Lag
 from airlight.validation.motion.measures import AGES, STARTING, Measures, Sequence, measure
-from airlight.validation.scenes.changes import move_shapes, shift_film
+from airlight.validation.scenes.changes import UNCHANGED, Changes, move_shapes, shift_film
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.comparison import check_margin
 from airlight.validation.statistics.estimate import Answer, Estimate, fact
@@ -144,6 +144,7 @@ def compare_frames(
     holds: str | None = None,
     pixel: str | None = None,
     margin: float | None = None,
+    changes: Changes = UNCHANGED,
     progress: Progress | None = None,
 ) -> MotionComparison:
     """Compare the frames of a renderer with the references of a scene that changes.
@@ -166,12 +167,12 @@ def compare_frames(
     first = read_exr(paths[0])
     judged = judged_layer(first, paths[0], name=layer or record.layer, holds=holds)
     kinds = pixel_kinds(first, pixel or record.pixel)
-    scene_of_size(scene, judged.size, paths[0])
+    named = scene_of_size(scene, judged.size, paths[0], changes).name
     with temporary_folder() as folder:
         # The measures read each frame and each reference several times. They lie in a folder, so
         # that memory holds one frame at a time. All frames are read before the first reference,
         # which takes the time: a frame of another size is refused at once.
-        frames = _Frames(folder, scene, record, judged, kinds[0])
+        frames = _Frames(folder, scene, record, judged, kinds[0], changes)
         for n, path in enumerate(paths):
             frames.take(n, path)
         for n in range(record.frames):
@@ -226,7 +227,7 @@ def compare_frames(
         why = "" if measures.bias.error is not None else f": {UNTOLD_SERIES}"
         failures.append(f"the relative bias is not shown to be within +-{margin:.3g}{why}")
     return MotionComparison(
-        scene=scene,
+        scene=named,
         files=str(pattern),
         size=judged.size,
         frames=record.frames,
@@ -249,7 +250,13 @@ class _Frames:
     """
 
     def __init__(
-        self, folder: Path, scene: str, record: FramesRecord, judged: JudgedLayer, pixel: str
+        self,
+        folder: Path,
+        scene: str,
+        record: FramesRecord,
+        judged: JudgedLayer,
+        pixel: str,
+        changes: Changes,
     ) -> None:
         self._folder, self._scene, self._record, self._judged, self._pixel = (
             folder,
@@ -258,6 +265,7 @@ class _Frames:
             judged,
             pixel,
         )
+        self._changes = changes  # of all frames; those of a frame go before
         self.known = fact(0.0)  # of the frame that is known worst
         self.nonfinite: list[int] = []  # values of each frame that are NaN or infinite
         shape = (record.frames, *judged.values.shape[:2])
@@ -303,7 +311,7 @@ class _Frames:
             # differs from it, not what differs from the frame before.
             try:
                 changes, moves, jitter = record.shown(n)
-                loaded = load_scene(self._scene, self._judged.size, changes)
+                loaded = load_scene(self._scene, self._judged.size, {**self._changes, **changes})
                 move_shapes(loaded.scene, moves)
                 shift_film(loaded.scene, *jitter)
                 image = reference_image(loaded.scene, pixel=self._pixel)

@@ -65,6 +65,7 @@ from airlight.validation.engine.observation import (
 from airlight.validation.estimates.quadrature import known_to, known_words
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
 from airlight.validation.motion.lag import SURE
+from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.statistics.comparison import check_margin
 from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
 from airlight.validation.statistics.samples import (
@@ -405,6 +406,7 @@ def compare_runs(
     holds: str | None = None,
     pixel: str | None = None,
     margin: float | None = None,
+    changes: Changes = UNCHANGED,
     progress: Progress | None = None,
 ) -> NoiseComparison:
     """Compare independent renders of a frame with the reference of its scene.
@@ -428,7 +430,7 @@ def compare_runs(
                 f"{first.size[1]}"
             )
     # References are computed when a kind of pixel is asked for; runs that do not count go first.
-    loaded = scene_of_size(scene, first.size, paths[0])
+    loaded = scene_of_size(scene, first.size, paths[0], changes)
     reference_of = references(loaded, progress)
     runs, names, notes, failures = _distinct(
         [each.values.astype(np.float64) for each in layers], paths

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import mitsuba as mi
@@ -42,6 +43,8 @@ from airlight.validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 from airlight.validation.scenes.parts import Plugin
 
 Values = tuple[float, ...]
+Changes = Mapping[str, Sequence[float]]
+UNCHANGED: Changes = MappingProxyType({})
 _LIGHTS = {"intensity": "W/sr", "irradiance": "W/m^2", "radiance": "W/(m^2 sr)"}
 
 

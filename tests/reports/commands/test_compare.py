@@ -4,6 +4,8 @@ are values and pictures.
 """
 
 import json
+import re
+import shlex
 
 import numpy as np
 import pytest
@@ -177,3 +179,32 @@ def test_the_command_and_python_find_the_fog_that_made_an_image(variant, tmp_pat
     assert "<table" in fit._repr_html_()
     with pytest.raises(airlight.InputError, match="did you mean"):
         airlight.compare("open-fog", str(path), fit=["albdo"])
+
+
+@pytest.mark.parametrize("how", [[], ["--diagnose"], ["--fit", "sigma_t"]], ids=" ".join)
+def test_a_changed_scene_is_described_and_judged_as_it_was_rendered(
+    variant, tmp_path, monkeypatch, capsys, how
+):
+    """The command that `describe` prints has the change, and judges the image that has it."""
+    monkeypatch.chdir(tmp_path)
+    change = ["--change", "medium.sigma_t=0.3"]
+    size = ["--size", "16x12"]
+    assert run(["reference", "open-fog", *size, *change, "-o", "open-fog.exr"]) == 0
+    capsys.readouterr()
+    assert run(["describe", "open-fog", *size, *change]) == 0
+    (line,) = (each for each in capsys.readouterr().out.splitlines() if "to judge it" in each)
+    words = shlex.split(line.partition("airlight ")[2])
+    assert words[-2:] == change
+    assert run([*words, "--pixel", "centre", *how]) == 0
+    said = capsys.readouterr().out
+    assert "open-fog with medium.sigma_t=0.3" in said
+    assert re.search(r"(verdict +|: )right: |sigma_t +0\.3 ", said), said
+    assert run(["describe", "open-fog", *size, *change, "--json"]) == 0
+    described = json.loads(capsys.readouterr().out)
+    assert described["changes"] == ["medium.sigma_t=0.3"]
+    assert described["medium"]["sigma_t"] == pytest.approx([0.3] * 3)
+
+
+def test_two_images_have_no_scene_to_change(files, capsys):
+    assert run(["compare", *files[0], "--change", "medium.sigma_t=0.3"]) == 2
+    assert "two images have no scene; leave out change" in capsys.readouterr().err
