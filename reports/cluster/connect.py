@@ -68,6 +68,7 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     import dask
     from distributed import Client, LocalCluster
 
+    from airlight.errors import InputError
     from airlight.reference.storage.files import temporary_folder
 
     alone = workers == 1
@@ -93,22 +94,29 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     with temporary_folder() as folder, dask.config.set(settings), ExitStack() as stack:
         with _without_interrupts():
             _start_quiet_tracker()
-            cluster = stack.enter_context(
-                LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=threads() if alone else 1,
-                    processes=True,
-                    host="127.0.0.1",
-                    # None is port 8787 on all interfaces, which may be taken
-                    dashboard_address="127.0.0.1:0",
-                    scheduler_kwargs={"dashboard": False},
-                    memory_limit=MEMORY,
-                    local_directory=str(folder),
-                    silence_logs=logging.CRITICAL,
-                    resources={"alone": 1} if alone else None,
-                    env=quick_compilation.settings() if quick else None,
+            try:
+                cluster = stack.enter_context(
+                    LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=threads() if alone else 1,
+                        processes=True,
+                        host="127.0.0.1",
+                        # None is port 8787 on all interfaces, which may be taken
+                        dashboard_address="127.0.0.1:0",
+                        scheduler_kwargs={"dashboard": False},
+                        memory_limit=MEMORY,
+                        local_directory=str(folder),
+                        silence_logs=logging.CRITICAL,
+                        resources={"alone": 1} if alone else None,
+                        env=quick_compilation.settings() if quick else None,
+                    )
                 )
-            )
+            except RuntimeError as error:
+                # A process that is started imports the script of its caller, and would start others.
+                raise InputError(
+                    "cluster: its processes did not start; each runs the script that calls airlight "
+                    'again: put what it does under `if __name__ == "__main__":`'
+                ) from error
             client = stack.enter_context(Client(cluster, set_as_default=False))
         yield client
 

@@ -121,3 +121,15 @@ def test_a_worker_of_another_version_that_joins_a_run_is_refused_by_name(
         said = r"worker tcp://127.* has source code \w{12}, not \w{12}: install the same airlight there"
         with pytest.raises(InputError, match=said):
             list(run_groups(cluster, groups, made=made))
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_is_told_what_it_lacks(tmp_path):
+    """Each process imports the script again, which would start processes for ever."""
+    script = tmp_path / "script.py"
+    script.write_text("import airlight\nairlight.sweep(1, cluster='local:1', output='rows')\n")
+    ran = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=300
+    )
+    assert ran.returncode == 1
+    assert 'put what it does under `if __name__ == "__main__":`' in ran.stderr.splitlines()[-1]
