@@ -26,7 +26,7 @@ from airlight.reports.plotting.pictures import (
     write_png,
 )
 from airlight.reports.tables.record import Said
-from airlight.reports.tables.table import Interval, numbers, table, words
+from airlight.reports.tables.table import Interval, Table, numbers, table, words
 from airlight.validation.columns import plain
 from airlight.validation.comparison.images import Comparison, shown
 from airlight.validation.engine.diagnose import Diagnosis
@@ -160,14 +160,30 @@ def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
     # JSON has the first diagnosis under `diagnosis`, and all of them under `layers` where there are
     # several.
     several = plain(diagnoses)
-    first, *others = (diagnosis.lines for diagnosis in diagnoses)
+    # Nothing was looked for where an image is right or black.
+    searched = [each for each in diagnoses if len(each.ranked) > 1]
+    said = "left: mean relative error without the fault; evidence: a score against `right`."
     return Said(
-        name="diagnosis",
+        name=f"{diagnoses[0].path} of {diagnoses[0].scene}: {diagnoses[0].first}",
         data={"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {}),
-        lines=first + [line for lines in others for line in ("", *lines)],
+        claims=[line for each in diagnoses for line in each.lines],
+        tables=[_ranked(each) for each in searched],
+        lines=[said] if searched else [],
         good=not any(diagnosis.failures for diagnosis in diagnoses),
         of=diagnoses,
     )
+
+
+def _ranked(diagnosis: Diagnosis) -> Table:
+    """Return the five faults with the most evidence, each with the error that it leaves."""
+    columns = (
+        *words(fault="fault"),
+        *numbers(left="left", how={"percent": True}),
+        *numbers(evidence="evidence", how={"digits": 4}),
+        *words(says="the image", how={"long": True}),
+    )
+    rows = [(each.name, each.residual, each.evidence, each.words) for each in diagnosis.ranked[:5]]
+    return table(f"Faults of the {diagnosis.layer}, by their evidence", columns, rows)
 
 
 def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:

@@ -80,26 +80,14 @@ class Diagnosis:
 
     @property
     def lines(self) -> list[str]:
-        """The first explanation, the error that it leaves, and the others that were tried."""
+        """The first explanation and the error that it leaves, in sentences."""
         off = f"values are {_percent(self.residual)} off in the mean"
         lines = [
             f"{self.path}, {self.layer}, against {self.scene}, {PIXEL_WORDS[self.pixel]}: {off}."
         ]
         lines += self._said()
         lines += [f"Failed: {reason}." for reason in self.failures]
-        lines += [f"The file: {self.note}."] if self.note else []
-        if len(self.ranked) < 2:  # no fault was looked for
-            return lines
-        # Five rows are printed. Evidence beyond 10 000 says no more by its digits.
-        lines += ["", f"{'fault':<16} {'left':>9} {'evidence':>9}  what it says"]
-        for row in self.ranked[:5]:
-            weight = f"{row.evidence:.0f}" if abs(row.evidence) < 1e4 else f"{row.evidence:.1e}"
-            lines.append(f"{row.name:<16} {_percent(row.residual):>9} {weight:>9}  {row.words}")
-        return [
-            *lines,
-            "",
-            "left: mean relative error without the fault; evidence: a score against `right`.",
-        ]
+        return [*lines, *([f"The file: {self.note}."] if self.note else [])]
 
     def _said(self) -> list[str]:
         """Return what is wrong, in sentences; the comparison's verdict stands

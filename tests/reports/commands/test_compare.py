@@ -124,12 +124,11 @@ def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(
     ]
     assert data["diagnosis"] == data["layers"][0]
     assert run(["compare", *asked]) == 0
-    first, said, blank, second, also = capsys.readouterr().out.splitlines()
-    assert first.startswith(f"{path}, airlight, against sphere-spot")
-    assert second.startswith(f"{path}, surface, against sphere-spot")
-    assert blank == ""
+    first, said, second, also = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"- {path}, airlight, against sphere-spot")
+    assert second.startswith(f"- {path}, surface, against sphere-spot")
     for line, each in ((said, data["layers"][0]), (also, data["layers"][1])):
-        assert line == f"Nothing is wrong with it: {each['verdict']}."
+        assert line == f"- Nothing is wrong with it: {each['verdict']}."
     again = airlight.compare(
         "sphere-spot", airlight.reference("sphere-spot", size=(32, 24)), diagnose=True
     )
