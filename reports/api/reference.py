@@ -224,7 +224,9 @@ def _check_work(
         )
     else:
         # A budget of error or of seconds names no number of samples: 64 a pixel stand for it.
-        work = sampled_work(size, budget.samples or 64, clouds=clouds)
+        # single-scatter takes them for each light, the others choose a light by chance.
+        lights = len(loaded.scene.emitters()) if estimator == "single-scatter" else 1
+        work = sampled_work(size, budget.samples or 64, lights=lights, clouds=clouds)
     kind = f"{estimator} of areas" if pixel == "area" else estimator
     return check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {kind}", [work])
 

@@ -65,14 +65,17 @@ def reference_work(
     return Work(least, pixels * reference_bytes, most)
 
 
-def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:
-    """Return the work of an image by random samples, so many in each pixel, each a path
-    through clouds or one step.
+def sampled_work(
+    size: tuple[int, int], samples: float, *, lights: int = 1, clouds: bool = False
+) -> Work:
+    """Return the work of an image by random samples, so many in each pixel for each light, each a
+    path through clouds or one step.
     """
     pixels = float(size[0]) * size[1]
     # A sample of single-scatter and volpath, and a path through a cloud [s].
     of_sample, of_path, sampled_bytes = 1e-6, 20e-6, 500
-    return Work(pixels * samples * (of_path if clouds else of_sample), pixels * sampled_bytes)
+    count = pixels * samples * max(lights, 1)
+    return Work(count * (of_path if clouds else of_sample), pixels * sampled_bytes)
 
 
 def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:

@@ -61,6 +61,26 @@ class Task:
     varying: VaryingMedium | None = None
 
 
+def source_light(
+    task: Task, source: Source, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool"
+) -> Light:
+    """Return airlight and lit surface along camera rays, of one light of a source after the
+    other.
+    """
+    if source.count == 1:
+        return ray_light(replace(task, sources=(source,)), sampler, ray, active)
+
+    def add_light(number, sampler, airlight, surface):
+        here = replace(task, sources=(source.light(number),))
+        sent = ray_light(here, sampler, ray, active)
+        return number + 1, sampler, airlight + sent[0], surface + sent[1]
+
+    # One kernel for any number of lights.
+    width, count = dr.width(active), dr.opaque(mi.UInt32, source.count)
+    state = (mi.UInt32(0), sampler, dr.zeros(mi.Spectrum, width), dr.zeros(mi.Spectrum, width))
+    return dr.while_loop(state, lambda number, *_: number < count, add_light, label="lights")[-2:]
+
+
 def ray_light(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool") -> Light:
     """Return airlight and lit surface along camera rays.
 

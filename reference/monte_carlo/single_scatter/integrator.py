@@ -17,15 +17,13 @@ relative to the light, in the variant's precision. Sums over at most 256 samples
 batches double.
 """
 
-from dataclasses import replace
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings
-from airlight.reference.monte_carlo.single_scatter.estimator import Task, ray_light
+from airlight.reference.monte_carlo.single_scatter.estimator import Task, source_light
 from airlight.reference.monte_carlo.single_scatter.sources import sources_of
 from airlight.reference.monte_carlo.single_scatter.stretches import double_ray
 from airlight.reference.scene.read import ReferenceScene
@@ -57,12 +55,10 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
             mi.Vector3d(reference.direction[chunk].T),
         )
         layers = dr.zeros(mi.Spectrum, count), dr.zeros(mi.Spectrum, count)
-        # One light after the other: lights of one structure share a compiled kernel, while a kernel
-        # of many lights would hold a loop for each.
+        # One source after the other: those of one structure share a compiled kernel, while a kernel
+        # of many would hold a loop for each.
         for source in task.sources:
-            sent = ray_light(
-                replace(task, sources=(source,)), sampler, ray, dr.full(mi.Bool, True, count)
-            )
+            sent = source_light(task, source, sampler, ray, dr.full(mi.Bool, True, count))
             layers = layers[0] + sent[0], layers[1] + sent[1]
             sampler.schedule_state()
             dr.eval(layers)

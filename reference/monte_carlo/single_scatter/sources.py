@@ -13,6 +13,7 @@ emission, except for area lights, whose points are drawn by
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -63,6 +64,7 @@ class _Near(ABC):
     could light.
     """
 
+    count = 1  # of lights
     position: "mi.Point3d | None" = None  # of all samples, if it is the same for all [m]
     medium: "mi.MediumPtr | None" = None  # where every path begins, if it is known
 
@@ -134,12 +136,42 @@ class _Near(ABC):
 
 @dataclass(frozen=True)
 class PointSource(_Near):
-    """A point or spot light."""
+    """Point lights, one or several."""
+
+    intensity: "mi.Color3f"  #: of each, the same in all directions [W/sr]
+    position: "mi.Point3d"  #: of each [m]
+    count: int = 1
+    medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
+    varies = False
+
+    def light(self, number: "mi.UInt32") -> "PointSource":
+        """Return one of them."""
+        intensity = dr.gather(mi.Color3f, self.intensity, number)
+        return PointSource(intensity, dr.gather(mi.Point3d, self.position, number))
+
+    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
+        """Return its place, for every sample."""
+        return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
+
+    def sent(
+        self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
+    ) -> "mi.Spectrum":
+        """Return the intensity."""
+        return self.intensity
+
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> Ends:
+        """Return the ends of all of a line."""
+        return -dr.inf, dr.inf
+
+
+@dataclass(frozen=True)
+class SpotSource(_Near):
+    """A spot."""
 
     emitter: "mi.Emitter"
+    axis: "mi.Vector3d"  #: unit vector
+    cutoff: float  #: half angle of the cone [rad]
     position: "mi.Point3d"  #: [m]
-    axis: "mi.Vector3d | None" = None  #: spot: unit vector
-    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
     medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
     varies = False
 
@@ -156,8 +188,6 @@ class PointSource(_Near):
 
     def ends(self, point: LightSample, approach: Approach, ray: Ray) -> Ends:
         """Return the ends of the part of a line in the cone."""
-        if self.axis is None:
-            return -dr.inf, dr.inf
         return cone_ends(approach, ray.direction_double, axis=self.axis, cutoff=self.cutoff)
 
 
@@ -205,6 +235,7 @@ class FarSource:
     """
 
     emitter: "mi.Emitter"
+    count = 1
     position = None
 
     @property
@@ -241,7 +272,7 @@ class FarSource:
         )
 
 
-Source = PointSource | AreaSource | FarSource
+Source = PointSource | SpotSource | AreaSource | FarSource
 
 
 def is_sky(emitter: "mi.Emitter") -> bool:
@@ -250,22 +281,32 @@ def is_sky(emitter: "mi.Emitter") -> bool:
 
 
 def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
-    """Return the lights of a scene."""
+    """Return the lights of a scene; all point lights are one source."""
     emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
+    points = [emitter for emitter in emitters if emitter.class_name() == "PointLight"]
+    others = [_source(emitter) for emitter in emitters if emitter not in points]
     area = [
         AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()))
         for light in reference.area
     ]
-    return (*map(_source, emitters), *area)
+    return (*([_point_lights(points)] if points else []), *others, *area)
+
+
+def _point_lights(emitters: Sequence["mi.Emitter"]) -> PointSource:
+    # What a point light sends is the same in all directions: its emitter is asked once.
+    places, intensities = np.empty((2, 3, len(emitters)))
+    for number, emitter in enumerate(emitters):
+        sample, irradiance = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+        places[:, number] = np.ravel(sample.p)
+        intensities[:, number] = np.ravel(irradiance * sample.dist * sample.dist)
+    # An array for each coordinate: cut out of one, their kernels would hold how many there are.
+    return PointSource(mi.Color3f(*intensities), mi.Point3d(*places), len(emitters))
 
 
 def _source(emitter: "mi.Emitter") -> Source:
     if is_sky(emitter) or is_directional(emitter):
         return FarSource(emitter)
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-    position = mi.Point3d(sample.p)
-    if emitter.class_name() == "PointLight":
-        return PointSource(emitter, position)
     axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
-    return PointSource(emitter, position, axis, math.radians(cutoff))
+    return SpotSource(emitter, axis, math.radians(cutoff), mi.Point3d(sample.p))

@@ -45,6 +45,7 @@ FOGS = {
     "rayleigh": lambda: tiny_scene(fog=FOG | {"phase": {"type": "rayleigh"}}),
     "coloured": lambda: tiny_scene(fog=FOG | COLOURED),
     "dense": lambda: tiny_scene(fog=FOG | {"sigma_t": 2.3}),
+    "nine lamps": lambda: tiny_scene(**lamps(9), second=spot(beam=11.0)),
 }
 
 
@@ -59,6 +60,18 @@ def lamp(**changes):
     return tiny_scene()["lamp"] | changes
 
 
+def lamps(count):
+    """Return point lights of unlike power at unlike places."""
+    x, y, z = tiny_scene()["lamp"]["position"]
+    return {
+        f"lamp-{k}": lamp(
+            position=[x + 0.13 * k, y - 0.07 * (k % 3), z + 0.11 * (k % 4)],
+            intensity={"type": "rgb", "value": [0.3 + k, 1.7, 2.9 / (1 + k)]},
+        )
+        for k in range(count)
+    }
+
+
 #: Media in bounds, under suns and lamps: segments are walked from boundary to boundary.
 MEDIA = {
     "sun on box and sphere": lambda: in_media(**ball_over_floor()),
@@ -67,6 +80,9 @@ MEDIA = {
     ),
     "two suns and a lamp": lambda: in_media(
         second=sun([0.4, 0.9, -0.3], (1.0, 2.0, 3.0)), lamp=lamp(), occluder=None
+    ),
+    "three lamps in and about the box": lambda: in_media(
+        sun=None, lamp=lamp(position=[-0.6, 0.3, 0.71]), occluder=None, **lamps(2)
     ),
     "lamp inside of the box": lambda: in_media(
         sun=None, lamp=lamp(position=[-0.6, 0.3, 0.71]), **ball_over_floor()
@@ -77,6 +93,7 @@ FAST = (
     "sphere and floor",
     "soft spot",
     "coloured",
+    "nine lamps",
     "sun on box and sphere",
     "lamp inside of the box",
 )
