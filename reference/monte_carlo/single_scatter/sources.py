@@ -14,8 +14,8 @@ emission, except for area lights, whose points are drawn by
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Self, TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -67,6 +67,10 @@ class _Near(ABC):
     count = 1  # of lights
     position: "mi.Point3d | None" = None  # of all samples, if it is the same for all [m]
     medium: "mi.MediumPtr | None" = None  # where every path begins, if it is known
+
+    def light(self, number: "mi.UInt32") -> Self:
+        """Return one of several lights; a source of one has one."""
+        return self
 
     @abstractmethod
     def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
@@ -144,10 +148,11 @@ class PointSource(_Near):
     medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
     varies = False
 
-    def light(self, number: "mi.UInt32") -> "PointSource":
-        """Return one of them."""
+    def light(self, number: "mi.UInt32") -> Self:
+        """Return one of the lights."""
         intensity = dr.gather(mi.Color3f, self.intensity, number)
-        return PointSource(intensity, dr.gather(mi.Point3d, self.position, number))
+        position = dr.gather(mi.Point3d, self.position, number)
+        return replace(self, intensity=intensity, position=position, count=1)
 
     def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
         """Return its place, for every sample."""
@@ -242,6 +247,10 @@ class FarSource:
     def varies(self) -> bool:
         """Whether samples differ on one surface."""
         return is_sky(self.emitter)
+
+    def light(self, number: "mi.UInt32") -> Self:
+        """Return the light."""
+        return self
 
     def on_ray(
         self, u: "mi.Float", numbers: SquarePoints, ray: Ray, part: Part, active: "mi.Bool"
