@@ -20,10 +20,12 @@ from airlight.reports.api.inputs import (
     Methods,
     Progress,
     Scenes,
+    Size,
     Values,
     exclude,
     note,
     one_error,
+    pixels_of,
     several,
     telling,
 )
@@ -125,6 +127,7 @@ def report(
     *,
     quick: bool = False,
     full: bool = False,
+    size: Size | None = None,
     method: Methods = (),
     kernel: Kernels = (),
     settings: Values = (),
@@ -154,6 +157,8 @@ def report(
         Few scenes and small images, for a first look in some minutes.
     full
         Large images, many samples and all tables, in about an hour.
+    size
+        Width and height of images and timed frames [pixels], or WxH; those of the effort by default.
     method
         A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or
         FILE.glsl, or 'all', the default; may be given several times. From Python also functions and
@@ -200,6 +205,7 @@ def report(
         beside = {
             "quick": quick,
             "full": full,
+            "size": size,
             "kernel": kernel,
             "set": settings,
             "images": images,
@@ -218,11 +224,15 @@ def report(
     asked = (several(scenes), several(method), several(kernel), settings)
     places = {"images": images, "output": output, "figures": figures, "cluster": cluster}
     # report.json says how to make it again.
-    command = _command(*asked, {"quick": quick, "full": full, "fresh": fresh, **places})
+    pixels = pixels_of(size)
+    asked_size = None if pixels is None else f"{pixels[0]}x{pixels[1]}"
+    efforts = {"quick": quick, "full": full, "size": asked_size, "fresh": fresh}
+    command = _command(*asked, {**efforts, **places})
     data = _measured(
         target,
         effort,
         *asked,
+        size=pixels,
         images=images,
         fresh=fresh,
         cluster=cluster,
@@ -325,6 +335,7 @@ def _measured(
     kernels: list[Any],
     settings: Any,
     *,
+    size: tuple[int, int] | None,
     images: Any,
     fresh: bool,
     cluster: str | None,
@@ -361,8 +372,12 @@ def _measured(
     # A study file replaces the effort: it says scenes, sizes and methods.
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
-        exclude(asked[0], "the study says how much is measured", {effort: effort != "default"})
+        beside = {effort: effort != "default", "size": size}
+        exclude(asked[0], "the study says how much is measured", beside)
         study, asked = _study_of(Path(asked[0])), []
+    if images is not None:
+        exclude("images", "they have sizes of their own", {"size": size})
+    study = study.at(size)
     # Images from elsewhere decide the scenes where none is named.
     names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
     # With `apart` user code runs in other processes, which can be ended when a method hangs.

@@ -302,7 +302,7 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
 
 
 def _point_lights(emitters: Sequence["mi.Emitter"]) -> PointSource:
-    # What a point light sends is the same in all directions: its emitter is asked once.
+    # A point light sends the same in all directions: its emitter is asked once.
     places, intensities = np.empty((2, 3, len(emitters)))
     for number, emitter in enumerate(emitters):
         sample, irradiance = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))

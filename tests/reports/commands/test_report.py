@@ -68,7 +68,11 @@ def handed_on(monkeypatch):
 
     def write(folder, study, **options):
         given.update(
-            options, folder=folder, scenes=study.scenes, configurations=study.configurations
+            options,
+            folder=folder,
+            study=study,
+            scenes=study.scenes,
+            configurations=study.configurations,
         )
         return checked(
             report_of([], claims=[{"kind": "image", "text": "`--full` has all.", "good": None}])
@@ -240,6 +244,15 @@ def test_how_to_reproduce_a_report_is_what_made_it(variant, tmp_path, handed_on,
     airlight.report("open-fog", method=["min-max", brighter], output=tmp_path, progress=progress)
     call = f"airlight.report(['open-fog'], method=['min-max', brighter], output={str(tmp_path)!r})"
     assert handed_on["command"] == call
+
+
+def test_a_size_is_that_of_images_and_of_timed_frames(variant, images, handed_on, capsys):
+    assert run(["report", "open-fog", "--method", "unshadowed", "--size", "96x72"]) == 0
+    assert handed_on["study"].sizes == ((96, 72),)
+    assert handed_on["study"].timed_size == (96, 72)
+    assert handed_on["command"].endswith("--method unshadowed --size 96x72")
+    assert run(["report", "--images", str(images), "--size", "96x72"]) == 2
+    assert "images: they have sizes of their own; leave out size" in capsys.readouterr().err
 
 
 @pytest.fixture
