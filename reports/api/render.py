@@ -137,8 +137,8 @@ def render(
     frame
         Number of the frame in its run; of an animation, number of its first frame.
     output
-        A file to write: .exr for all layers, .png for a tone-mapped picture;
-        may be given several times.
+        A file to write: .exr for all layers, .png for a tone-mapped picture; may be given several
+        times. The command writes SCENE.png where it has none. From Python nothing is written then.
     plan
         Say what the scene needs from the method, and render nothing.
     timed

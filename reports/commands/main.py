@@ -46,6 +46,7 @@ from airlight.reports.machine.process_start import start_again_with
 from airlight.reports.studies.registry import STUDIES, endings_of, find_study
 from airlight.reports.studies.registry import study as run_study
 from airlight.reports.tables.record import Result, colours_wanted, print_json, terminal_width
+from airlight.validation.scenes.names import scene_stem
 
 DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 
@@ -108,6 +109,8 @@ _OUTPUT = Annotated[
 #: options that are not written as their parameter
 _SPELT = {"output": ("--output", "-o"), "settings": "--set"}
 _ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
+#: Options of `render` that ask for something else than a picture.
+_NO_PICTURE = ("output", "plan", "timed", "frames")
 
 
 def _shown_default(value: Any) -> Any:
@@ -197,6 +200,8 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             options |= parse_settings(list(settings))
         if "progress" in own:
             options["progress"] = True
+        if function is render and not (json or any(map(options.get, _NO_PICTURE))):
+            options["output"] = [_usual_picture(str(arguments[0]))]
         result = function(*arguments, **options)
         # A result writes itself; an integer is the exit status of the command.
         for path in files:
@@ -207,6 +212,16 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     command.__signature__ = inspect.Signature([*positional, *named])  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in (*positional, *named)}
     return command
+
+
+def _usual_picture(scene: str) -> Path:
+    """Return the file of a picture that was given no name; one that another program wrote is kept."""
+    path = Path(f"{scene_stem(scene)}.png")
+    if path.exists() and b"Software\0airlight" not in path.read_bytes()[:200]:
+        raise InputError(
+            f"output: {path} is there, and airlight did not write it; name a file with -o"
+        )
+    return path
 
 
 def _plain(words: str | None) -> str:

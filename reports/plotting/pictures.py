@@ -189,12 +189,14 @@ def error_scale() -> Picture:
 
 
 def png_bytes(picture: Picture) -> bytes:
-    """Return a picture as a PNG file."""
+    """Return a picture as a PNG file, which says who made it."""
     from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
 
-    buffer = io.BytesIO()
+    buffer, said = io.BytesIO(), PngInfo()
+    said.add_text("Software", "airlight")
     # `optimize` saves 3 % and takes six times as long
-    Image.fromarray(picture).save(buffer, format="PNG")
+    Image.fromarray(picture).save(buffer, format="PNG", pnginfo=said)
     return buffer.getvalue()
 
 

@@ -18,6 +18,12 @@ from airlight.validation.study.cost import TIMED
 SMALL = ["--size", "8x6"]
 
 
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path_factory, monkeypatch):
+    """A frame without a file writes a picture where one is."""
+    monkeypatch.chdir(tmp_path_factory.mktemp("here"))
+
+
 def run(*arguments, status=0):
     assert cli.run(["render", *arguments]) == status
 
@@ -144,3 +150,26 @@ def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pay
         with pytest.raises(InputError, match="enough"):
             airlight.render("open-fog", "unshadowed", samples=samples, timed=timed)
     assert asked == [(1, True), (4, False), (1 + TIMED, True)]
+
+
+def test_a_frame_without_a_file_writes_a_picture_and_no_file_of_another_program(
+    variant, tmp_path, monkeypatch, capsys
+):
+    from PIL import Image as Picture
+
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):  # its own picture is written again
+        run("open-fog", *SMALL)
+        assert "wrote open-fog.png: a picture, 8 x 6 pixels" in capsys.readouterr().out
+    with Picture.open("open-fog.png") as made:
+        assert made.size == (8, 6)
+        assert made.text["Software"] == "airlight"
+    run("random:7", *SMALL)
+    assert (tmp_path / "random-7.png").exists()
+    Picture.new("RGB", (2, 2)).save("sphere-spot.png")
+    before = (tmp_path / "sphere-spot.png").read_bytes()
+    run("sphere-spot", *SMALL, status=2)
+    assert "airlight did not write it; name a file with -o" in capsys.readouterr().err
+    assert (tmp_path / "sphere-spot.png").read_bytes() == before
+    run("omni-box", *SMALL, "--json")
+    assert not (tmp_path / "omni-box.png").exists()
