@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import airlight
 from airlight.reports.commands.main import run
 from airlight.validation.study.configuration import configuration
 from tests.helpers.scenes import tiny_scene
@@ -41,15 +42,22 @@ def blocks(page, language, after=""):
 
 
 @pytest.mark.claim("snippet-of-the-readme")
-def test_python_of_the_readme(tmp_path):
-    for code in blocks(ROOT / "README.md", "python"):
-        ran = subprocess.run(
-            [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-        )
-        printed = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", ran.stdout)
-        assert printed, ran.stdout
-        assert 0 < float(printed[1]) < 0.02  # 64 equi-angular steps against shadow edges
-        assert float(printed[2]) > 0
+def test_python_of_the_readme(variant, monkeypatch):
+    method, program = blocks(ROOT / "README.md", "python")
+    module = types.ModuleType("fog_of_the_readme")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec(compile(method, "README.md", "exec"), vars(module))
+    whole, half = (
+        airlight.render("open-fog", each, size=(16, 12)) for each in ("unshadowed", module.faded)
+    )
+    np.testing.assert_allclose(half.airlight, 0.5 * whole.airlight, rtol=1e-6)
+    ran = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    printed = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", ran.stdout)
+    assert printed, ran.stdout
+    assert 0 < float(printed[1]) < 0.02  # 64 equi-angular steps against shadow edges
+    assert float(printed[2]) > 0
 
 
 def run_commands(page, capfd):

@@ -111,22 +111,12 @@ def expected(name: str) -> str:
         "`airlight report`: the median time of a frame, and the error of its airlight against the "
         "reference."
     )
-    shown = Table("", _columns_of_methods(), tuple(_row(entry) for entry in chosen.values()))
-    return f"{said}\n\n{markdown(shown.only('label', 'frame', 'relative_rmse'))}"
-
-
-def _columns_of_methods() -> tuple[Column, ...]:
-    """Return the columns of methods in a scene."""
-    return (
-        Column("scene", "scene", words=True),
-        Column("label", "configuration", words=True),
-        *list(COLUMNS.values())[1:],
-    )
-
-
-def _row(entry: CellRow, **named: Any) -> Row:
-    """Return the numbers of a configuration, and words that stand with them."""
-    return Row(method_row(entry).values | {"label": entry.label} | named)
+    rows = [
+        [entry.label, number(entry.times.frame.median_ms), number(entry.error.relative_rmse, 2)]
+        for entry in chosen.values()
+        if entry.times and entry.error
+    ]
+    return f"{said}\n\n{table(('method', 'frame [ms]', 'relative RMSE'), rows)}"
 
 
 def method(name: str) -> str:
@@ -143,10 +133,16 @@ def method(name: str) -> str:
                     f"- {scene.name}, {label}: {entry.reason or entry.note or 'not measured'}"
                 )
             else:
-                rows.append(_row(entry, scene=Name(scene.name), label=label))
+                row = method_row(entry)
+                rows.append(Row(row.values | {"scene": Name(scene.name), "label": label}))
     if not rows:
         return f"The report at hand did not measure `{name}`."
-    shown = Table("", _columns_of_methods(), tuple(rows)).only("scene", "label", *_METHOD)
+    columns = (
+        Column("scene", "scene", words=True),
+        Column("label", "configuration", words=True),
+        *list(COLUMNS.values())[1:],
+    )
+    shown = Table("", columns, tuple(rows)).only("scene", "label", *_METHOD)
     parts = [markdown(shown)]
     if notes:
         parts.append("Refused or left out:\n\n" + "\n".join(notes))
