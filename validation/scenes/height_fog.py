@@ -37,7 +37,7 @@ import numpy as np
 
 from airlight.reference.scene.transforms import matrix_of
 from airlight.validation.arrays import Array
-from airlight.validation.scenes.engine_fog import ENGINES, layers_of
+from airlight.validation.scenes.engine_fog import ENGINES, fog_of_engine
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
 
@@ -121,13 +121,11 @@ def _layers(props: mi.Properties) -> tuple[dict[str, float], bool]:
     engine = str(props["engine"])
     # A parameter that the engine has but the file does not give keeps the engine's default.
     names = ENGINES[engine]["parameters"] if engine in ENGINES else ()
-    layers, clamped = layers_of(
-        engine, {name: float(props[name]) for name in names if name in props}
-    )
-    numbers = dict.fromkeys(NUMBERS, 0.0)
-    for i, layer in enumerate(layers, 1):
+    fog = fog_of_engine(engine, {name: float(props[name]) for name in names if name in props})
+    numbers = dict.fromkeys(NUMBERS, 0.0) | {"sigma_0": fog.constant}
+    for i, layer in enumerate(fog.layers, 1):
         numbers |= dict(zip((f"sigma_{i}", f"z_{i}", f"H_{i}"), layer, strict=True))
-    return numbers, clamped
+    return numbers, fog.clamped
 
 
 def _box(props: mi.Properties) -> tuple[float, float, list[float], Array]:

@@ -13,7 +13,7 @@ from airlight.analytic.height_fog import HeightFog, Layer
 from airlight.errors import InputError
 from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.scene.read import read_reference
-from airlight.validation.scenes.engine_fog import ENGINES, layers_of, parameters_of
+from airlight.validation.scenes.engine_fog import ENGINES, fog_of_engine, parameters_of
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import FOG, LAMP, SPOT, SUN, fog_xml
@@ -118,8 +118,9 @@ def test_refusals_of_the_scene(loaded):
 
 
 def _fog(engine, **given):
-    layers, clamped = layers_of(engine, given)
-    return HeightFog(tuple(Layer(*layer) for layer in layers), clamped=clamped)
+    fog = fog_of_engine(engine, given)
+    layers = tuple(Layer(*layer) for layer in fog.layers)
+    return HeightFog(layers, clamped=fog.clamped, constant=fog.constant)
 
 
 @pytest.mark.claim(
@@ -158,6 +159,22 @@ def test_hdrp_and_playcanvas():
     assert fog.density([-4.0, 1.1, 1.1 + 1 / 0.31]) == pytest.approx(
         [0.07, 0.07, 0.07 / math.e], rel=1e-12
     )
+    even = _fog("playcanvas", density=0.07, heightBase=1.1, heightFalloff=0.0)
+    assert even.density([-4.0, 1.1, 900.0]) == pytest.approx([0.07] * 3, rel=1e-15)
+
+
+@pytest.mark.claim("height-fog-engines", tolerance="1e-12 relative")
+def test_flax_has_the_analytic_fog_of_unreal_and_half_of_it_in_volumes():
+    given = {"FogDensity": 0.037, "FogHeightFalloff": 0.23, "FogHeight": 1.9}
+    analytic, volumetric = _fog("flax", **given), _fog("flax-volumetric", **given)
+    heights = [-2.0, 1.9, 14.3]
+    assert analytic.density(heights) == pytest.approx(
+        _fog("unreal", **given).density(heights), rel=1e-12
+    )
+    assert volumetric.density(1.9) == pytest.approx(0.024 * 0.037, rel=1e-12)
+    assert volumetric.density(heights) / analytic.density(heights) == pytest.approx(
+        [0.24 / math.log(2) ** 2] * 3, rel=1e-12
+    )
 
 
 def test_parameters_come_back():
@@ -166,7 +183,9 @@ def test_parameters_come_back():
         found = parameters_of(
             engine, layers, clamped=engine in ("hdrp", "playcanvas"), constant=0.0
         )
-        assert np.ravel(layers_of(engine, found)[0]) == pytest.approx(np.ravel(layers), rel=1e-12)
+        assert np.ravel(fog_of_engine(engine, found).layers) == pytest.approx(
+            np.ravel(layers), rel=1e-12
+        )
         assert isinstance(
             parameters_of(
                 engine, layers, clamped=engine not in ("hdrp", "playcanvas"), constant=0.0
