@@ -2,17 +2,20 @@
 """Pages of the site that differ from the files of the repository.
 
 Links to Python files of the project, which have no pages, become the names of the files. A notebook
-is read as the Markdown of its cells and of what they printed and showed.
+is read as the Markdown of its cells and of what they printed and showed. The first page has the
+contents of the site, `contents.txt`.
 """
 
 import json
 import re
+from pathlib import Path
 
 from sphinx.application import Sphinx
 
 _SOURCE = re.compile(
     r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)"
 )
+_CONTENTS = Path(__file__).with_name("contents.txt")
 #: Documents in the folder above, and the pages that show them.
 _PAGES = {"../DESIGN.md": "conventions.md"}
 
@@ -47,7 +50,8 @@ def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
     text = _SOURCE.sub(_code, content[0])
     for path, page in _PAGES.items():
         text = text.replace(f"]({path}", f"]({page}")
-    content[0] = text
+    contents = _CONTENTS.read_text(encoding="utf-8") if docname == "index" else ""
+    content[0] = f"{text}\n{contents}"
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
