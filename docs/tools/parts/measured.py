@@ -12,7 +12,7 @@ from airlight.reports.data import records
 from airlight.reports.tables.agreement import left_out_table
 from airlight.reports.tables.costs import cost_table
 from airlight.reports.tables.drawing import markdown
-from airlight.reports.tables.methods import COLUMNS, fastest_table, method_row
+from airlight.reports.tables.methods import COLUMNS, fastest_table, method_row, raced
 from airlight.reports.tables.papers import count_words, paper_tables
 from airlight.reports.tables.table import Column, Name, Row, Table, number
 from airlight.validation.columns import record_of
@@ -95,6 +95,9 @@ def claims() -> str:
 
 def fastest() -> str:
     """Return which method is the fastest within an error, scene by scene."""
+    # A race is between times of one run, and an old report does not say which are.
+    if not any(raced(scene.methods) for scene in kept_scenes()):
+        return "The report at hand does not say which of its times are of one run: nothing is the fastest."
     return markdown(replace(fastest_table(kept_scenes(), code=True), title=""))
 
 

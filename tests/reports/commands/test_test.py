@@ -133,18 +133,25 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
     assert capsys.readouterr().out == f"written: {tmp_path / 'record.json'}\n"
 
 
-def test_a_run_that_counted_nothing_leaves_the_record_and_fails(monkeypatch, tmp_path, capsys):
-    """Pytest that was killed, or that refused its arguments, writes no results."""
+@pytest.mark.parametrize("status", [-9, 2, 4], ids=["killed", "interrupted", "wrong arguments"])
+def test_a_run_that_did_not_end_leaves_the_record_and_fails(monkeypatch, tmp_path, capsys, status):
+    """An interrupted pytest writes its results so far, which have no failure."""
     record = tmp_path / "record.json"
     record.write_text("the run before")
+
+    def ended(words, **how):
+        (results,) = (word for word in words if word.startswith("--junit-xml="))
+        if status == 2:
+            Path(results.removeprefix("--junit-xml=")).write_text(SUITE)
+        return SimpleNamespace(returncode=status)
+
     monkeypatch.setattr(command, "RECORD", str(record))
-    killed = SimpleNamespace(run=lambda words, **how: SimpleNamespace(returncode=-9))
-    monkeypatch.setattr(command, "subprocess", killed)
+    monkeypatch.setattr(command, "subprocess", SimpleNamespace(run=ended))
     assert cli.run(["test", "--all"]) == 1
     assert record.read_text() == "the run before"
     assert (
         capsys.readouterr().err
-        == "airlight: error: pytest ended with -9 and counted no tests: no record\n"
+        == f"airlight: error: pytest ended with {status} before all tests ran: no record\n"
     )
 
 
