@@ -97,7 +97,8 @@ def fastest() -> str:
     """Return which method is the fastest within an error, scene by scene."""
     # A race is between times of one run, and an old report does not say which are.
     if not any(raced(scene.methods) for scene in kept_scenes()):
-        return "The report at hand does not say which of its times are of one run: nothing is the fastest."
+        unknown = "does not say which of its times are of one run: nothing is the fastest"
+        return f"The report at hand {unknown}."
     return markdown(replace(fastest_table(kept_scenes(), code=True), title=""))
 
 

@@ -28,7 +28,8 @@ def kept() -> dict[str, Any]:
 
 def strip() -> str:
     """Return the four scenes at the top of the first page."""
-    return f"![Four scenes lit through fog: hall, clutter, three-media, windows](gallery/{kept()['strip']['file']})"
+    words = "Four scenes lit through fog: hall, clutter, three-media, windows"
+    return f"![{words}](gallery/{kept()['strip']['file']})"
 
 
 def pictures(method: str) -> str:
@@ -59,8 +60,9 @@ def frame_and_error(method: str) -> str:
         f"![Its relative error against the reference](docs/gallery/{error['file']})",
     ]
     said = (
-        f"*`{frame['scene']}` by `{method}`, and its error against the reference: blue is too dark, red "
-        f"too bright. {error['frame_ms']:.0f} ms a frame of 480 x 360 pixels on two threads.*"
+        f"*`{frame['scene']}` by `{method}`, and its error against the reference: blue is too "
+        f"dark, red too bright. {error['frame_ms']:.0f} ms a frame of 480 x 360 pixels on two "
+        "threads.*"
     )
     return f"| {' | '.join(cells)} |\n| --- | --- |\n\n{said}"
 
@@ -85,7 +87,10 @@ def _caption(present: dict[str, dict[str, Any]]) -> str:
     )
     if "sketch" not in present:
         return text[0].upper() + text[1:]
-    how = "How it works, in `sphere-spot` seen from the side: some rays of the camera, what is lit in yellow."
+    how = (
+        "How it works, in `sphere-spot` seen from the side: some rays of the camera, what is lit in "
+        "yellow."
+    )
     return f"{how} Next to it: {text}"
 
 
