@@ -183,9 +183,8 @@ def _numbers(text):
 @pytest.fixture
 def fog(tmp_path):
     """The examples of docs/your-method.md as files; the first one's path."""
-    for name, block in zip(
-        ("fog", "plain", "kernel"), blocks(DOCS / "your-method.md", "python"), strict=True
-    ):
+    names = ("fog", "plain", "veil", "kernel")
+    for name, block in zip(names, blocks(DOCS / "your-method.md", "python"), strict=True):
         (tmp_path / f"{name}.py").write_text(block, encoding="utf-8")
     return tmp_path / "fog.py"
 
