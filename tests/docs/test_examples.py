@@ -242,7 +242,7 @@ def test_the_kernel_of_the_page(variant, tmp_path, monkeypatch):
     from airlight.validation.kernels.case_files import read_cases
     from airlight.validation.kernels.cases import integrate_cases
 
-    code = blocks(DOCS / "your-method.md", "python")[2]
+    code = blocks(DOCS / "your-method.md", "python")[-1]
     (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
     cases = read_cases(ROOT / "validation/certified/airlight_integral.csv")
