@@ -12,6 +12,7 @@ from textwrap import dedent, indent
 from typing import Any
 
 from airlight.reports.data import records
+from parts.listed import table
 
 #: The purposes of readers, and the names that serve each; a public name in none of them
 #: ends the build.
@@ -54,8 +55,7 @@ def names() -> str:
         for topic, words in TOPICS.items()
         for number, name in enumerate(words.split())
     ]
-    lines = ["| for | name | what it is |", "| --- | --- | --- |"]
-    return "\n".join(lines + [f"| {topic} | {link} | {words} |" for topic, link, words in rows])
+    return table(("for", "name", "what it is"), rows, 3)
 
 
 def signatures() -> str:

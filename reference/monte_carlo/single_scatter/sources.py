@@ -138,25 +138,31 @@ class _Near(ABC):
         return Path(begin + hair, way / length, length, medium=self.medium)
 
 
-@dataclass(frozen=True)
-class PointSource(_Near):
+@dataclass(frozen=True, kw_only=True)
+class _Placed(_Near):
+    """Lights of one place each."""
+
+    position: "mi.Point3d"  #: [m]
+    medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
+    varies = False
+
+    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
+        """Return its place, for every sample."""
+        return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointSource(_Placed):
     """Point lights, one or several."""
 
     intensity: "mi.Color3f"  #: of each, the same in all directions [W/sr]
-    position: "mi.Point3d"  #: of each [m]
     count: int = 1
-    medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
-    varies = False
 
     def light(self, number: "mi.UInt32") -> Self:
         """Return one of the lights."""
         intensity = dr.gather(mi.Color3f, self.intensity, number)
         position = dr.gather(mi.Point3d, self.position, number)
         return replace(self, intensity=intensity, position=position, count=1)
-
-    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
-        """Return its place, for every sample."""
-        return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
 
     def sent(
         self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
@@ -169,20 +175,13 @@ class PointSource(_Near):
         return -dr.inf, dr.inf
 
 
-@dataclass(frozen=True)
-class SpotSource(_Near):
+@dataclass(frozen=True, kw_only=True)
+class SpotSource(_Placed):
     """A spot."""
 
     emitter: "mi.Emitter"
     axis: "mi.Vector3d"  #: unit vector
     cutoff: float  #: half angle of the cone [rad]
-    position: "mi.Point3d"  #: [m]
-    medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
-    varies = False
-
-    def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
-        """Return its place, for every sample."""
-        return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
 
     def sent(
         self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
@@ -309,7 +308,9 @@ def _point_lights(emitters: Sequence["mi.Emitter"]) -> PointSource:
         places[:, number] = np.ravel(sample.p)
         intensities[:, number] = np.ravel(irradiance * sample.dist * sample.dist)
     # An array for each coordinate: cut out of one, their kernels would hold how many there are.
-    return PointSource(mi.Color3f(*intensities), mi.Point3d(*places), len(emitters))
+    return PointSource(
+        position=mi.Point3d(*places), intensity=mi.Color3f(*intensities), count=len(emitters)
+    )
 
 
 def _source(emitter: "mi.Emitter") -> Source:
@@ -318,4 +319,6 @@ def _source(emitter: "mi.Emitter") -> Source:
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
-    return SpotSource(emitter, axis, math.radians(cutoff), mi.Point3d(sample.p))
+    return SpotSource(
+        position=mi.Point3d(sample.p), emitter=emitter, axis=axis, cutoff=math.radians(cutoff)
+    )
