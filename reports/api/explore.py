@@ -65,9 +65,6 @@ def describe(
     files = output_files(output, ".glb", ".vol")
     check_scene(scene)
     changes = changes_of(change)
-    from airlight.reports.machine.environment import activate
-
-    activate()
     from airlight.reports.api.scenes import opened
     from airlight.reports.interchange.gltf import write_gltf
     from airlight.reports.interchange.scene import describe_scene

@@ -50,9 +50,6 @@ def rays(scene: SceneLike, size: Size | None = None) -> CameraRays:
     ((24, 32, 3), (24, 32))
     """
     check_scene(scene)
-    from airlight.reports.machine.environment import activate
-
-    activate()
     from airlight.reference.quadrature.surface import surface_hits
     from airlight.reference.scene.read import read_reference
     from airlight.reference.visibility.distances import exact_distance

@@ -73,9 +73,6 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     '1 point'
     """
     check_scene(scene)
-    from airlight.reports.machine.environment import activate
-
-    activate()
     from airlight.reports.api.scenes import opened
 
     return opened(scene, size)
