@@ -61,7 +61,7 @@ def main() -> None:
 def read(path: str) -> dict[str, Any]:
     """Return the properties of a scene that `describe` printed."""
     with open(path, encoding="utf-8") as stream:
-        return cycles_properties(json.load(stream))
+        return cycles_properties(json.load(stream)["result"])
 
 
 def build(properties: dict[str, Any], gltf: str) -> None:

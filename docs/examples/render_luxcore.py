@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=4096, help="paths per pixel")
     chosen = parser.parse_args()
     with open(chosen.described, encoding="utf-8") as stream:
-        described = json.load(stream)
+        described = json.load(stream)["result"]
     pyluxcore.Init()
     scene = pyluxcore.Scene()
     scene.Parse(properties(media(described) | camera(described) | lights(described["lights"])))

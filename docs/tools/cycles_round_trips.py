@@ -110,6 +110,7 @@ def render_faults(
     root
         The checkout.
     """
+    from airlight.reports.api.explore import Description
     from airlight.reports.interchange.gltf import write_gltf
     from airlight.reports.interchange.scene import describe_scene
     from airlight.validation.scenes.loading import load_scene
@@ -117,7 +118,8 @@ def render_faults(
     folder.mkdir(parents=True, exist_ok=True)
     loaded = load_scene(scene, size)
     described, gltf = folder / "described.json", folder / "meshes.glb"
-    described.write_text(json.dumps(describe_scene(loaded)), encoding="utf-8")
+    said = Description(described=describe_scene(loaded)).enveloped("airlight describe")
+    described.write_text(json.dumps(said), encoding="utf-8")
     write_gltf(gltf, loaded)
     wanted = [
         fault for fault in faults or _listed(python, root) if not (folder / f"{fault}.exr").exists()

@@ -32,8 +32,13 @@ from airlight.validation.scenes.names import check_scene, is_random, scene_names
 
 if TYPE_CHECKING:
     from airlight.reference.storage.exr import Image
-    from airlight.reports.api.comparisons import Fitted, ImageComparison, SceneComparison
-    from airlight.reports.tables.record import Said
+    from airlight.reports.api.comparisons import (
+        FittedFog,
+        FramesComparison,
+        ImageComparison,
+        ImageDiagnosis,
+        SceneComparison,
+    )
 
 
 @one_error
@@ -52,7 +57,7 @@ def compare(
     frames: File | None = None,
     output: Files = (),
     progress: Progress = None,
-) -> "ImageComparison | SceneComparison | Fitted | Said":
+) -> "ImageComparison | SceneComparison | ImageDiagnosis | FramesComparison | FittedFog":
     """Compare an image with another, or with the reference of a scene.
 
     The result has the bias and quantiles of the error, and statistics if there are standard errors.
@@ -216,7 +221,9 @@ def _are_several(test: Any) -> bool:
     return isinstance(test, str | os.PathLike) and "#" in str(test) and not Path(test).exists()
 
 
-def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "Said":
+def _several(
+    scene: str, test: Any, frames: Any, *, progress: Any, **how: Any
+) -> "FramesComparison":
     """Compare frames that `frames` tells of, or independent renders."""
     # The number of a frame is read from the name of its file.
     if not isinstance(test, str | os.PathLike):
@@ -224,7 +231,7 @@ def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -
             "frames: expected the files of all frames, such as 'frames/####.exr'; save the images "
             "first"
         )
-    from airlight.reports.api.comparisons import frames_comparison
+    from airlight.reports.api.comparisons import FramesComparison
     from airlight.reports.machine.environment import activate
     from airlight.validation.motion.judge import compare_frames
     from airlight.validation.motion.noise import compare_runs
@@ -237,7 +244,7 @@ def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -
             if frames is None
             else compare_frames(scene, test, frames, **how)
         )
-    return frames_comparison(compared)
+    return FramesComparison(compared=compared)
 
 
 def _is_scene(word: Any) -> bool:
@@ -364,7 +371,7 @@ def _with_scene(
     progress: Any,
     **options: Any,
 ) -> "SceneComparison":
-    from airlight.reports.api.comparisons import scene_comparison, write_difference
+    from airlight.reports.api.comparisons import SceneComparison, write_difference
     from airlight.validation.engine.judge import compare_scene
 
     # The command that the result prints names the mask as a file.
@@ -379,16 +386,16 @@ def _with_scene(
     compared = dataclasses.replace(comparison, path=name)
     images = compared.reference, compared.image
     said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
-    return scene_comparison(compared, said)
+    return SceneComparison(compared=compared, files=said)
 
 
-def _diagnose(scene: str, path: Path, name: str, *, progress: Any, **how: Any) -> "Said":
-    from airlight.reports.api.comparisons import diagnosed
+def _diagnose(scene: str, path: Path, name: str, *, progress: Any, **how: Any) -> "ImageDiagnosis":
+    from airlight.reports.api.comparisons import ImageDiagnosis
     from airlight.validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
         found = diagnose_file(path, scene, progress=tell, **how)
-    return diagnosed([dataclasses.replace(each, path=name) for each in found])
+    return ImageDiagnosis(diagnoses=tuple(dataclasses.replace(each, path=name) for each in found))
 
 
 def _fit(
@@ -401,7 +408,7 @@ def _fit(
     mask: Any,
     progress: Any,
     **how: Any,
-) -> "Fitted":
+) -> "FittedFog":
     from airlight.validation.readers import named_values
 
     # sigma_t=0.1 is a parameter and where its search starts; a name alone starts at the scene.
@@ -417,7 +424,7 @@ def _fit(
     from airlight.reports.machine.environment import activate
 
     activate()
-    from airlight.reports.api.comparisons import fitted
+    from airlight.reports.api.comparisons import FittedFog
     from airlight.validation.engine.observation import judged_layer, scene_of_size
     from airlight.validation.fit.fit import fit_image
 
@@ -436,4 +443,4 @@ def _fit(
             progress=tell,
             **how,
         )
-    return fitted(result)
+    return FittedFog(fit=result)

@@ -25,12 +25,12 @@ from airlight.reports.plotting.pictures import (
     tone_mapped,
     write_png,
 )
-from airlight.reports.tables.record import Said
+from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Interval, Table, numbers, table, words
 from airlight.validation.columns import plain
 from airlight.validation.comparison.images import Comparison, shown
 from airlight.validation.engine.diagnose import Diagnosis
-from airlight.validation.engine.judge import EngineComparison
+from airlight.validation.engine.judge import EngineComparison, Verdict
 from airlight.validation.fit.fit import Fit
 from airlight.validation.fit.fit import Fitted as FittedParameter
 from airlight.validation.metrics.errors import Metrics, colours
@@ -46,11 +46,6 @@ class ImageComparison(Comparison, Pictured):
     test: Array  #: the same layer of the image under test
     names: tuple[str, str] = ("the reference", "the test image")
     files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
-
-    @property
-    def passed(self) -> bool:
-        """Whether the test image has no fault; `failures` names the faults."""
-        return not self.failures
 
     @cached_property
     def error(self) -> Array:
@@ -128,50 +123,97 @@ class ImageComparison(Comparison, Pictured):
         )
 
 
-class SceneComparison(Said):
-    """How far an image is from the reference of a scene; `of` has every number."""
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SceneComparison(Result):
+    """How far an image is from the reference of a scene."""
+
+    compared: EngineComparison  #: every number
+    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
 
     @property
     def metrics(self) -> Metrics:
         """The errors."""
-        compared: EngineComparison = self.of
-        return compared.comparison.metrics
+        return self.compared.comparison.metrics
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the image is right, within the margin."""
+        return self.compared.verdict
+
+    @property
+    def title(self) -> str:
+        """The compared layer, image and scene."""
+        compared = self.compared
+        return f"{compared.comparison.layer} of {compared.path} against {compared.scene}"
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.compared.scene
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The numbers, a line for each group."""
+        return [*self.compared.summary().split("\n"), *_difference_lines(self.files)]
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The faults of the image."""
+        return self.compared.comparison.failures
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the numbers of two images, and beside them those of the scene."""
+        data = plain(self.compared)
+        return data.pop("comparison") | data | _differences(self.files)
 
 
-def scene_comparison(
-    compared: EngineComparison, files: Sequence[tuple[str, str]] = ()
-) -> SceneComparison:
-    """Return a comparison as a result; `files` are differences that were
-    written, and what they show.
-    """
-    return SceneComparison(
-        name=f"{compared.comparison.layer} of {compared.path} against {compared.scene}",
-        data=plain(compared) | _differences(files),
-        lines=[*compared.summary().split("\n"), *_difference_lines(files)],
-        good=not compared.comparison.failures,
-        of=compared,
-    )
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ImageDiagnosis(Result):
+    """The faults of an image: of its airlight and its surfaces where it has both as layers."""
 
+    diagnoses: tuple[Diagnosis, ...]  #: one for each layer
 
-def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
-    """Return what is wrong with an image: with each of airlight and surfaces
-    where it has both as layers.
-    """
-    # JSON has the first diagnosis under `diagnosis`, and all of them under `layers` where there are
-    # several.
-    several = plain(diagnoses)
-    # Nothing was looked for where an image is right or black.
-    searched = [each for each in diagnoses if len(each.ranked) > 1]
-    said = "left: mean relative error without the fault; evidence: a score against `right`."
-    return Said(
-        name=f"{diagnoses[0].path} of {diagnoses[0].scene}: {diagnoses[0].first}",
-        data={"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {}),
-        claims=[line for each in diagnoses for line in each.lines],
-        tables=[_ranked(each) for each in searched],
-        lines=[said] if searched else [],
-        good=not any(diagnosis.failures for diagnosis in diagnoses),
-        of=diagnoses,
-    )
+    @property
+    def first(self) -> str:
+        """The name of what explains the first layer: a fault, 'right', 'black' or 'unexplained'."""
+        return self.diagnoses[0].first
+
+    @property
+    def title(self) -> str:
+        """The image, the scene and the first explanation."""
+        one = self.diagnoses[0]
+        return f"{one.path} of {one.scene}: {one.first}"
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.diagnoses[0].scene
+
+    @property
+    def claims(self) -> Sequence[str]:
+        """The explanations, in sentences."""
+        return [line for each in self.diagnoses for line in each.lines]
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The likeliest faults; none where nothing was looked for, as the image is right or black."""
+        return [_ranked(each) for each in self.diagnoses if len(each.ranked) > 1]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The meaning of the columns."""
+        said = "left: mean relative error without the fault; evidence: a score against `right`."
+        return [said] if self.tables else []
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The faults of the file."""
+        return [reason for each in self.diagnoses for reason in each.failures]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the first diagnosis, and those of all layers where there are several."""
+        several = plain(self.diagnoses)
+        return {"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {})
 
 
 def _ranked(diagnosis: Diagnosis) -> Table:
@@ -186,47 +228,92 @@ def _ranked(diagnosis: Diagnosis) -> Table:
     return table(f"Faults of the {diagnosis.layer}, by their evidence", columns, rows)
 
 
-def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:
-    """Return how far frames are from the reference of each, or independent renders from theirs."""
-    return Said(
-        name=f"{compared.files} against {compared.scene}",
-        lines=compared.lines,
-        good=not compared.failures,
-        of=compared,
-    )
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FramesComparison(Result):
+    """How far frames are from the reference of each, or independent renders from theirs."""
+
+    compared: MotionComparison | NoiseComparison  #: every number
+
+    @property
+    def title(self) -> str:
+        """The files and the scene."""
+        return f"{self.compared.files} against {self.compared.scene}"
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.compared.scene
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The numbers, a line for each group."""
+        return self.compared.lines
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Whatever was changed or left out when the files were read."""
+        return self.compared.notes
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The reasons for which the comparison must be called failed."""
+        return self.compared.failures
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every number."""
+        return plain(self.compared)
 
 
-class Fitted(Said):
-    """The parameters of the fog that explain an image; `of` has every number."""
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FittedFog(Result):
+    """The parameters of the fog that explain an image."""
+
+    fit: Fit  #: every number
 
     def __getitem__(self, name: str) -> FittedParameter:
         """Return a parameter, or a channel of it such as 'sigma_t.r': its
         value, low, high and scene.
         """
-        fit: Fit = self.of
-        return {each.name: each for each in fit.parameters}[name]
+        return {each.name: each for each in self.fit.parameters}[name]
 
+    @property
+    def title(self) -> str:
+        """The image, the scene, the fitted values, and the error that they leave."""
+        fit = self.fit
+        values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
+        return f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}"
 
-def fitted(fit: Fit) -> Fitted:
-    """Return a fit as a result."""
-    values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
-    # A row is a parameter: the fitted value and its 95 % interval, beside the value in the scene.
-    columns = numbers(
-        value="value", interval="95 % interval", scene="in the scene", how={"digits": 6}
-    )
-    rows = [
-        (each.name, each.value, Interval.of((each.low, each.high)), each.scene)
-        for each in fit.parameters
-    ]
-    return Fitted(
-        name=f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}",
-        tables=(
-            table("Parameters that explain the image", (*words(name="parameter"), *columns), rows),
-        ),
-        lines=fit.lines,
-        good=not fit.failures,
-        of=fit,
-    )
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.fit.scene
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A row for each parameter: its value with the 95 % interval, and that in the scene."""
+        columns = numbers(
+            value="value", interval="95 % interval", scene="in the scene", how={"digits": 6}
+        )
+        rows = [
+            (each.name, each.value, Interval.of((each.low, each.high)), each.scene)
+            for each in self.fit.parameters
+        ]
+        columns = (*words(name="parameter"), *columns)
+        return [table("Parameters that explain the image", columns, rows)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The explanation, in sentences."""
+        return self.fit.lines
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The faults of the file."""
+        return self.fit.failures
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every number."""
+        return plain(self.fit)
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:

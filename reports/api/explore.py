@@ -3,6 +3,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from airlight.reports.api.inputs import (
     output_files,
     pixels_of,
 )
-from airlight.reports.tables.record import Said
+from airlight.reports.tables.record import Result
+from airlight.reports.tables.table import Table
 from airlight.validation.scenes.names import check_scene
 
 
@@ -34,7 +36,7 @@ def describe(
     size: Size | None = None,
     output: Files = (),
     progress: Progress = None,
-) -> Said:
+) -> "Description":
     """Describe everything that another renderer needs to render a scene.
 
     The description has the camera, media, lights and surfaces, what the pixels contain and which
@@ -68,6 +70,7 @@ def describe(
     from airlight.reports.api.scenes import opened
     from airlight.reports.interchange.gltf import write_gltf
     from airlight.reports.interchange.scene import describe_scene
+    from airlight.validation.scenes.changes import change_words
 
     loaded = opened(scene, size, changes)
     # A .vol file holds a medium that varies, sampled to a grid; every other file is glTF.
@@ -76,39 +79,67 @@ def describe(
     written = [write_gltf(path, loaded) for path in files if path not in volumes]
     grids = [_write_grid(path, loaded.scene) for path in volumes]
     note(progress, described["notes"])
-    return _said(described, changes, written[-1] if written else None, grids[-1] if grids else "")
-
-
-def _said(
-    described: Mapping[str, Any],
-    changes: Mapping[str, Sequence[float]],
-    written: Mapping[str, Any] | None,
-    grid: str,
-) -> Said:
-    """Return a description, with the glTF file and the medium that reads
-    the volume file, as XML.
-    """
-    from airlight.reports.interchange.words import description_table
-    from airlight.validation.scenes.changes import change_words
-
-    # The next step of the user, who renders the scene elsewhere and judges the image here.
-    changed = change_words(changes)
-    options = [word for change in changed for word in ("--change", change)]
-    command = shlex.join(
-        ["airlight", "compare", described["source"], described["file"]["name"], *options]
+    return Description(
+        described=described,
+        changes=tuple(change_words(changes)),
+        gltf=written[-1] if written else None,
+        grid=grids[-1] if grids else "",
     )
-    lines = [f"to judge it: {command}"]
-    if written is not None:
-        # glTF knows triangles only: shapes that Mitsuba intersects in closed form have become
-        # meshes, which the user must know when the silhouettes differ.
-        cut = ", ".join(written["tessellated"])
-        more = f"; cut into triangles: {cut}" if cut else ""
-        lines.append(f"{written['path']}: {written['triangles']} triangles{more}")
-    lines += [f"the fog as a grid: {grid}"] if grid else []
-    files = ({} if written is None else {"gltf": written}) | ({"grid": grid} if grid else {})
-    tables = (description_table(described),)
-    data = {**described, **({"changes": changed} if changed else {}), **files}
-    return Said(name=described["scene"], data=data, tables=tables, lines=lines)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Description(Result):
+    """Everything that another renderer needs to render a scene."""
+
+    described: Mapping[str, Any]  #: see `reports.interchange.scene.describe_scene`
+    changes: tuple[str, ...] = ()  #: of the scene, in words
+    gltf: Mapping[str, Any] | None = None  #: the glTF file that was written
+    grid: str = ""  #: the medium that reads the volume file that was written, as XML
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a part of the description, such as 'camera' or 'lights'."""
+        return self.described[name]
+
+    @property
+    def title(self) -> str:
+        """The scene."""
+        return str(self.described["scene"])
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.title
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Remarks on the scene."""
+        return self["notes"]
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The camera, the media, the lights and the surfaces, with units of engines."""
+        from airlight.reports.interchange.words import description_table
+
+        return [description_table(self.described)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The command that judges an image, and the files that were written."""
+        options = [word for change in self.changes for word in ("--change", change)]
+        command = ["airlight", "compare", self["source"], self["file"]["name"], *options]
+        lines = [f"to judge it: {shlex.join(command)}"]
+        if self.gltf is not None:
+            # glTF knows triangles only: shapes that Mitsuba intersects in closed form have become
+            # meshes, which the user must know when the silhouettes differ.
+            cut = ", ".join(self.gltf["tessellated"])
+            more = f"; cut into triangles: {cut}" if cut else ""
+            lines.append(f"{self.gltf['path']}: {self.gltf['triangles']} triangles{more}")
+        return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the description, its changes, and the files that were written."""
+        own = {"changes": list(self.changes), "gltf": self.gltf, "grid": self.grid}
+        return {**self.described, **{name: value for name, value in own.items() if value}}
 
 
 def _write_grid(path: Path, scene: Any) -> str:

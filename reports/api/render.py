@@ -38,9 +38,8 @@ from airlight.reports.api.inputs import (
 from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
-    from airlight.reports.api.results import RenderedFrames, Rendering
+    from airlight.reports.api.results import Plan, RenderedFrames, Rendering
     from airlight.reports.api.scenes import OpenScene
-    from airlight.reports.tables.record import Said
     from airlight.validation.study.configuration import Configuration
 
 _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
@@ -97,7 +96,7 @@ def render(
     timed: bool = False,
     progress: Progress = None,
     **parameters: Any,
-) -> "Rendering | RenderedFrames | Said":
+) -> "Rendering | RenderedFrames | Plan":
     """Render a frame or an animation; say what a frame costs.
 
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours
@@ -493,15 +492,13 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
     return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
 
 
-def _plan(asked: _Asked) -> "Said":
+def _plan(asked: _Asked) -> "Plan":
     """Return the features that a scene needs."""
     from airlight.realtime.scene.read_scene import describe
-    from airlight.reports.tables.record import Said
+    from airlight.reports.api.results import Plan
 
     loaded, read = asked.read()
-    words, notes = describe(read), read.features.notes
-    lines = [*(f"{name}: {said}" for name, said in words.items()), *notes]
-    return Said(name=loaded.name, data={"plan": words, "notes": list(notes)}, lines=lines)
+    return Plan(scene=loaded.name, plan=describe(read), notes=tuple(read.features.notes))
 
 
 def _warnings(renderer: Any) -> tuple[str, ...]:

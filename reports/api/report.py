@@ -8,7 +8,7 @@ import os
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -30,13 +30,16 @@ from airlight.reports.api.inputs import (
     telling,
 )
 from airlight.reports.tables.drawing import html
-from airlight.reports.tables.record import Result, Said, block, bullets
+from airlight.reports.tables.record import Result, block, bullets
 from airlight.reports.tables.table import Table
+from airlight.validation.columns import plain
 from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
     from airlight.reports.data import records
+    from airlight.reports.diff.compare import Difference
     from airlight.validation.engine.images import EngineImage
+    from airlight.validation.papers.claims import Claim
     from airlight.validation.study.study import Study
 
 FOLDER = "airlight-report"  #: where a report is written by default
@@ -76,9 +79,14 @@ class Report(Result):
         return own_faults(row for scene in self.data.scenes for row in scene.methods)
 
     @property
-    def passed(self) -> bool:
-        """Whether the reference is confirmed and no user method is at fault."""
-        return self.confirmed and not self.faults
+    def failures(self) -> Sequence[str]:
+        """The faults of user methods, and a reference that is not confirmed."""
+        return [*self.faults, *([] if self.confirmed else ["the reference is not confirmed"])]
+
+    @property
+    def scene_name(self) -> str | None:
+        """The scene of a report of one."""
+        return self.data.scenes[0].name if len(self.data.scenes) == 1 else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of report.json."""
@@ -476,7 +484,7 @@ def diff(
     new: File,
     *,
     time_tolerance: float = 0.25,
-) -> Said:
+) -> "ReportDifference":
     """Compare two reports: what got slower or less accurate.
 
     The result also has what got better, what is new and what is gone.
@@ -497,19 +505,50 @@ def diff(
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     """
     from airlight.reports.data.records import read_report
-    from airlight.reports.diff.compare import compare_reports, difference_lines, difference_tables
+    from airlight.reports.diff.compare import compare_reports
 
     # An infinite tolerance leaves times out.
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
-    comparison = compare_reports(*reports, time_tolerance=tolerance)
-    return Said(
-        name=f"{new} against {old}",
-        tables=difference_tables(comparison),
-        lines=difference_lines(comparison),
-        good=not comparison.worse,
-        of=comparison,
-    )
+    found = compare_reports(*reports, time_tolerance=tolerance)
+    return ReportDifference(old=str(old), new=str(new), difference=found)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ReportDifference(Result):
+    """The differences of two reports."""
+
+    old: str  #: file or folder
+    new: str
+    difference: "Difference"  #: every finding
+
+    @property
+    def title(self) -> str:
+        """The two reports."""
+        return f"{self.new} against {self.old}"
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The findings, the worse ones first."""
+        from airlight.reports.diff.compare import difference_tables
+
+        return difference_tables(self.difference)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """How much was compared."""
+        from airlight.reports.diff.compare import difference_lines
+
+        return difference_lines(self.difference)
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The findings that are worse."""
+        return [each.words for each in self.difference.findings if each.verdict == "worse"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every finding."""
+        return plain(self.difference)
 
 
 @one_error
@@ -519,7 +558,7 @@ def paper(
     figures: File | None = None,
     quick: bool = False,
     progress: Progress = None,
-) -> Said:
+) -> "PaperVerdicts":
     """Give a verdict on every claim of the papers.
 
     Equations, figures, tables and sentences stand next to what was measured. A verdict is
@@ -548,8 +587,6 @@ def paper(
     from airlight.reference.storage.store import date
     from airlight.reports.machine.environment import activate, describe_environment
     from airlight.reports.report.others import measure_claims
-    from airlight.reports.tables.papers import count_words, paper_tables
-    from airlight.validation.columns import plain
     from airlight.validation.papers.claims import claims, papers
 
     # The names are known without Mitsuba.
@@ -569,20 +606,46 @@ def paper(
 
         with telling(progress, "figures") as tell:
             written = write_figures(Path(figures), name, quick=quick, progress=tell)
-    # Rows that `quick` did not measure are counted, never passed over in silence.
-    left_out = len(chosen) - len(rows)
-    # Context rows without a verdict belong to no count.
-    counted = count_words([row for row in rows if row.verdict is not None])
-    lines = [
-        f"{counted}.",
-        *([f"{left_out} more rows need images: leave out --quick."] if left_out else []),
-        *written,
-    ]
-    data = {
-        "measured": date(),
-        "environment": describe_environment(),
-        "papers": plain(rows),
-        "left_out": left_out,
-    }
-    tables = paper_tables(rows, plain=name is not None)
-    return Said(name=counted, data=data, tables=tables, lines=lines, of=tuple(rows))
+    return PaperVerdicts(
+        measured=date(),
+        environment=describe_environment(),
+        papers=tuple(rows),
+        # Rows that `quick` did not measure are counted, never passed over in silence.
+        left_out=len(chosen) - len(rows),
+        files=written,
+        numbers=name is not None,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PaperVerdicts(Result):
+    """The claims of papers with their verdicts."""
+
+    measured: str  #: date
+    environment: Mapping[str, Any]
+    papers: "tuple[Claim, ...]"
+    left_out: int  #: claims that were not measured
+    files: tuple[str, ...] = field(default=(), repr=False)  #: figures that were written
+    #: whether tables also have the numbers of a paper that have no verdict
+    numbers: bool = field(default=False, repr=False)
+
+    @property
+    def title(self) -> str:
+        """How many claims have each verdict."""
+        from airlight.reports.tables.papers import count_words
+
+        # Numbers without a verdict belong to no count.
+        return count_words([row for row in self.papers if row.verdict is not None])
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A table of verdicts for each paper, and its numbers."""
+        from airlight.reports.tables.papers import paper_tables
+
+        return paper_tables(self.papers, plain=self.numbers)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The counts, and the figures that were written."""
+        more = [f"{self.left_out} more rows need images: leave out --quick."]
+        return [f"{self.title}.", *(more if self.left_out else []), *self.files]

@@ -73,10 +73,21 @@ class Pictured(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LayeredImage(Pictured):
-    """Layers of radiance and the depth, shared by renderings and references; see the module."""
+class OfScene(Result):
+    """A result that is about one scene."""
 
     scene: str  #: name of the scene
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.scene
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LayeredImage(Pictured, OfScene):
+    """Layers of radiance and the depth, shared by renderings and references; see the module."""
+
     #: the layers as they are written to a file, with what made them
     image: Image = field(repr=False)
 
@@ -287,9 +298,10 @@ class Reference(LayeredImage):
         return super().to_dict() | plain({"means": means, **known})
 
     @property
-    def passed(self) -> bool:
-        """Whether the error that was asked for is known to be reached."""
-        return not isinstance(self.how, MonteCarloReference) or self.how.reached is not False
+    def failures(self) -> Sequence[str]:
+        """The error that was asked for, where it is not known to be reached."""
+        missed = isinstance(self.how, MonteCarloReference) and self.how.reached is False
+        return ["the target error was not reached"] if missed else []
 
     @property
     def lines(self) -> Sequence[str]:
@@ -336,7 +348,7 @@ class Reference(LayeredImage):
             # - 1)); from 32 batches on it is below 13 % and not worth a line.
             known = 100 / (2 * (batches - 1)) ** 0.5
             lines.append(f"  a standard error from {batches} {kind} is known to {known:.0f} % only")
-        return lines if self.passed else [*lines, "  the target error was not reached"]
+        return [*lines, *(f"  {failure}" for failure in self.failures)]
 
     @property
     def title(self) -> str:
@@ -353,10 +365,9 @@ def _error_words(how: MonteCarloReference) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class RenderedFrames(Result):
+class RenderedFrames(OfScene):
     """The frames of an animation, which were written as files, and what they cost."""
 
-    scene: str
     method: str
     moves: tuple[str, ...]
     size: tuple[int, int]
@@ -392,6 +403,24 @@ class RenderedFrames(Result):
             )
             lines.append(f"wrote {f'{own[0]}: what changes' if ending == '.json' else pixels}")
         return lines
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Plan(OfScene):
+    """The features that a scene needs of a method."""
+
+    plan: Mapping[str, str]  #: by feature, in words
+    notes: tuple[str, ...] = ()  #: on the scene
+
+    @property
+    def title(self) -> str:
+        """The scene."""
+        return self.scene
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """A line for each feature, and the notes."""
+        return [*(f"{name}: {said}" for name, said in self.plan.items()), *self.notes]
 
 
 def write_image(

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from airlight.errors import InputError
 from airlight.reports.api.inputs import File, Progress, exclude, one_error, telling
-from airlight.reports.tables.record import Result, Said
+from airlight.reports.tables.record import Result
+from airlight.reports.tables.table import Table
+from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from airlight.reports.cluster.connect import Place
     from airlight.reports.cluster.run import Group, Task
+    from airlight.reports.sweep.summary import Summary
     from airlight.validation.study.keys import Made
     from airlight.validation.study.rows import RowStore
     from airlight.validation.study.study import Cell, Study
@@ -32,6 +35,11 @@ class Problem:
     label: str
     status: str
     reason: str | None
+
+    @property
+    def words(self) -> str:
+        """The problem in a line."""
+        return f"{self.status}: {self.scene}, {self.label}: {self.reason}"
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -51,9 +59,10 @@ class SweepRun(Result):
     parquet: str | None
 
     @property
-    def passed(self) -> bool:
-        """Whether no cell failed, hung or aborted, and none is left."""
-        return not (self.problems or self.left)
+    def failures(self) -> Sequence[str]:
+        """The cells that failed, hung or aborted, and how many are left."""
+        left = [f"{self.left} cells are left"] if self.left else []
+        return [each.words for each in self.problems] + left
 
     @property
     def title(self) -> str:
@@ -70,9 +79,7 @@ class SweepRun(Result):
         lines += [f"  {self.timed_alone} timed alone"] if self.timed_alone else []
         lines += [f"  {status}: {number}" for status, number in sorted(self.counts.items())]
         # Problems are listed one a line; the numbers of the others are in the rows.
-        lines += [
-            f"  {each.status}: {each.scene}, {each.label}: {each.reason}" for each in self.problems
-        ]
+        lines += [f"  {each.words}" for each in self.problems]
         if self.parquet:
             lines += [
                 f"  rows in {self.parquet}",
@@ -89,7 +96,7 @@ def sweep(
     output: File | None = None,
     from_: File | None = None,
     progress: Progress = None,
-) -> SweepRun | Said:
+) -> "SweepRun | SweepFindings":
     """Run every method over many scenes: a row of numbers each.
 
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell
@@ -128,7 +135,10 @@ def sweep(
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
         exclude("from", "computes no cells", {"the study": study, "cluster": cluster})
-        return _findings(Path(from_), None if output is None else Path(output))
+        from airlight.reports.sweep.page import write_sweep
+
+        said, page = write_sweep(Path(from_), None if output is None else Path(output))
+        return SweepFindings(page=page, said=said)
     from airlight.reports.cluster.connect import parse_place
     from airlight.validation.study.rows import RowStore
     from airlight.validation.study.study import default_study, read_study
@@ -154,20 +164,40 @@ def sweep(
         return replace(ran, parquet=str(store.write_parquet()))
 
 
-def _findings(source: Path, target: Path | None) -> Said:
-    """Write what the rows of a sweep say, and return it."""
-    from airlight.reports.sweep.page import write_sweep
-    from airlight.reports.sweep.tables import errors_table, speed_table
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SweepFindings(Result):
+    """The findings of a sweep, which were written as a page."""
 
-    said, page = write_sweep(source, target)
-    count = f"{said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells"
-    return Said(
-        name=str(page),
-        claims=[f"{each.kind}: {each.text}" for each in said.headlines],
-        tables=(errors_table(said), speed_table(said)),
-        lines=(f"{page}: {count}",),
-        of=said,
-    )
+    page: Path
+    said: "Summary"  #: every number
+
+    @property
+    def title(self) -> str:
+        """The page."""
+        return str(self.page)
+
+    @property
+    def claims(self) -> Sequence[str]:
+        """The most important sentences."""
+        return [f"{each.kind}: {each.text}" for each in self.said.headlines]
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The errors and the speed of each configuration."""
+        from airlight.reports.sweep.tables import errors_table, speed_table
+
+        return [errors_table(self.said), speed_table(self.said)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Where the page is, and how much it is about."""
+        said = self.said
+        count = f"{said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells"
+        return [f"{self.page}: {count}"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every number."""
+        return plain(self.said)
 
 
 def _run(

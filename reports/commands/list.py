@@ -2,18 +2,20 @@
 """`airlight.list`: the built-in scenes, methods, kernels, studies and papers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from airlight.errors import InputError, nearest
 from airlight.reports.tables.drawing import text_of
-from airlight.reports.tables.record import Said
+from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, table, words
 
 _LONG = {"long": True}
 
 
-def list(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Said:
+def list(
+    what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None,
+) -> "Listing":
     """List the built-in scenes, methods, kernels, studies and papers.
 
     The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
@@ -34,16 +36,37 @@ def list(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | No
         raise InputError(
             f"list: got {what!r}, expected one of {', '.join(kinds)}" + nearest(what, kinds)
         )
-    # One list is a table without a title; all lists together have titles to tell them apart.
-    if what is not None:
-        shown = kinds[what]()
-        return Said(name=what, data=_data(shown), tables=(shown,))
-    tables = {kind: replace(made(), title=kind.capitalize()) for kind, made in kinds.items()}
-    return Said(
-        name="list",
-        data={kind: _data(each) for kind, each in tables.items()},
-        tables=[*tables.values()],
-    )
+    asked = tuple(kinds) if what is None else (what,)
+    return Listing(kinds=asked, listed=tuple(kinds[kind]() for kind in asked))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Listing(Result):
+    """Lists of what is built in."""
+
+    kinds: tuple[str, ...]  #: what each lists
+    listed: tuple[Table, ...]
+
+    @property
+    def title(self) -> str:
+        """The only list, or all."""
+        return self.kinds[0] if len(self.kinds) == 1 else "list"
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The lists; several have titles to tell them apart."""
+        if len(self.kinds) == 1:
+            return self.listed
+        return [replace(t, title=kind.capitalize()) for kind, t in zip(self.kinds, self.listed)]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Nothing."""
+        return ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the rows of each list by its name."""
+        return dict(zip(self.kinds, map(_data, self.listed)))
 
 
 def _data(shown: Table) -> Sequence[dict[str, str]]:

@@ -14,6 +14,7 @@ import errno
 import inspect
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -124,14 +125,16 @@ def _shown_default(value: Any) -> Any:
     )
 
 
-def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Callable[..., int]:
+def _command(
+    function: Callable[..., Any], words: Sequence[str], *, endings: Sequence[str] = ()
+) -> Callable[..., int]:
     """Return a function as a command: with options for its output, without arguments
-    that only Python can give.
+    that only Python can give; `words` are those of the command line.
     """
     # The function decides everything: its parameters are the options, their descriptions the help.
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
-    words = {
+    helps = {
         each.arg_name: _plain(each.description)
         for each in docstring_parser.parse(function.__doc__ or "").params
     }
@@ -162,7 +165,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             and default
         ):
             default = "x".join(map(str, default))
-        how: dict[str, Any] = {"help": words.get(each.name, "")}
+        how: dict[str, Any] = {"help": helps.get(each.name, "")}
         # Words such as -k belong to pytest. The first argument stands without an option name, as
         # does every one without a default.
         if each.kind is inspect.Parameter.VAR_POSITIONAL:
@@ -206,7 +209,9 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         # A result writes itself; an integer is the exit status of the command.
         for path in files:
             result.save(path)
-        return result if isinstance(result, int) else _printed(result, files, json=json)
+        if isinstance(result, int):
+            return result
+        return _printed(result, files, shlex.join(["airlight", *words]) if json else None)
 
     # Both, as cyclopts takes annotations from the function where they have the name of a parameter.
     command.__signature__ = inspect.Signature([*positional, *named])  # type: ignore[attr-defined]
@@ -242,16 +247,18 @@ def _help(function: Callable[..., Any], *, whole: bool) -> str:
     return _plain(description if whole else description.split("\n\n")[0])
 
 
-def _printed(result: Result | None, files: Sequence[Path], *, json: bool) -> int:
-    """Print a result, and return the exit status."""
+def _printed(result: Result | None, files: Sequence[Path], json_of: str | None) -> int:
+    """Print a result, as JSON where a command is given that asked for it; return the
+    exit status.
+    """
     # A view has no result.
     if result is None:
         return DONE
     # JSON and tables go to standard output, where a pipe reads them; faults go to the error stream,
     # where they do not mix with the data.
-    if json:
-        data = result.to_dict()
-        print_json({**data, "output": str(files[-1])} if files and isinstance(data, dict) else data)
+    if json_of is not None:
+        written = {"output": str(files[-1])} if files else {}
+        print_json(result.enveloped(json_of, **written))
     else:
         width = terminal_width()
         print(result.text(width=width, styled=width is not None and colours_wanted()), end="")
@@ -294,9 +301,9 @@ def make_app(words: Sequence[str] = (), *, whole: bool = False) -> App:
             asked = whole or name in words[:1]
             sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=at, **how)
             if asked and function is run_study:
-                _add_studies(sub, words[1:], whole=whole)
+                _add_studies(sub, words, whole=whole)
             elif asked:
-                sub.default(_command(function, endings=_ENDINGS.get(function, ())))
+                sub.default(_command(function, words, endings=_ENDINGS.get(function, ())))
             app.command(sub)
     return app
 
@@ -309,10 +316,10 @@ def _add_studies(app: App, words: Sequence[str], *, whole: bool) -> None:
     # A study is a command of its own under `airlight study`.
     for number, name in enumerate(STUDIES):
         function = find_study(name)
-        asked = whole or name in words[:1]
+        asked = whole or name in words[1:2]
         sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=number, **how)
         if asked:
-            sub.default(_command(function, endings=endings_of(name)))
+            sub.default(_command(function, words, endings=endings_of(name)))
         app.command(sub)
 
 

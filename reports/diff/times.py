@@ -29,6 +29,11 @@ class Finding:
     old: float | None = None
     new: float | None = None
 
+    @property
+    def words(self) -> str:
+        """The finding without its verdict."""
+        return ", ".join(each for each in (self.scene, self.method, self.what) if each)
+
 
 _MACHINE = ("processor", "threads", "variant", "device")
 

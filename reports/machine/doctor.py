@@ -123,9 +123,11 @@ class Doctor(Result):
         return [*lines, ready if self.works else f"Not ready: {self.machine.problem}"]
 
     @property
-    def passed(self) -> bool:
-        """Whether kernels run here, and no file is left of a cache that was to be cleared."""
-        return self.works and (self.cache.removed is None or self.cache.files == 0)
+    def failures(self) -> Sequence[str]:
+        """Why no kernel runs here, and that files are left of a cache that was to be cleared."""
+        left = self.cache.files if self.cache.removed is not None else 0
+        problem = [] if self.works else [self.machine.problem or "no kernel runs here"]
+        return [*problem, *([f"{left} files of the cache are left"] if left else [])]
 
     @property
     def status(self) -> int:

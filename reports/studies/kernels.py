@@ -148,7 +148,7 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
         data=with_environment(certified=CERTIFIED, bar=BAR, kernels=stabilities),
         tables=(stability_summary(stabilities),),
         lines=tuple(line for one in stabilities for line in _stability_lines(one)),
-        good=not any(one.broken for one in stabilities),
+        broken=tuple(f"{one.kernel}: {each}" for one in stabilities for each in one.broken),
     )
 
 

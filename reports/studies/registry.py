@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airlight.errors import InputError, nearest
-from airlight.reports.tables.record import Said
+from airlight.reports.tables.record import Result
+from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from airlight.reports.tables.table import Table
 
 
 FRACTION = {"digits": 2, "fraction": True}  #: how an error relative to the reference is printed
@@ -21,13 +24,33 @@ ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Study(Said):
-    """The outcome of a study; its data are what `airlight study NAME -o NAME.json` writes."""
+class Study(Result):
+    """The outcome of a study."""
 
+    name: str
+    data: Mapping[str, Any]  #: the result in what `airlight study NAME -o NAME.json` writes
+    tables: "Sequence[Table]" = ()
+    lines: Sequence[str] = ()
+    faults: Sequence[str] = ()
+    broken: Sequence[str] = ()  #: checks that failed
     #: A record for each measurement; a mapping where the columns of a study are no record's.
     rows: tuple[Any, ...] = ()
     #: returns the figure for a column, 'single' or 'double'
     draw: "Callable[[str], Figure] | None" = None
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The faults of user methods, and the checks that failed."""
+        return [*self.faults, *self.broken]
+
+    @property
+    def scene_name(self) -> str | None:
+        """The scene of a study of one."""
+        return self.data.get("scene")
+
+    def to_dict(self) -> Any:
+        """Return the data, as JSON has them."""
+        return plain(self.data)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -95,9 +118,10 @@ class Study(Said):
         elif ending == ".md":
             write_text(target, "\n".join(map(markdown, self.tables)))
         elif ending == ".json":
+            said = self.enveloped(f"airlight study {self.name}")
             write_text(
                 target,
-                json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+                json.dumps(said, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
             )
         else:
             raise InputError(
@@ -122,7 +146,6 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
 def with_environment(**data: Any) -> dict[str, Any]:
     """Return data with the machine and the versions that made them."""
     from airlight.reports.machine.environment import describe_environment
-    from airlight.validation.columns import plain
 
     return {"environment": describe_environment(), **plain(data)}
 

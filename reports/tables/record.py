@@ -11,7 +11,6 @@ import shutil
 import sys
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -52,13 +51,14 @@ def print_json(data: Any) -> None:
     print(text)
 
 
+SCHEMA = 1  #: of what commands print as JSON, see `Result.enveloped`
 #: Pictures narrower than this are enlarged by a whole factor, so that single pixels
 #: can be seen [CSS pixels].
 _NARROW = 240
 
 
 class Result:
-    """The result of a function."""
+    """The result of a function: what a terminal, a notebook and JSON show of it."""
 
     @property
     @abstractmethod
@@ -81,14 +81,29 @@ class Result:
         """Sentences that stand below the tables."""
 
     @property
+    def scene_name(self) -> str | None:
+        """The scene that it is about; None where it is about none, or about several."""
+        return None
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Remarks on the scene and on how it was read."""
+        return ()
+
+    @property
     def faults(self) -> Sequence[str]:
         """Faults, for the error stream."""
         return ()
 
     @property
+    def failures(self) -> Sequence[str]:
+        """All for which the result does not pass, the faults among them."""
+        return self.faults
+
+    @property
     def passed(self) -> bool:
         """Whether all that was checked is as it should be."""
-        return not self.faults
+        return not self.failures
 
     @property
     def status(self) -> int:
@@ -100,6 +115,24 @@ class Result:
         from airlight.validation.columns import plain
 
         return plain(self)
+
+    def enveloped(self, command: str, **more: Any) -> dict[str, Any]:
+        """Return the data that a command prints as JSON: `result` is of the command, and all else
+        is the same for every command.
+        """
+        from airlight.reference.storage.build import build
+
+        built, data = build(), self.to_dict()
+        return {
+            "schema": SCHEMA,
+            "command": command,
+            "airlight": built.airlight,
+            "commit": built.commit,
+            "scene": self.scene_name,
+            "result": {**data, **more} if more else data,
+            "notes": list(self.notes),
+            "failures": list(self.failures),
+        }
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
         """Return the claims, tables and lines for a terminal."""
@@ -114,36 +147,6 @@ class Result:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title})"
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Said(Result):
-    """A result that is worked out as a whole."""
-
-    name: str
-    data: Any = None  #: as JSON has them; by default the data of the record
-    claims: Sequence[str] = ()
-    tables: Sequence[Table] = ()
-    lines: Sequence[str] = ()
-    faults: Sequence[str] = ()  #: for the error stream
-    good: bool = True  #: whether all that was checked is as it should be
-    of: Any = None  #: the record that says so
-
-    @property
-    def title(self) -> str:
-        """The name of the result."""
-        return self.name
-
-    @property
-    def passed(self) -> bool:
-        """Whether all that was checked is as it should be, and there are no faults."""
-        return self.good and not self.faults
-
-    def to_dict(self) -> Any:
-        """Return the data."""
-        from airlight.validation.columns import plain
-
-        return plain(self.of if self.data is None else self.data)
 
 
 # Pieces of HTML for notebooks, without scripts.

@@ -288,7 +288,7 @@ def test_an_engine_that_knows_the_description_alone_is_called_right(
     subprocess.run(command, capture_output=True, text=True, check=True)
     layer = ["--layer", "ViewLayer.Volume Direct"] if "--layers" in options else []
     assert run(["compare", scene, str(image), *layer, "--json"]) == 0
-    compared = json.loads(capsys.readouterr().out)
+    compared = json.loads(capsys.readouterr().out)["result"]
     assert compared["verdict"]["right"], compared["verdict"]["reasons"]
     assert abs(compared["hints"]["factor"] - 1) < 0.005
 

@@ -12,6 +12,7 @@ from textwrap import dedent, indent
 from typing import Any
 
 from airlight.reports.data import records
+from airlight.reports.tables.record import Result
 from parts.listed import table
 
 #: The purposes of readers, and the names that serve each; a public name in none of them
@@ -30,12 +31,16 @@ TOPICS = {
 }
 #: Classes that these functions return or are given: nobody imports them.
 _RESULTS = (
+    "reports.tables.record.Result",
     "reports.api.rays.CameraRays",
     "reports.api.results.Rendering",
     "reports.api.results.Reference",
     "reports.api.comparisons.ImageComparison",
     "reports.api.comparisons.SceneComparison",
-    "reports.api.comparisons.Fitted",
+    "reports.api.comparisons.ImageDiagnosis",
+    "reports.api.comparisons.FittedFog",
+    "reports.api.comparisons.FramesComparison",
+    "reports.api.explore.Description",
     "reports.api.report.Report",
     "reports.studies.registry.Study",
     "reports.studies.methods.MethodsStudy",
@@ -142,12 +147,16 @@ def _signature(name: str, value: Any) -> str:
 
 
 def _members(value: type) -> Iterator[str]:
-    """Yield a line for each field, property and method that a class documents itself."""
+    """Yield a line for each field, property and method that a class documents itself; those of
+    all results stand at `Result`.
+    """
     if is_dataclass(value):
         meanings = records.meanings(value) if any(f.metadata for f in fields(value)) else {}
         for name, words in (_commented(value) | {k: v for k, v in meanings.items() if v}).items():
             yield f"- `{name}`: {words}"
     for name, member in vars(value).items():
+        if value is not Result and hasattr(Result, name):
+            continue
         if name.startswith("_") or not _own(member) or not (words := inspect.getdoc(member)):
             continue
         call = ""

@@ -230,7 +230,7 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
 @cache
 def _judged() -> dict[str, Any]:
     """Return what `airlight paper --json` printed."""
-    return json.loads((DATA / "papers.json").read_text(encoding="utf-8"))
+    return json.loads((DATA / "papers.json").read_text(encoding="utf-8"))["result"]
 
 
 def verdicts() -> str:

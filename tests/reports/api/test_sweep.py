@@ -75,7 +75,7 @@ def sweep(workers, tmp_path, capsys):
     def run_command(*words, status=0):
         assert run(["sweep", str(path), "-o", str(workers.folder), *words]) == status
         printed = capsys.readouterr().out
-        return json.loads(printed) if "--json" in words else printed
+        return json.loads(printed)["result"] if "--json" in words else printed
 
     return run_command
 
@@ -181,7 +181,7 @@ def test_without_a_study_a_number_of_random_scenes_is_swept_into_a_folder_of_its
 ):
     workers.ends["unshadowed"] = "refused"
     assert run(["sweep", "2", "--cluster", "local:1", "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
+    data = json.loads(capsys.readouterr().out)["result"]
     assert (data["study"], data["scenes"], data["output"]) == ("random-2", 2, "sweep-random-2")
     assert data["cells"] == len(rows(tmp_path / "sweep-random-2")) > 2 * 8
     assert {row["seed"] for row in rows(tmp_path / "sweep-random-2")} == {0, 1}

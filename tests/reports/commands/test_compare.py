@@ -42,7 +42,7 @@ def files(tmp_path):
 
 def printed(capsys, *arguments, status=0):
     assert run(["compare", *arguments, "--json"]) == status
-    return json.loads(capsys.readouterr().out)
+    return json.loads(capsys.readouterr().out)["result"]
 
 
 @pytest.mark.claim("agreement-inside-the-margin", "exit-status")
@@ -82,7 +82,7 @@ def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     write_exr(path, Image({"airlight": airlight}))
     values = printed(capsys, "open-fog", str(path), "--margin", "1e-6", "-o", str(difference))
     assert (values["scene"], values["size"], values["hints"]["words"]) == ("open-fog", [32, 24], [])
-    assert values["comparison"]["metrics"]["relative_rmse"] < 1e-6  # the file is float32
+    assert values["metrics"]["relative_rmse"] < 1e-6  # the file is float32
     assert np.abs(read_exr(difference).layers["relative"]).max() < 1e-5
     write_exr(path, Image({"total": airlight[::-1]}))
     turned = printed(capsys, "open-fog", str(path), "--margin", "1e-6")  # a turn moves no light
@@ -98,7 +98,7 @@ def test_from_python_a_result_or_an_array_is_judged_against_a_scene(variant):
     exact = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     compared = airlight.compare("open-fog", 1.01 * exact, pixel="centre", margin=0.005)
     assert compared.metrics.relative_bias == pytest.approx(0.01, rel=1e-4)
-    assert compared.metrics == compared.of.comparison.metrics
+    assert compared.metrics == compared.compared.comparison.metrics
     assert compared.status == 1
     # and no file that is gone
     assert compared.title == "airlight of the test image against open-fog"
@@ -132,7 +132,9 @@ def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(
     again = airlight.compare(
         "sphere-spot", airlight.reference("sphere-spot", size=(32, 24)), diagnose=True
     )
-    assert [each.path for each in again.of] == ["sphere-spot, the reference by quadrature"] * 2
+    assert [each.path for each in again.diagnoses] == [
+        "sphere-spot, the reference by quadrature"
+    ] * 2
 
 
 @pytest.mark.claim("difference-image")
@@ -199,7 +201,7 @@ def test_a_changed_scene_is_described_and_judged_as_it_was_rendered(
     assert "open-fog with medium.sigma_t=0.3" in said
     assert re.search(r"(verdict +|: )right: |sigma_t +0\.3 ", said), said
     assert run(["describe", "open-fog", *size, *change, "--json"]) == 0
-    described = json.loads(capsys.readouterr().out)
+    described = json.loads(capsys.readouterr().out)["result"]
     assert described["changes"] == ["medium.sigma_t=0.3"]
     assert described["medium"]["sigma_t"] == pytest.approx([0.3] * 3)
 

@@ -52,7 +52,7 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     method(new)["error"] = errors(3e-3)
     paths = files(report(), new)
     assert run(["diff", *paths, "--json"]) == 1
-    data = json.loads(capsys.readouterr().out)
+    data = json.loads(capsys.readouterr().out)["result"]
     assert {finding["what"] for finding in data["findings"]} >= {
         "relative_rmse",
         "relative_bias",

@@ -142,7 +142,7 @@ def same_numbers(
     `ignore` are the text's own.
     """
     text = ended(status, *words)
-    data = json.loads(ended(status, *words, "--json"))
+    data = json.loads(ended(status, *words, "--json"))["result"]
     assert strays(re.sub(ignore, "", text), data, folder) == [], (words, text)
     return text, data
 
@@ -183,7 +183,9 @@ def described(path: Path) -> None:
     text, data = same_numbers(path.parent, "describe", path, ignore=r"(?m)^pixels.*|column i.*")
     assert data["scene"] in text
     assert data["camera"]["size"] == [WIDTH, HEIGHT]
-    triangles = json.loads(ended(0, "describe", path, "-o", glb, "--json"))["gltf"]["triangles"]
+    triangles = json.loads(ended(0, "describe", path, "-o", glb, "--json"))["result"]["gltf"][
+        "triangles"
+    ]
     assert glb.read_bytes()[:4] == b"glTF"
     assert f"{triangles} triangles" in ended(0, "describe", path, "-o", glb)
 
@@ -219,7 +221,7 @@ def compared(path: Path, reference: Path, frame: Path) -> None:
     text, data = same_numbers(
         path.parent, "compare", path, frame, "--pixel", "centre", ignore=ignore
     )
-    assert f"relative {100 * data['comparison']['metrics']['relative_rmse']:.4g} %" in text
+    assert f"relative {100 * data['metrics']['relative_rmse']:.4g} %" in text
     known = data["known"]
     assert f"known to {known['error'] / known['value']:.2g} of its mean ({known['kind']})" in text
 
@@ -229,7 +231,7 @@ def reported(path: Path, method: str) -> None:
     study.write_text(STUDY.format(path, method), encoding="utf-8")
     outcomes = [typed("report", study, "-o", folder, *more) for more in ([], ["--json"])]
     assert {outcome.status for outcome in outcomes} == {0}, outcomes[0]
-    data = json.loads(outcomes[1].out)
+    data = json.loads(outcomes[1].out)["result"]
     assert data == json.loads((folder / "report.json").read_text(encoding="utf-8"))
     for claim in data["claims"]:
         assert f"- {claim['text'].replace('`', '')}" in outcomes[0].out

@@ -43,7 +43,7 @@ def test_verdicts_tables_and_json(variant, experiments, capfd):
     assert experiments == needed
     assert cli.run(["paper", "bouthors", "--json"]) == 0
     assert experiments == needed  # the second time nothing is measured
-    printed = json.loads(capfd.readouterr().out)
+    printed = json.loads(capfd.readouterr().out)["result"]
     rows = {row["item"]: row for row in printed["papers"]}
     assert (rows["eq. 1"]["verdict"], rows["eq. 5"]["verdict"]) == ("reproduced", "not reproduced")
     assert rows["9, stratocumulus of 130 000 triangles"]["verdict"] is None
@@ -52,7 +52,7 @@ def test_verdicts_tables_and_json(variant, experiments, capfd):
 def test_quick_leaves_out_what_needs_images(variant, experiments, capfd):
     assert cli.run(["paper", "--quick", "--json"]) == 0
     assert experiments == ["formulas", "stencil"]
-    printed = json.loads(capfd.readouterr().out)
+    printed = json.loads(capfd.readouterr().out)["result"]
     assert printed["left_out"] > 100
     assert {row["verdict"] for row in printed["papers"] if row["paper"] == "ali"} == {"impossible"}
 

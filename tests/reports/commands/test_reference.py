@@ -58,7 +58,7 @@ def run(output, *arguments, status=0, estimator="volpath"):
 def summary(output, capfd, *arguments, **options):
     capfd.readouterr()
     run(output, "--json", *arguments, **options)
-    return json.loads(capfd.readouterr().out)
+    return json.loads(capfd.readouterr().out)["result"]
 
 
 @pytest.mark.claim("runs-go-on", tolerance="none: equal bytes")
@@ -147,7 +147,7 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
     capfd.readouterr()
     files = [word for name in "ab" for word in ("--merge", str(tmp_path / f"{name}.exr"))]
     assert cli.run(["reference", SCENE[0], *files, "-o", str(tmp_path / "m.exr"), "--json"]) == 0
-    summed = json.loads(capfd.readouterr().out)
+    summed = json.loads(capfd.readouterr().out)["result"]
     assert (summed["seeds"], summed["batches"], summed["spp"]) == ("0-63", 64, 128)
     run(tmp_path / "whole.exr", "--samples", "127")  # 64 batches of 2 as well
     merged, whole = read_exr(tmp_path / "m.exr"), read_exr(tmp_path / "whole.exr")

@@ -35,7 +35,7 @@ def test_frames_are_numbered_files_that_differ_and_begin_as_the_scene_stands(
     run("open-fog", *SMALL, "-o", str(tmp_path / "still" / "one.exr"))
     capfd.readouterr()
     run("open-fog", *SMALL, "--frames", "3", "-o", str(output), "-o", str(preview), "--json")
-    printed = json.loads(capfd.readouterr().out)
+    printed = json.loads(capfd.readouterr().out)["result"]
     names = [f"fog-000{number}.{kind}" for kind in ("exr", "png") for number in (1, 2, 3)]
     names += ["fog.json"]
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted(names)
@@ -60,7 +60,7 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
     found = airlight.compare(
         "sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json"
     )
-    assert found.of.verdict.kind == "exact"
+    assert found.compared.verdict.kind == "exact"
 
 
 def test_one_frame_has_no_file_of_changes(variant, tmp_path):
@@ -72,7 +72,7 @@ def test_the_plan_says_what_the_scene_needs_and_renders_nothing(variant, capfd):
     run("open-fog", *SMALL, "--plan")
     text = capfd.readouterr().out
     run("open-fog", *SMALL, "--plan", "--json")
-    data = json.loads(capfd.readouterr().out)
+    data = json.loads(capfd.readouterr().out)["result"]
     assert data["plan"] == airlight.load_scene("open-fog").plan()
     assert (
         text.splitlines()
@@ -108,7 +108,7 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(
     assert (made["airlight:pixel"], made["airlight:samples"]) == ("area", "4")
     assert not timed
     run("open-fog", *SMALL, "--timed", "--json")
-    times = json.loads(capfd.readouterr().out)
+    times = json.loads(capfd.readouterr().out)["result"]
     assert len(timed) == 1
     assert times["files"] == []
     measured = (

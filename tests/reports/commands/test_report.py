@@ -104,7 +104,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(
     options = ["--quick", "open-fog", "--method", "unshadowed", "-o", "out"]
     assert run(["report", *options, *own, "--json"]) == 1
     printed = capfd.readouterr()
-    data = json.loads(printed.out)
+    data = json.loads(printed.out)["result"]
     rows = {row["method"].partition(":")[2]: row for row in data["scenes"][0]["methods"]}
     assert rows["half"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
     page = (mine / "out" / "report.html").read_text(encoding="utf-8")
@@ -134,7 +134,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(
     )
     again = {
         row["method"].partition(":")[2]: row
-        for row in json.loads(capfd.readouterr().out)["scenes"][0]["methods"]
+        for row in json.loads(capfd.readouterr().out)["result"]["scenes"][0]["methods"]
     }
     assert (again["exits"]["cached"], again["half"]["cached"]) == (False, True)
 
@@ -357,7 +357,7 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
 
     folder = write_report_files(tmp_path / "r")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(report_text(small_report()))
+    assert json.loads(capsys.readouterr().out)["result"] == json.loads(report_text(small_report()))
     assert "The reference is confirmed." in (tmp_path / "again" / "report.html").read_text(
         encoding="utf-8"
     )

@@ -23,7 +23,7 @@ def test_a_frame_is_timed_on_the_device_that_drew_it(variant, capfd):
         cli.run(["render", "omni-box", "--method", MARCHER, "--size", "8x6", "--timed", "--json"])
         == 0
     )
-    said = json.loads(capfd.readouterr().out)
+    said = json.loads(capfd.readouterr().out)["result"]
     assert said["times"]["frame"]["median_ms"] > 0
     assert "threads" not in said["device"]  # of Dr.Jit
 

@@ -75,7 +75,7 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     assert 1 <= len(kept) <= 8
     ran = _run(study, "-o", folder, "--cluster", "local:2", "--json")
     assert ran.returncode == 0, ran.stderr
-    summary = json.loads(ran.stdout)
+    summary = json.loads(ran.stdout)["result"]
     assert (summary["cells"], summary["cached"], summary["computed"], summary["left"]) == (
         8,
         len(kept),
@@ -93,7 +93,7 @@ def test_a_killed_sweep_goes_on_and_a_second_computes_nothing(tmp_path):
     assert {row["seed"] for row in rows} == {None, 3}
     assert {row["properties.lights"] is None for row in rows} == {False}
     assert all(row["picture"][:4] == b"RIFF" for row in rows)
-    again = json.loads(_run(study, "-o", folder, "--json").stdout)
+    again = json.loads(_run(study, "-o", folder, "--json").stdout)["result"]
     assert (again["cached"], again["computed"]) == (8, 0)
     assert _rows(folder) == rows
 
@@ -105,7 +105,9 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
     study.write_text(
         'times = "alone"\n' + STUDY.replace(', "light-volumes"', "").split("[parameters.light")[0]
     )
-    summary = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
+    summary = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)[
+        "result"
+    ]
     assert (summary["cells"], summary["computed"], summary["timed_alone"], summary["problems"]) == (
         6,
         6,
@@ -119,7 +121,7 @@ def test_times_of_a_process_alone_are_added_to_the_errors_of_all(tmp_path):
     with RowStore(folder) as store:  # a run that ended between the errors and the times
         row = store.row(rows[0]["key"])
         store.add(row | {FRAME_MS: None, "cost.alone": None})
-    again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)
+    again = json.loads(_run(study, "-o", folder, "--cluster", "local:2", "--json").stdout)["result"]
     # The three cells of its image: they are compared with one another, so
     # their times are of one run.
     assert (again["cached"], again["computed"], again["timed_alone"]) == (6, 0, 3)
@@ -159,4 +161,4 @@ def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):
         files.append(file.read_bytes())
     assert files[0] == files[1]
     if words[1] == "single-scatter":
-        assert json.loads(ran.stdout)["how"]["cached"] == 0
+        assert json.loads(ran.stdout)["result"]["how"]["cached"] == 0

@@ -153,7 +153,7 @@ def test_power_of_a_spot_is_the_integral_of_its_falloff(beam, cutoff):
 def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
     glb = tmp_path / "fog.glb"
     assert run(["describe", "open-fog", "--size", "64x48", "--json", "-o", str(glb)]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)["result"]
     assert (printed["scene"], printed["camera"]["size"]) == ("open-fog", [64, 48])
     assert printed["gltf"]["bytes"] == glb.stat().st_size
 
@@ -234,7 +234,7 @@ def test_a_sky_that_lights_media_is_described_and_one_that_does_not_is_none(vari
     sky = '<emitter type="constant"><rgb name="radiance" value="0.07, 0.11, 0.21"/></emitter>'
     (tmp_path / "fog.xml").write_text(fog_xml(LAMP + sky))
     found = airlight.describe(str(tmp_path / "fog.xml"))
-    assert found.data["sky"]["radiance"] == [0.07, 0.11, 0.21]
+    assert found["sky"]["radiance"] == [0.07, 0.11, 0.21]
     assert "(0.07, 0.11, 0.21) W/(m^2 sr)" in found.text()
     away = {"type": "constant", "radiance": {"type": "rgb", "value": [0.07, 0.11, 0.21]}}
     assert described(sky=away)["sky"] is None  # through an unbounded medium nothing of it arrives
@@ -276,7 +276,7 @@ def test_describe_writes_it(variant, tmp_path):
     (tmp_path / "fog.xml").write_text(fog_xml(LAMP))
     found = airlight.describe(str(tmp_path / "fog.xml"), output=tmp_path / "fog.vol")
     assert (tmp_path / "fog.vol").exists()
-    assert "gridvolume" in found.data["grid"]
+    assert "gridvolume" in found.grid
     airlight.describe("smoke", output=tmp_path / "smoke.vol")
     assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
     with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
@@ -310,7 +310,7 @@ def test_the_printed_description_has_the_numbers_of_the_json_with_their_units(va
     assert run(["describe", "sphere-spot", "--size", "16x12"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert run(["describe", "sphere-spot", "--size", "16x12", "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
+    data = json.loads(capsys.readouterr().out)["result"]
     parts = {"camera": data["camera"], "medium": data["medium"], "light": data["lights"][0]}
     begins = {
         part: next(n for n, line in enumerate(lines) if re.match(rf"{part}\s", line))

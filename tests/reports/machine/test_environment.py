@@ -187,7 +187,7 @@ def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
     monkeypatch.setattr(doctor, "prepare", missing)
     monkeypatch.setattr(doctor, "find_llvm", lambda: [])
     assert run(["doctor", "--json"]) == 3
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)["result"]
     assert (printed["works"], printed["problem"]) == (False, "no libLLVM found: install it")
     assert {"what": "LLVM", "works": False, "details": "none found"} in printed["checks"]
     assert run(["doctor"]) == 3

@@ -102,7 +102,7 @@ def test_kernels_are_named_by_an_option(variant, tmp_path, monkeypatch):
         )
         == 0
     )
-    assert json.loads(written.read_text())["kernels"] == {"costs": [], "levels": []}
+    assert json.loads(written.read_text())["result"]["kernels"] == {"costs": [], "levels": []}
     assert cli.run(["study", "kernels"]) == 0
     assert asked == [["exact", "taylor-8"], None]
 
@@ -137,7 +137,7 @@ def test_slab_by_command_and_from_python(tmp_path):
         "50",
     ]
     assert cli.run([*slab, "-o", str(tmp_path / "slab.json")]) == 0
-    data = json.loads((tmp_path / "slab.json").read_text())
+    data = json.loads((tmp_path / "slab.json").read_text())["result"]
     assert (data["tau"], data["sun"], data["albedo"], data["phase"]) == (2, 30, 0.9, "hg:0.75")
     assert (
         [row["orders"] for row in data["orders"]]

@@ -24,7 +24,7 @@ def printed(capfd, *arguments, status=0):
     with temporary_folder() as folder:
         assert cli.run(["study", *arguments, "-o", str(folder / "study.json")]) == status
         capfd.readouterr()
-        return json.loads((folder / "study.json").read_text())
+        return json.loads((folder / "study.json").read_text())["result"]
 
 
 def test_methods_are_measured_by_the_command(variant, capfd):

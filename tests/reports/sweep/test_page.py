@@ -127,6 +127,6 @@ def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(
     assert (
         run(["sweep", "--from", str(tmp_path / FILE), "--json", "-o", str(tmp_path / "said")]) == 0
     )
-    data = json.loads(capsys.readouterr().out)
+    data = json.loads(capsys.readouterr().out)["result"]
     assert len(data["claims"]) == 3 * len(METHODS)
     assert data == json.loads((tmp_path / "said" / "sweep.json").read_text())

@@ -5,22 +5,44 @@ number that is not finite.
 
 import io
 import json
+import math
 import sys
+from dataclasses import dataclass
 
 import pytest
 
+import airlight
 from airlight.errors import InputError
-from airlight.reports.tables.record import Said, picture, print_json
+from airlight.reference.storage.build import build
+from airlight.reports.tables.record import Result, picture, print_json
 from airlight.reports.tables.table import numbers, table
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Checked(Result):
+    """A check of a scene, with everything that a result can say."""
+
+    error: float
+    wrong: tuple[str, ...] = ()
+    broken: tuple[str, ...] = ()
+
+    title = scene_name = "a <scene>"
+    claims = ("`exact` is 1 % off.",)
+    tables = (table("Times", numbers("frame"), [(1.5,)]),)
+    lines = ("wrote `a.exr`",)
+    notes = ("a sun",)
+
+    @property
+    def faults(self):
+        return self.broken
+
+    @property
+    def failures(self):
+        return [*self.broken, *self.wrong]
+
+
 def test_a_result_has_its_claims_tables_and_lines_wherever_it_is_shown():
-    shown = Said(
-        name="a <scene>",
-        claims=["`exact` is 1 % off."],
-        tables=[table("Times", numbers("frame"), [(1.5,)])],
-        lines=["wrote `a.exr`"],
-    )
+    shown = Checked(0.5)
     lines = [line.strip() for line in shown.text().splitlines()]
     assert lines[:2] == ["- exact is 1 % off.", "Times"]
     assert lines[-4:] == ["1.5", "", "", "wrote `a.exr`"]
@@ -29,16 +51,32 @@ def test_a_result_has_its_claims_tables_and_lines_wherever_it_is_shown():
     assert "<li><code>exact</code> is 1 % off.</li>" in notebook
     assert ">1.5</th>" in notebook
     assert "<li>wrote <code>a.exr</code></li>" in notebook
-    assert repr(shown) == "Said(a <scene>)"
+    assert repr(shown) == "Checked(a <scene>)"
 
 
 @pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(
-    ("good", "faults", "status"), [(True, (), 0), (False, (), 1), (True, ("no light",), 1)]
+    ("wrong", "broken", "status"), [((), (), 0), (("late",), (), 1), ((), ("no light",), 1)]
 )
-def test_the_status_is_one_where_a_check_failed_or_something_is_at_fault(good, faults, status):
-    said = Said(name="s", good=good, faults=faults)
+def test_the_status_is_one_where_a_check_failed_or_something_is_at_fault(wrong, broken, status):
+    said = Checked(0.5, wrong, broken)
     assert (said.passed, said.status) == (status == 0, status)
+
+
+def test_every_command_prints_json_of_one_shape():
+    printed = Checked(math.nan, ("late",), ("no light",)).enveloped(
+        "airlight check", output="a.exr"
+    )
+    assert printed == {
+        "schema": 1,
+        "command": "airlight check",
+        "airlight": airlight.__version__,
+        "commit": build().commit,
+        "scene": "a <scene>",
+        "result": {"error": None, "wrong": ["late"], "broken": ["no light"], "output": "a.exr"},
+        "notes": ["a sun"],
+        "failures": ["no light", "late"],
+    }
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), [{"mean": float("-inf")}]])

@@ -167,7 +167,7 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(
     assert cli.run([*shlex.split(commands["reference"])[1:], "-o", reference]) == 0
     capfd.readouterr()
     assert cli.run(["compare", reference, method, "--json"]) == 0
-    compared = json.loads(capfd.readouterr().out)["metrics"]
+    compared = json.loads(capfd.readouterr().out)["result"]["metrics"]
     assert error["relative_rmse"] == pytest.approx(compared["relative_rmse"], rel=1e-5)
     assert error["relative_bias"] == pytest.approx(compared["relative_bias"], rel=1e-4)
     # Another method has the same reference; another scene has not.
