@@ -172,7 +172,8 @@ class Noise:
         bias, variance = self.squared_bias.value, self.variance.value
         if bias is None or variance is None or self.correlated:
             return math.nan
-        return math.sqrt(max(bias + variance / runs, 0.0))
+        # The estimate of a squared bias may be below zero; the square is not, and noise stays.
+        return math.sqrt(max(bias, 0.0) + max(variance, 0.0) / runs)
 
 
 def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:

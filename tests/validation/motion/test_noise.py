@@ -53,6 +53,14 @@ def test_white_noise_has_the_closed_form():
     assert found.largest_fraction < 0.01
 
 
+def test_averages_of_noise_are_never_said_to_be_without_error():
+    """Where a squared bias is estimated below zero, 64 averaged runs had an error of 0 %."""
+    found = [measure_noise(REFERENCE, renders(seed, 4)) for seed in range(8)]
+    assert any(each.squared_bias.value < -each.variance.value / 256 for each in found)
+    for each in found:
+        assert each.after(256) >= math.sqrt(each.variance.value / 256)
+
+
 def test_noise_of_another_spectrum_is_told():
     random = np.random.default_rng(2)
     white = random.normal(size=(8, 24, 32, 3))
