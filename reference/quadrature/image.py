@@ -52,6 +52,7 @@ from airlight.reference.quadrature.surface import (
     SurfaceHits,
     emitted_light,
     lit_surface,
+    mirrored_light,
     surface_hits,
 )
 from airlight.reference.scene.camera import film_directions, pixel_centres
@@ -299,6 +300,11 @@ def ray_values(
     emitted, replicates = np.empty((0, 0)), np.empty((0, 0, 0))
     if reference.area or reference.background is not None:
         emitted = emitted_light(reference, hits.distance)
+    if reference.is_sampled:
+        shown = mirrored_light(reference, hits)
+        surface = surface + shown
+        # In single precision: 16 roundings, as of other surfaces.
+        surface_error = surface_error + 16 * 2.0**-24 * shown
     plan, keep = plan or PointPlan(), keep or keep_nothing
     if reference.area:
         done = total - _STEPS * wide_parts

@@ -22,10 +22,18 @@ It is no part of it which point a ray meets, which is Mitsuba's, and whether tha
 the lit intervals of the ray say.
 
 **Area lights and the background** are seen with their own radiance, a layer beside the others.
+
+**A mirror** has no f that samples of a light could meet: its reflection is one direction. It shows
+an area light, or a sky, as a ray from its surface in that direction sees it,
+
+    L = F L_e exp(-depth to the mirror - depth from there to the light),
+
+with the direction and the reflectance F by `BSDF.sample`. That is light of one reflection, and so
+part of the surface's layer. Lights without extent have no area that a mirror could show.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -33,6 +41,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.reference.quadrature.fields import optical_depth
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.device import as_rows, on_device, vectors
@@ -151,19 +160,65 @@ def lit_surface(
     return total, error
 
 
+def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
+    """Return the radiance of area lights and the sky that mirrors show at the pixel centres,
+    (pixels, 3) [W/(m^2 sr)]; of mirrors in mirrors the first alone reflects.
+    """
+    total, seen = np.zeros((len(hits.distance), 3)), hits.interaction
+    mirrors = mi.has_flag(seen.bsdf().flags(), mi.BSDFFlags.DeltaReflection) & seen.is_valid()
+    rows = np.flatnonzero(np.array(mirrors, dtype=bool))
+    if not len(rows):
+        return total
+    _check_mirrors(reference)
+    at = dr.gather(mi.SurfaceInteraction3f, seen, on_device(mi.UInt32, rows))
+    # The direction that a mirror reflects to, and its reflectance; no numbers are drawn for these.
+    context = mi.BSDFContext()
+    context.type_mask = int(mi.BSDFFlags.DeltaReflection)
+    sample, reflectance = at.bsdf().sample(context, at, 0.5, mi.Point2f(0.5))
+    onwards = as_rows(dr.normalize(at.to_world(sample.wo)))
+    # An image around the scene lights nothing, and no mirror either; a sky does.
+    background = None if reference.sky is None else reference.background
+    origin, direction = reference.origin, reference.direction[rows]
+    far = hits.distance[rows]
+    point = origin + far[:, None] * direction
+    # Rays start a step along their way, a thousand roundings, so as not to meet the mirror itself.
+    step = 1e-4 * (1 + np.abs(point).max(axis=1))
+    start = point + step[:, None] * onwards
+    ray = mi.Ray3f(vectors(mi.Point3f, start), vectors(mi.Vector3f, onwards))
+    next_surface = step + np.array(reference.occluders.ray_intersect(ray).t, dtype=np.float64)
+    shown = emitted_light(
+        replace(reference, origin=point, direction=onwards, background=background), next_surface
+    )
+    depth = optical_depth(reference, origin, direction, np.zeros(len(rows)), far)
+    total[rows] = as_rows(reflectance) * shown * np.exp(-depth)
+    return total
+
+
+def _check_mirrors(reference: ReferenceScene) -> None:
+    """Refuse mirrors that a material mixes with others by chance."""
+    for shape in reference.occluders.shapes():
+        bsdf = shape.bsdf()
+        if bsdf.class_name() == "BlendBSDF" and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta):
+            raise InputError(
+                f"shape '{shape.id()}' blends a mirror with another material, which shows area "
+                "lights and skies in part; expected the mirror alone, or a rough one"
+            )
+
+
 def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
     """Return the radiance of area lights before the visible surface, and of the
     background where there is none.
 
     In W/(m^2 sr), (rays, 3).
 
-    `reference`: the scene; `distance`: to the visible surface, (rays,), infinite
-    where there is none [m].
+    `reference`: the scene, whose rays may have an origin each, (rays, 3); `distance`: to the
+    visible surface, (rays,), infinite where there is none [m].
 
     Valid for the side that emits; a light of material `null` is seen with what is behind it,
     a black one ends the ray.
     """
     total = np.zeros((len(distance), 3))
+    origin = np.broadcast_to(reference.origin, total.shape)
     for light in reference.area:
         places = (
             _mesh_distances(light, reference)
@@ -175,11 +230,7 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
             # it. NaN, where the ray misses the light, compares as false.
             rows = np.flatnonzero(at <= distance * (1 + 1e-4))
             depth = optical_depth(
-                reference,
-                reference.origin,
-                reference.direction[rows],
-                np.zeros(len(rows)),
-                at[rows],
+                reference, origin[rows], reference.direction[rows], np.zeros(len(rows)), at[rows]
             )
             total[rows] += light.radiance * np.exp(-depth)
     if reference.background is not None:
@@ -187,7 +238,7 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
         # The background is seen through all media: 1e30 m is beyond their bounds.
         depth = optical_depth(
             reference,
-            reference.origin,
+            origin[rows],
             reference.direction[rows],
             np.zeros(len(rows)),
             np.full(len(rows), 1e30),
@@ -225,7 +276,7 @@ def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
     origin, direction = reference.origin, reference.direction
     away = light.centre - origin
     if light.kind == "sphere":
-        middle = direction @ away
+        middle = np.sum(direction * away, axis=-1)
         miss = np.linalg.norm(away - middle[:, None] * direction, axis=1)
         at = middle - half_chord(light.radius, miss)
         return np.where((miss < light.radius) & (at > 0), at, np.nan)

@@ -9,7 +9,8 @@ For each light and each medium that a ray crosses, from x0 to x1,
 (T transmittance, V visibility) is estimated at distances that the medium draws. E is the irradiance
 of a light at the point, I/r^2 for a light at a place. Area lights and a sky are integrals over
 their points and directions: each sample has its own, from a Kronecker sequence with a random start.
-A surface at the end of the ray adds f cos E V T T, for such lights as the mean over samples. Lights
+A surface at the end of the ray adds f cos E V T T, for such lights as the mean over samples; a mirror,
+which no sample finds, the radiance of the light that it shows, through both ways. Lights
 come from `reference.monte_carlo.single_scatter.sources`, transmittances from the medium
 (`reference.monte_carlo.single_scatter.stretches.Part`); phase function, scattering and material f
 come from Mitsuba's plugins alone.
@@ -31,7 +32,7 @@ from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
     medium_at,
     step_beyond,
 )
-from airlight.reference.monte_carlo.single_scatter.sources import Source
+from airlight.reference.monte_carlo.single_scatter.sources import AreaSource, FarSource, Source
 from airlight.reference.monte_carlo.single_scatter.stretches import (
     Part,
     Ray,
@@ -56,6 +57,7 @@ class Task:
     sources: tuple[Source, ...]  #: the lights
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
+    mirrors: bool  #: whether a surface may show lights with extent
     start: "mi.MediumPtr"  #: the medium in which camera rays start
     #: the same as numbers, if its extinction differs from place to place
     varying: VaryingMedium | None = None
@@ -245,4 +247,28 @@ def _surface(
             _, total, sampler = dr.while_loop(
                 state, lambda i, *_, n=count: i < n, add_sample, label="surfaces"
             )
+        # A sun has one direction, and no extent.
+        if task.mirrors and isinstance(source, AreaSource | FarSource) and source.varies:
+            shown, sampler = _mirrored(source, sampler, ray, hit, x, part, active)
+            total += shown
     return total, sampler
+
+
+def _mirrored(
+    source: AreaSource | FarSource,
+    sampler: "mi.Sampler",
+    ray: Ray,
+    hit: "mi.SurfaceInteraction3f",
+    x: "mi.Float64",
+    part: Part,
+    active: "mi.Bool",
+) -> Estimate:
+    """Return the light with extent that mirrors at the end of a part of the rays show."""
+    used = active & mi.has_flag(hit.bsdf().flags(), mi.BSDFFlags.DeltaReflection)
+    # One direction, which `eval` of the material does not know.
+    mirror = mi.BSDFContext()
+    mirror.type_mask = int(mi.BSDFFlags.DeltaReflection)
+    sample, reflectance = hit.bsdf().sample(mirror, hit, 0.5, mi.Point2f(0.5), used)
+    path, radiance = source.in_mirror(hit, hit.to_world(sample.wo), used)
+    transmittance, sampler = part.transmittance(x, hit, path, ray, sampler, used)
+    return dr.select(used, reflectance * radiance * transmittance, 0), sampler

@@ -77,6 +77,10 @@ def _task(reference: ReferenceScene, samples: int) -> Task:
         Surroundings(scene, bool(scene.shapes()), bounded),
         sources_of(reference),
         samples,
+        mirrors=any(
+            mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.DeltaReflection)
+            for shape in reference.occluders.shapes()
+        ),
         grey=all(len(set(medium.largest.tolist())) == 1 for medium in media),
         start=dr.zeros(mi.MediumPtr) if camera is None else mi.MediumPtr(camera),
         varying=reference.medium if isinstance(reference.medium, VaryingMedium) else None,

@@ -36,7 +36,7 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
 from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
-from airlight.reference.scene.read import ReferenceScene, whole_scene
+from airlight.reference.scene.read import ReferenceScene, scene_from, whole_scene
 
 #: points of the unit square
 SquarePoints: TypeAlias = "tuple[mi.Float64, mi.Float64]"
@@ -201,6 +201,7 @@ class AreaSource(_Near):
 
     shape: Emitting
     radiance: "mi.Color3f"  #: [W/(m^2 sr)]
+    alone: "mi.Scene"  #: the shape of the light by itself
     varies = True
 
     def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
@@ -229,6 +230,19 @@ class AreaSource(_Near):
         low = dr.select(~parallel & (slope > 0), crossing, -dr.inf)
         high = dr.select(~parallel & (slope < 0), crossing, dr.inf)
         return low, dr.select(parallel & (level <= 0), -dr.inf, high)
+
+    def in_mirror(
+        self, hit: "mi.SurfaceInteraction3f", towards: "mi.Vector3f", active: "mi.Bool"
+    ) -> tuple[Path, "mi.Spectrum"]:
+        """Return the way from where rays off a mirror first meet the light, and its radiance
+        there.
+        """
+        way = hit.spawn_ray(towards)
+        met = self.alone.ray_intersect(way, active)
+        sends = met.is_valid() & (mi.Frame3f.cos_theta(met.wi) > 0)
+        place = mi.Point3d(dr.select(sends, met.p, way.o + towards))
+        point = LightSample(place, mi.Vector3d(met.n), mi.Float64(1))
+        return self._path(point, hit.p - mi.Point3f(place)), dr.select(sends, self.radiance, 0)
 
 
 @dataclass(frozen=True)
@@ -279,6 +293,17 @@ class FarSource:
             irradiance,
         )
 
+    def in_mirror(
+        self, hit: "mi.SurfaceInteraction3f", towards: "mi.Vector3f", active: "mi.Bool"
+    ) -> tuple[Path, "mi.Spectrum"]:
+        """Return the way from a sky along rays off a mirror, and its radiance."""
+        seen = dr.zeros(mi.SurfaceInteraction3f, dr.width(active))
+        seen.wi = -towards
+        # A sample of the emitter is beyond all shapes; so is a point as far away along the ray.
+        far = self.emitter.sample_direction(hit, mi.Point2f(0.5), active)[0].dist
+        way = hit.spawn_ray(towards)
+        return Path(way.o + towards * far, -towards, far, way.o), self.emitter.eval(seen, active)
+
 
 Source = PointSource | SpotSource | AreaSource | FarSource
 
@@ -294,7 +319,7 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     points = [emitter for emitter in emitters if emitter.class_name() == "PointLight"]
     others = [_source(emitter) for emitter in emitters if emitter not in points]
     area = [
-        AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()))
+        AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()), scene_from([light.shape]))
         for light in reference.area
     ]
     return (*([_point_lights(points)] if points else []), *others, *area)
