@@ -24,6 +24,7 @@ Read in this order:
 - `engine/`: images of other renderers: whether they are right, and what is wrong with them;
 - `fog_model/`: the single scattering of an image as a function of what describes the fog;
 - `fit/`: which parameters of the fog explain an image;
+- `check/`: relations between frames, which need no reference;
 - `motion/`: independent renders and sequences of frames: bias apart from
   noise, flicker, lag, ghosts.
 

@@ -10,6 +10,7 @@ Read in this order:
 - `render.py`: `load_scene`, `render`, and which configurations are asked for
 - `reference.py`: `reference`
 - `compare.py`: `compare`, with `--diagnose` and `--fit`
+- `check.py`: `check`, relations between frames
 - `report.py`: `report`, `diff`, `paper`
 - `sweep.py`: `sweep`
 - `explore.py`: `describe`, `view`

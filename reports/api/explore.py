@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
 
+import json
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from airlight.errors import InputError
 from airlight.reports.api.inputs import (
@@ -18,10 +19,12 @@ from airlight.reports.api.inputs import (
     Values,
     changes_of,
     configuration_of,
+    exclude,
     note,
     one_error,
     output_files,
     pixels_of,
+    several,
 )
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table
@@ -34,9 +37,10 @@ def describe(
     *,
     change: Values = (),
     size: Size | None = None,
+    variants: Literal["all"] | None = None,
     output: Files = (),
     progress: Progress = None,
-) -> "Description":
+) -> "Description | Variants":
     """Describe everything that another renderer needs to render a scene.
 
     The description has the camera, media, lights and surfaces, what the pixels contain and which
@@ -52,6 +56,9 @@ def describe(
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
+    variants
+        all: write the changed scenes of `airlight check` into the folder of `--output`, each as JSON
+        and as glTF, and check.json, which names the frames to render.
     output
         Write the scene as binary glTF 2.0, a .glb file, or its height fog or density grid as a grid
         of Mitsuba, a .vol file.
@@ -64,6 +71,9 @@ def describe(
         For a scene without a reference, with the name of what is in the way.
     """
     # Names are checked before Mitsuba starts.
+    if variants is not None:
+        exclude("variants", "are those of a scene as it is", {"change": several(change)})
+        return _variants(scene, size, several(output))
     files = output_files(output, ".glb", ".vol")
     check_scene(scene)
     changes = changes_of(change)
@@ -140,6 +150,62 @@ class Description(Result):
         """Return the description, its changes, and the files that were written."""
         own = {"changes": list(self.changes), "gltf": self.gltf, "grid": self.grid}
         return {**self.described, **{name: value for name, value in own.items() if value}}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Variants(Result):
+    """The changed scenes that were written for `airlight check`."""
+
+    scene: str
+    folder: Path
+    frames: tuple[str, ...]  #: names of the images to render
+    relations: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The scene and the folder."""
+        return f"{self.scene}, changed scenes in {self.folder}"
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.scene
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The images to render, and the command that judges them."""
+        return [
+            f"{self.folder}: {len(self.frames)} scenes, each as NAME.json and NAME.glb",
+            f"to render: NAME.exr of each, beside {self.folder / 'check.json'}",
+            f"to judge them: {shlex.join(['airlight', 'check', str(self.folder)])}",
+        ]
+
+
+def _variants(scene: Any, size: Any, output: Sequence[Any]) -> Variants:
+    """Write the changed scenes of a check."""
+    if len(output) != 1 or Path(output[0]).suffix:
+        raise InputError("variants: expected one folder for the scenes, such as -o variants")
+    check_scene(scene)
+    from airlight.reference.storage.files import ensure_folder, write_text
+    from airlight.reports.api.scenes import opened
+    from airlight.reports.interchange.gltf import write_gltf
+    from airlight.reports.interchange.scene import describe_scene
+    from airlight.validation.check.check_file import FILE, CheckFile, named_frames
+    from airlight.validation.check.variants import variants as changed
+
+    pixels = opened(scene, size).size  # starts Mitsuba, and says how large the images are
+    made, folder = changed(str(scene), pixels), ensure_folder(output[0])
+    for name, build in made.scenes.items():
+        loaded = replace(opened(build()), name=name)
+        data = Description(described=describe_scene(loaded)).enveloped(f"airlight describe {scene}")
+        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+        write_text(folder / f"{name}.json", text + "\n")
+        write_gltf(folder / f"{name}.glb", loaded)
+    asked = CheckFile(made.asked, scene=str(scene), again=made.again)
+    write_text(folder / FILE, json.dumps(named_frames(asked), indent=1) + "\n")
+    names = tuple(f"{name}.exr" for name in made.scenes)
+    relations = tuple(each.name for each in made.asked)
+    return Variants(scene=str(scene), folder=folder, frames=names, relations=relations)
 
 
 def _write_grid(path: Path, scene: Any) -> str:

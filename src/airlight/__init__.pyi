@@ -18,6 +18,7 @@ from .realtime.scene.light_table import light_tables as light_tables
 from .realtime.scene.read_scene import read_scene as read_scene
 from .reference.storage.exr import read_exr as read_exr
 from .reference.storage.exr import write_exr as write_exr
+from .reports.api.check import check as check
 from .reports.api.compare import compare as compare
 from .reports.api.explore import describe as describe
 from .reports.api.explore import view as view

@@ -19,7 +19,7 @@ from parts.listed import table
 #: ends the build.
 TOPICS = {
     "Render and judge": (
-        "render reference compare error_metrics multiple_scattering_fraction Budget"
+        "render reference compare check error_metrics multiple_scattering_fraction Budget"
     ),
     "Measure": "report diff study STUDIES sweep paper configuration time_frame",
     "Scenes": "load_scene describe view SCENES certified_data",
@@ -40,6 +40,8 @@ _RESULTS = (
     "reports.api.comparisons.ImageDiagnosis",
     "reports.api.comparisons.FittedFog",
     "reports.api.comparisons.FramesComparison",
+    "reports.api.check.RelationsKept",
+    "validation.check.judge.Kept",
     "reports.api.explore.Description",
     "reports.api.report.Report",
     "reports.studies.registry.Study",

@@ -57,7 +57,7 @@ class Task:
     sources: tuple[Source, ...]  #: the lights
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
-    mirrors: bool  #: whether a surface may show lights with extent
+    mirrors: bool  #: whether a surface may show area lights and a sky
     start: "mi.MediumPtr"  #: the medium in which camera rays start
     #: the same as numbers, if its extinction differs from place to place
     varying: VaryingMedium | None = None
@@ -263,7 +263,7 @@ def _mirrored(
     part: Part,
     active: "mi.Bool",
 ) -> Estimate:
-    """Return the light with extent that mirrors at the end of a part of the rays show."""
+    """Return the light of area lights and skies that mirrors at the ends of rays show."""
     used = active & mi.has_flag(hit.bsdf().flags(), mi.BSDFFlags.DeltaReflection)
     # One direction, which `eval` of the material does not know.
     mirror = mi.BSDFContext()

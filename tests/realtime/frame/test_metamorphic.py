@@ -51,10 +51,10 @@ from airlight.errors import InputError
 from airlight.realtime.methods.registry import METHODS, PUBLISHED_METHODS
 from airlight.realtime.parameters import defaults
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.check import changes
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.meshes import rotation
 from airlight.validation.scenes.registry import FILES, SCENES
-from tests.helpers import metamorphic as changes
 from tests.helpers.area_lights import ring
 from tests.helpers.frames import render
 from tests.helpers.transport_formula import use_formula

@@ -6,13 +6,14 @@ A description is the dictionary that `mi.load_dict` takes. Meshes in it are Mits
 changed in place: each change builds its scene again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.validation.scenes.meshes import box, placed
 from airlight.validation.scenes.parts import medium_boundary, mitsuba_mesh
 from airlight.validation.scenes.registry import SCENES
@@ -25,13 +26,19 @@ SIZE = (16, 12)  # of the images [pixels]
 FAR, DUST = 64.0, 0.002
 _LIGHTS = ("point", "spot", "directional", "constant")
 _POWERS = ("intensity", "irradiance", "radiance")
+_ENDS = ("scale", "value")  # of parameters of meshes that are numbers or colours
 _CAMERA_LIKE = ("perspective", "spot")  # what has a place and a direction, and no size
 
 
-def description(name: str) -> Description:
-    """Return a built-in scene with a small image."""
-    scene = SCENES[name].build()
-    scene["sensor"]["film"] |= {"width": SIZE[0], "height": SIZE[1]}
+def description(name: str, size: tuple[int, int] = SIZE) -> Description:
+    """Return a built-in scene with an image of a size, a small one by default.
+
+    Raises InputError for another scene: what a file holds cannot be changed as a whole.
+    """
+    if name not in SCENES:
+        raise InputError(f"{name}: expected a built-in scene, which can be changed as a whole")
+    scene: Description = dict(SCENES[name].build())
+    scene["sensor"]["film"] |= {"width": size[0], "height": size[1]}
     return scene
 
 
@@ -67,6 +74,11 @@ def _brighter(part: Description, factor: float) -> Description:
     if "emitter" in part:
         part["emitter"] = _brighter(part["emitter"], factor)
     return part
+
+
+def dark(light: Description) -> Description:
+    """Return a light that sends nothing."""
+    return _brighter(light, 0.0)
 
 
 def larger(scene: Description, factor: float) -> Description:
@@ -196,3 +208,89 @@ def another_light(scene: Description) -> Description:
     place = axes[:3] @ (0.31, 0.57, 1.13, 1.0)
     intensity = {"type": "rgb", "value": [20.0, 10.0, 30.0]}
     return {"type": "point", "position": list(place), "intensity": intensity}
+
+
+def turned(scene: Description, angle: float) -> Description:
+    """Return a scene whose camera is turned about its own up, to the right [degrees]."""
+    sensor = dict(scene["sensor"])
+    sensor["to_world"] = sensor["to_world"] @ mi.ScalarTransform4f().rotate([0, 1, 0], -angle)
+    return scene | {"sensor": sensor}
+
+
+def denser(scene: Description, factor: float) -> Description:
+    """Return a scene whose media are so many times as dense."""
+
+    def dense(part: Any) -> Any:
+        if isinstance(part, mi.Mesh):
+            return _with_medium(part, {"scale": lambda value: factor * value})
+        if part.get("type") == "heightfog":
+            return {k: factor * v if k.startswith("sigma") else v for k, v in part.items()}
+        if "sigma_t" in part and "albedo" in part and not isinstance(part["sigma_t"], dict):
+            return part | {"scale": factor * part.get("scale", 1.0)}
+        if "sigma_t" in part and part.get("type") == "homogeneous":
+            return part | {"scale": factor * part.get("scale", 1.0)}
+        return part
+
+    return _everywhere(scene, dense)
+
+
+def paler(scene: Description, factor: float) -> Description:
+    """Return a scene whose media scatter so many times as much, at one extinction."""
+
+    def pale(part: Any) -> Any:
+        if isinstance(part, mi.Mesh):
+            return _with_medium(part, {"albedo": lambda value: factor * value})
+        if "albedo" in part and "type" in part:
+            return part | {"albedo": _each(part["albedo"], lambda v: [factor * x for x in v])}
+        return part
+
+    return _everywhere(scene, pale)
+
+
+def permuted(scene: Description, order: Sequence[int]) -> Description:
+    """Return a scene whose colours are permuted, those of lights, media and surfaces."""
+
+    def other(part: Any) -> Any:
+        if isinstance(part, mi.Mesh):
+            return _with_medium(part, {"": lambda value: value[list(order)]}, colours=True)
+        if part.get("type") == "rgb" and np.size(part["value"]) == 3:
+            return part | {"value": [part["value"][number] for number in order]}
+        return part
+
+    return _everywhere(scene, other)
+
+
+def _everywhere(part: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a description with all its dictionaries and meshes changed, the inner ones first."""
+    if isinstance(part, mi.Mesh):
+        return change(part)
+    if not isinstance(part, dict):
+        return part
+    return change({key: _everywhere(value, change) for key, value in part.items()})
+
+
+def _each(value: Any, change: Callable[[list[float]], list[float]]) -> Any:
+    """Return a number, or an rgb, changed."""
+    if isinstance(value, dict):
+        return value | {"value": change([float(each) for each in value["value"]])}
+    return change([float(value)])[0]
+
+
+def _with_medium(
+    mesh: Any, changes: Mapping[str, Callable[[Array], Any]], *, colours: bool = False
+) -> Any:
+    """Return a mesh whose medium, or with `colours` whose every colour, is changed."""
+    inside = mesh if colours else mesh.interior_medium()
+    if inside is None:
+        return mesh
+    parameters = mi.traverse(inside)
+    for key in list(parameters.keys()):
+        for name, change in changes.items():
+            values = np.ravel(parameters[key]).astype(np.float64) if key.endswith(_ENDS) else None
+            if values is None or not key.startswith(name) or (colours and len(values) != 3):
+                continue
+            kind = type(parameters[key])
+            new = np.ravel(change(values))
+            parameters[key] = float(new[0]) if kind is float else kind(*new.tolist())
+    parameters.update()
+    return mesh

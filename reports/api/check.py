@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight.check`: relations between frames, which need no reference."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from airlight.errors import InputError
+from airlight.reports.api.inputs import (
+    File,
+    KernelLike,
+    MethodLike,
+    Progress,
+    Size,
+    Words,
+    configuration_of,
+    listed,
+    one_error,
+    pixels_of,
+    telling,
+)
+from airlight.reports.tables.record import Result
+from airlight.reports.tables.table import Table, numbers, table, words
+from airlight.validation.columns import plain
+
+if TYPE_CHECKING:
+    from airlight.validation.arrays import Array
+    from airlight.validation.check.check_file import Asked
+    from airlight.validation.check.judge import Kept
+
+# Relative rounding of a value by the precision of a method: places of 32 m are known to 2e-6 m in
+# float32, and the airlight of a ray that passes a light closely follows them.
+_ROUNDING = {"single": 2e-4, "double": 1e-6}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RelationsKept(Result):
+    """The answers of frames to relations."""
+
+    checked: str  #: the folder, or the scene and the method
+    scene: str | None
+    kept: "tuple[Kept, ...]"  #: a row for each relation
+    signature: str  #: what failing relations say together; empty where that is nothing
+
+    def __getitem__(self, name: str) -> "Kept":
+        """Return the answer to a relation, such as 'units'."""
+        return {each.name: each for each in self.kept}[name]
+
+    @property
+    def title(self) -> str:
+        """The folder, or the scene and the method."""
+        return self.checked
+
+    @property
+    def scene_name(self) -> str | None:
+        """The scene, where one was named."""
+        return self.scene
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """A row for each relation."""
+        columns = (
+            *words(name="relation", verdict="answer"),
+            *numbers(error="error", limit="limit", how={"percent": True, "digits": 2}),
+            *numbers(ratio="ratio", how={"digits": 4}),
+            *words(worst="worst at"),
+            *words(points_to="points to", how={"long": True}),
+        )
+        return [table(self.checked, columns, [vars(each) for each in self.kept])]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """How many hold, and what failing ones say together."""
+        count = {
+            verdict: sum(each.verdict == verdict for each in self.kept)
+            for verdict in ("holds", "fails", "cannot be told")
+        }
+        total = f"{count['holds']} of {len(self.kept)} relations hold, {count['fails']} fail"
+        untold = count["cannot be told"]
+        said = [f"{total}, {untold} cannot be told." if untold else f"{total}."]
+        return [*said, f"Together: {self.signature}."] if self.signature else said
+
+    @property
+    def failures(self) -> Sequence[str]:
+        """The relations that fail."""
+        return [f"{each.name} fails: {each.points_to}" for each in self.kept if each.fails]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answers."""
+        return plain({"relations": self.kept, "signature": self.signature})
+
+
+@one_error
+def check(
+    what: File,
+    method: MethodLike | None = None,
+    kernel: KernelLike | None = None,
+    *,
+    only: Words = (),
+    size: Size = "64x48",
+    precision: Literal["single", "double"] = "double",
+    margin: float | None = None,
+    progress: Progress = None,
+    **parameters: Any,
+) -> RelationsKept:
+    """Check a renderer without a reference: frames whose ratio, difference or sum is known.
+
+    Twice the light is twice the image; a camera that turns sees the same rays; no length is
+    special. Sixteen such relations hold in every scene of single scattering, and need no number of
+    it. `airlight describe SCENE --variants all -o DIR` writes scenes to render, with the file
+    check.json that names their frames; or write that file for frames of your own. With `--method`
+    a method of ours or of yours renders the frames.
+
+    The exit status is 1 if a relation fails. Each row says what that points to.
+
+    Parameters
+    ----------
+    what
+        The folder of a check.json, or the file; with `--method` a built-in scene of fog.
+    method
+        Render and check this method: one of `airlight list methods`, or a user's as
+        MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python also a function.
+    kernel
+        Airlight kernel of the method, see `airlight list kernels`.
+    only
+        Check these relations alone, such as units,pan.
+    size
+        With a method: width and height of the frames [pixels], or WxH.
+    precision
+        With a method: its precision; shaders have single.
+    margin
+        The largest error of a relation that is no fault, such as 0.01; by default what noise and
+        rounding make.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    parameters
+        Parameters of the method.
+
+    Raises
+    ------
+    InputError
+        For a file or a frame that cannot be read, and a relation that there is not.
+
+    References
+    ----------
+    Chen, Cheung, Yiu 1998, Metamorphic testing; Donaldson, Lascu 2016, for shader compilers.
+    """
+    from airlight.validation.check.relations import RELATIONS
+
+    chosen = listed("only", only) if only else []
+    for name in chosen:
+        if name not in RELATIONS:
+            raise InputError(f"only: got {name!r}, expected some of {', '.join(RELATIONS)}")
+    if margin is not None and not 0 < margin < 1:
+        raise InputError(f"margin: got {margin:g}, expected a fraction above 0, such as 0.01")
+    if method is None:
+        return _files(Path(what), chosen, margin)
+    pixels = pixels_of(size)
+    assert pixels is not None
+    asked = configuration_of(method, kernel, parameters)
+    with telling(progress, f"{what}: {asked.label}") as tell:
+        return _method(str(what), asked, chosen, pixels, precision, margin, tell)
+
+
+def _files(path: Path, only: Sequence[str], margin: float | None) -> RelationsKept:
+    """Judge the frames that check.json names."""
+    from airlight.reference.storage.exr import read_exr
+    from airlight.validation.check.check_file import ROUNDING, read_check
+    from airlight.validation.check.judge import judge, signature
+
+    given = read_check(path)
+    folder = path if path.is_dir() else path.parent
+    asked = _chosen(given.relations, only)
+    names = dict.fromkeys((*given.again, *(name for each in asked for name in each.frames)))
+    frames = {name: _layers(read_exr(folder / name).layers) for name in names}
+    kept = judge(
+        asked,
+        frames,
+        again=given.again,
+        rounding=ROUNDING[given.format],
+        layer=given.layer,
+        margin=margin,
+    )
+    return RelationsKept(checked=str(path), scene=given.scene, kept=kept, signature=signature(kept))
+
+
+def _layers(layers: Mapping[str, Any]) -> "dict[str, Array]":
+    """Return layers with all light among them."""
+    if "total" in layers or not {"airlight", "surface"} <= layers.keys():
+        return dict(layers)
+    return {**layers, "total": layers["airlight"] + layers["surface"]}
+
+
+def _chosen(asked: "Sequence[Asked]", only: Sequence[str]) -> "list[Asked]":
+    found = [each for each in asked if not only or each.name in only]
+    if not found:
+        raise InputError(f"only: {', '.join(only)} is none of the relations that are asked for")
+    return found
+
+
+def _method(
+    scene: str,
+    chosen: Any,
+    only: Sequence[str],
+    size: tuple[int, int],
+    precision: str,
+    margin: float | None,
+    tell: Any,
+) -> RelationsKept:
+    """Render the frames of a method, and judge them."""
+    from airlight.realtime.methods.registry import METHODS
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.check.judge import judge, signature
+    from airlight.validation.check.variants import variants
+
+    activate()
+    if chosen.method in METHODS and METHODS[chosen.method].renders_clouds:
+        raise InputError(f"check: {chosen.label} scatters many times; expected a method of fog")
+    made = variants(scene, size)
+    asked = _chosen(made.asked, only)
+    names = dict.fromkeys((*made.again, *(name for each in asked for name in each.frames)))
+    frames, draws = {}, True
+    for number, name in enumerate(names):
+        tell(number / len(names), name)
+        try:
+            # A noisy method draws other numbers for each frame.
+            image = _frame(made.scenes[name](), chosen, precision, number if draws else 0)
+        except InputError:
+            # A method that draws none refuses a run; whatever else is wrong is wrong without it.
+            if not (draws and number):
+                raise
+            draws, image = False, _frame(made.scenes[name](), chosen, precision, 0)
+        frames[name] = _layers(image)
+    kept = judge(asked, frames, again=made.again, rounding=_ROUNDING[precision], margin=margin)
+    label = f"{scene} by {chosen.label}, {precision} precision"
+    return RelationsKept(checked=label, scene=scene, kept=kept, signature=signature(kept))
+
+
+def _frame(scene: Any, chosen: Any, precision: Any, run: int) -> "dict[str, Array]":
+    """Return the layers of a frame of a method."""
+    from airlight.reports.api.render import render
+
+    image: Any = render(
+        scene,
+        chosen.method,
+        chosen.kernel,
+        precision=precision,
+        run=run,
+        **dict(chosen.parameters),
+    )
+    return {"airlight": image.airlight, "surface": image.surface}

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether frames keep a relation: its error by blocks, against what noise and rounding do.
+
+Blocks of 8 x 8 pixels have an error each: the difference of their means over the brightness that
+the relation wants there, at least a twentieth of that of the image. A relation says of its own
+pixels how far sampling parts them, and that is no error. The worst 2 % are left out, as edges of shadows lie
+in other pixels of a changed frame. The root mean square of all others is the error of the relation.
+It fails beyond
+
+    3 x floor + rounding,
+
+with the *floor* the error of the same frame twice, and *rounding* that of the format for each
+frame. Where noise, and sampling in half of the blocks, exceed 5 %, nothing can be told: a fault of a
+twentieth would be missed.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airlight.errors import InputError, nearest
+from airlight.validation.arrays import Array
+from airlight.validation.check.check_file import Asked
+from airlight.validation.check.relations import RELATIONS, SIGNATURES, Sides
+from airlight.validation.columns import column
+
+BLOCK = 8  #: pixels on a side of a block, in images of 8 blocks or more
+_LEAST = 0.05  # of the mean brightness: darker blocks are judged as if they had it
+_WORST = 0.02  # of the blocks, which edges of shadows may take
+_FLOORS = 3.0  # a floor is one number of chance: three times as much is none
+TELLING = 0.05  #: the largest fault that a check may miss without saying so
+
+HOLDS, FAILS, UNKNOWN = "holds", "fails", "cannot be told"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The answer of frames to a relation."""
+
+    name: str = column("relation")
+    verdict: str = column("verdict", meaning="holds, fails or cannot be told")
+    error: float | None = column(
+        "error", "1", "of blocks of 8 x 8 pixels beyond sampling, root mean square"
+    )
+    limit: float = column("limit", "1", "beyond which a relation fails: noise and rounding")
+    ratio: float | None = column("ratio", "1", "sum of what is there over that of what is expected")
+    worst: str = column("worst at", "pixels", "column and row of the block with the largest error")
+    points_to: str = column("points to", meaning="what is likely wrong where a relation fails")
+
+    @property
+    def fails(self) -> bool:
+        """Whether the relation is broken."""
+        return self.verdict == FAILS
+
+
+def judge(
+    asked: Sequence[Asked],
+    frames: Mapping[str, Mapping[str, Array]],
+    *,
+    again: Sequence[str] = (),
+    rounding: float,
+    layer: str | None = None,
+    margin: float | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> tuple[Kept, ...]:
+    """Return the answers to relations.
+
+    `asked`: the relations; `frames`: layers by name, (height, width, 3), of each frame by name;
+    `again`: two frames of one input; `rounding`: of a value, relative; `layer`: to judge in all
+    relations, by default that of each; `margin`: an error that is no fault, whatever made it.
+
+    Raises InputError for frames of other sizes, or without a layer that a relation needs.
+    """
+    for each in asked:
+        _check(each)
+    found: list[Kept] = []
+    twice = (Asked("again", tuple(again)),) if again else ()
+    for number, each in enumerate((*twice, *asked)):
+        relation = RELATIONS[each.name]
+        values = _layers(each, frames, layer or each.layer or relation.layer)
+        sides = relation.sides(values, each)
+        floor = 0.0
+        if twice and each.name != "again":
+            pair = _layers(
+                Asked("again", tuple(again)), frames, layer or each.layer or relation.layer
+            )
+            floor = block_errors(Sides(pair[1], pair[0])).error
+        found.append(_answer(each, sides, floor, rounding * len(values), margin))
+        if progress is not None:
+            progress((number + 1) / (len(asked) + len(twice)), each.name)
+    return tuple(found)
+
+
+def _check(asked: Asked) -> None:
+    """Refuse a relation that there is not, and numbers that it cannot have."""
+    if asked.name not in RELATIONS:
+        raise InputError(
+            f"relations: got {asked.name!r}, expected one of {', '.join(RELATIONS)}"
+            f"{nearest(asked.name, RELATIONS)}"
+        )
+    counts = RELATIONS[asked.name].frames
+    if len(asked.frames) not in counts:
+        wanted = " or ".join(map(str, counts))
+        raise InputError(f"{asked.name}: got {len(asked.frames)} frames, expected {wanted}")
+    if sorted(asked.order) != [0, 1, 2]:
+        raise InputError(
+            f"{asked.name}: got the order {list(asked.order)}, expected each of 0, 1, 2"
+        )
+    if not (math.isfinite(asked.factor) and asked.factor > 0):
+        raise InputError(f"{asked.name}: got the factor {asked.factor:g}, expected one above 0")
+
+
+def _layers(asked: Asked, frames: Mapping[str, Mapping[str, Array]], layer: str) -> list[Array]:
+    """Return a layer of the frames of a relation; all light where a frame has nothing else."""
+    chosen = [frames[name] for name in asked.frames]
+    wanted = layer if all(layer in each for each in chosen) else "total"
+    for name, each in zip(asked.frames, chosen):
+        if wanted not in each:
+            raise InputError(f"{name}: has no layer {layer}; it has {', '.join(each)}")
+    values = [np.asarray(each[wanted], dtype=np.float64) for each in chosen]
+    sizes = {value.shape for value in values}
+    if len(sizes) > 1 and asked.name not in ("size", "pan", "reciprocity"):
+        raise InputError(f"{asked.name}: its frames have other sizes: expected one size")
+    for name, value in zip(asked.frames, values):
+        if not np.isfinite(value).all():
+            raise InputError(f"{name}: {int((~np.isfinite(value)).sum())} values are not finite")
+    return values
+
+
+def _answer(
+    asked: Asked, sides: Sides, floor: float, rounding: float, margin: float | None
+) -> Kept:
+    blocks = block_errors(sides)
+    limit = max(_FLOORS * floor + rounding, margin or 0.0)
+    # Without light there is nothing to compare.
+    if not math.isfinite(blocks.error):
+        return Kept(asked.name, UNKNOWN, None, limit, None, "", "")
+    if asked.name == "again":
+        limit = TELLING / _FLOORS
+        verdict = HOLDS if blocks.error <= limit else UNKNOWN
+    elif blocks.error > limit:
+        verdict = FAILS
+    else:
+        verdict = UNKNOWN if _FLOORS * floor + blocks.sampling > TELLING else HOLDS
+    points_to = RELATIONS[asked.name].points_to if verdict == FAILS else ""
+    ratio = blocks.ratio if math.isfinite(blocks.ratio) else None
+    worst = f"{blocks.worst[0]}, {blocks.worst[1]}"
+    return Kept(asked.name, verdict, blocks.error, limit, ratio, worst, points_to)
+
+
+@dataclass(frozen=True)
+class BlockErrors:
+    """The difference of two images by blocks."""
+
+    error: float  #: root mean square beyond sampling, relative; NaN where nothing is lit
+    sampling: float  #: median of what sampling explains, relative
+    ratio: float  #: sum of the one over that of the other
+    worst: tuple[int, int]  #: column and row of the middle of the worst block [pixels]
+
+
+def block_errors(sides: Sides) -> BlockErrors:
+    """Return the errors of two images by blocks."""
+    height, width = sides.wanted.shape[:2]
+    size = max(1, min(BLOCK, height // BLOCK, width // BLOCK))
+    sampling = np.broadcast_to(sides.sampling, sides.wanted.shape)
+    got, wanted, spread = (_means(each, size) for each in (sides.got, sides.wanted, sampling))
+    known = np.isfinite(got) & np.isfinite(wanted)
+    scale = float(np.abs(wanted[known]).mean()) if known.any() else 0.0
+    if scale == 0 and not np.abs(got[known]).any():
+        return BlockErrors(math.nan, 0.0, math.nan, (0, 0))
+    # Nothing is wanted, and something is there: its own brightness is the scale.
+    scale = scale or float(np.abs(got[known]).mean())
+    brightness = np.maximum(np.abs(wanted), _LEAST * scale)
+    beyond = np.maximum(np.abs(got - wanted) - spread, 0.0) / brightness
+    blocks = np.where(known, beyond, -1.0).max(axis=2)
+    row, column_ = np.unravel_index(int(blocks.argmax()), blocks.shape)
+    kept = np.sort(blocks[blocks >= 0])
+    kept = kept[: len(kept) - int(_WORST * len(kept))]
+    total = float(wanted[known].sum())
+    return BlockErrors(
+        float(np.sqrt(np.mean(kept**2))),
+        float(np.median(spread[known] / brightness[known])),
+        float(got[known].sum()) / total if total else math.inf,
+        (int(column_) * size + size // 2, int(row) * size + size // 2),
+    )
+
+
+def _means(values: Array, size: int) -> Array:
+    """Return means over blocks; what is left at the right and below is a part of no block."""
+    height, width = (side - side % size for side in values.shape[:2])
+    cut = values[:height, :width]
+    return cut.reshape(height // size, size, width // size, size, -1).mean(axis=(1, 3))
+
+
+def signature(found: Sequence[Kept]) -> str:
+    """Return what the failing relations say together; empty where that is nothing in common."""
+    failing = {each.name for each in found if each.fails}
+    return next((words for names, words in SIGNATURES if names <= failing), "")
