@@ -133,7 +133,8 @@ def _answer(
     asked: Asked, sides: Sides, floor: float, rounding: float, margin: float | None
 ) -> Kept:
     blocks = block_errors(sides)
-    limit = max(_FLOORS * floor + rounding, margin or 0.0)
+    limit = _FLOORS * floor + rounding
+    limit = limit if margin is None else max(limit, margin)
     # Without light there is nothing to compare.
     if not math.isfinite(blocks.error):
         return Kept(asked.name, UNKNOWN, None, limit, None, "", "")
