@@ -22,7 +22,6 @@ from airlight.reports.api.inputs import (
 )
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, numbers, table, words
-from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from airlight.validation.arrays import Array
@@ -88,6 +87,8 @@ class RelationsKept(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the answers."""
+        from airlight.validation.columns import plain
+
         return plain({"relations": self.kept, "signature": self.signature})
 
 

@@ -32,7 +32,6 @@ from airlight.reports.api.inputs import (
 from airlight.reports.tables.drawing import html
 from airlight.reports.tables.record import Result, block, bullets
 from airlight.reports.tables.table import Table
-from airlight.validation.columns import plain
 from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
@@ -548,6 +547,8 @@ class ReportDifference(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return every finding."""
+        from airlight.validation.columns import plain
+
         return plain(self.difference)
 
 

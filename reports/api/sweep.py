@@ -14,7 +14,6 @@ from airlight.errors import InputError
 from airlight.reports.api.inputs import File, Progress, exclude, one_error, telling
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table
-from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from airlight.reports.cluster.connect import Place
@@ -197,6 +196,8 @@ class SweepFindings(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return every number."""
+        from airlight.validation.columns import plain
+
         return plain(self.said)
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from airlight.errors import InputError, nearest
 from airlight.reports.tables.record import Result
-from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +49,8 @@ class Study(Result):
 
     def to_dict(self) -> Any:
         """Return the data, as JSON has them."""
+        from airlight.validation.columns import plain
+
         return plain(self.data)
 
     def __len__(self) -> int:
@@ -146,6 +147,7 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
 def with_environment(**data: Any) -> dict[str, Any]:
     """Return data with the machine and the versions that made them."""
     from airlight.reports.machine.environment import describe_environment
+    from airlight.validation.columns import plain
 
     return {"environment": describe_environment(), **plain(data)}
 
