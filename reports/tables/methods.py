@@ -277,7 +277,8 @@ def _name_and_time(fastest: Sequence[CellRow]) -> str:
     shared = dict[str, str]()
     for entry in alike(fastest):
         shared.setdefault(entry.method, entry.label)
-    names = " and ".join(shared.values())
+    *others, last = shared.values()
+    names = f"{', '.join(others)} and {last}" if others else last
     milliseconds = _milliseconds(fastest[0])
     return f"{names}: {number(milliseconds)} ms, {rate_words(milliseconds)}"
 
