@@ -46,7 +46,11 @@ class Kept:
     )
     limit: float = column("limit", "1", "beyond which a relation fails: noise and rounding")
     ratio: float | None = column("ratio", "1", "sum of what is there over that of what is expected")
-    worst: str = column("worst at", "pixels", "column and row of the block with the largest error")
+    worst: str = column(
+        "worst at",
+        "pixels",
+        "column and row of the block with the largest error, where there is one",
+    )
     points_to: str = column("points to", meaning="what is likely wrong where a relation fails")
 
     @property
@@ -147,7 +151,7 @@ def _answer(
         verdict = UNKNOWN if _FLOORS * floor + blocks.sampling > TELLING else HOLDS
     points_to = RELATIONS[asked.name].points_to if verdict == FAILS else ""
     ratio = blocks.ratio if math.isfinite(blocks.ratio) else None
-    worst = f"{blocks.worst[0]}, {blocks.worst[1]}"
+    worst = f"{blocks.worst[0]}, {blocks.worst[1]}" if blocks.error else ""
     return Kept(asked.name, verdict, blocks.error, limit, ratio, worst, points_to)
 
 
