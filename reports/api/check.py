@@ -41,6 +41,7 @@ class RelationsKept(Result):
     scene: str | None
     kept: "tuple[Kept, ...]"  #: a row for each relation
     signature: str  #: what failing relations say together; empty where that is nothing
+    notes: tuple[str, ...] = ()  #: relations that a method cannot be asked, and why
 
     def __getitem__(self, name: str) -> "Kept":
         """Return the answer to a relation, such as 'units'."""
@@ -77,7 +78,7 @@ class RelationsKept(Result):
         }
         total = f"{count['holds']} of {len(self.kept)} relations hold, {count['fails']} fail"
         untold = count["cannot be told"]
-        said = [f"{total}, {untold} cannot be told." if untold else f"{total}."]
+        said = [f"{total}, {untold} cannot be told." if untold else f"{total}.", *self.notes]
         return [*said, f"Together: {self.signature}."] if self.signature else said
 
     @property
@@ -100,7 +101,7 @@ def check(
     *,
     only: Words = (),
     size: Size = "64x48",
-    precision: Literal["single", "double"] = "double",
+    precision: Literal["single", "double"] | None = None,
     margin: float | None = None,
     progress: Progress = None,
     **parameters: Any,
@@ -129,7 +130,7 @@ def check(
     size
         With a method: width and height of the frames [pixels], or WxH.
     precision
-        With a method: its precision; shaders have single.
+        With a method: its precision; by default double for a built-in one, single for a user's.
     margin
         The largest error of a relation that is no fault, such as 0.01; by default what noise and
         rounding make.
@@ -147,6 +148,7 @@ def check(
     ----------
     Chen, Cheung, Yiu 1998, Metamorphic testing; Donaldson, Lascu 2016, for shader compilers.
     """
+    from airlight.realtime.methods.shader.source import is_users
     from airlight.validation.check.relations import RELATIONS
 
     chosen = listed("only", only) if only else []
@@ -160,8 +162,11 @@ def check(
     pixels = pixels_of(size)
     assert pixels is not None
     asked = configuration_of(method, kernel, parameters)
+    # A user's code may be written for single precision alone, as shaders are.
+    usual: Literal["single", "double"] = "single" if is_users(asked.method) else "double"
     with telling(progress, f"{what}: {asked.label}") as tell:
-        return _method(str(what), asked, chosen, pixels, precision, margin, tell)
+        how = precision or usual
+        return _method(str(what), asked, chosen, pixels, how, margin, tell)
 
 
 def _files(path: Path, only: Sequence[str], margin: float | None) -> RelationsKept:
@@ -221,21 +226,41 @@ def _method(
     made = variants(scene, size)
     asked = _chosen(made.asked, only)
     names = dict.fromkeys((*made.again, *(name for each in asked for name in each.frames)))
-    frames, draws = {}, True
+    frames, refused, draws = {}, dict[str, str](), True
     for number, name in enumerate(names):
         tell(number / len(names), name)
+        changed = made.scenes[name]
         try:
-            # A noisy method draws other numbers for each frame.
-            image = _frame(made.scenes[name](), chosen, precision, number if draws else 0)
-        except InputError:
-            # A method that draws none refuses a run; whatever else is wrong is wrong without it.
-            if not (draws and number):
+            # A noisy method draws other numbers for each frame; one that draws none refuses a run.
+            try:
+                image = _frame(changed(), chosen, precision, number if draws else 0)
+            except InputError:
+                if not (draws and number):
+                    raise
+                image = _frame(changed(), chosen, precision, 0)
+                draws = False
+        except InputError as error:
+            # A method may not know a light of a changed scene; the scene as it is it must know.
+            if name in made.again:
                 raise
-            draws, image = False, _frame(made.scenes[name](), chosen, precision, 0)
+            refused[name] = str(error)
+            continue
         frames[name] = _layers(image)
-    kept = judge(asked, frames, again=made.again, rounding=_ROUNDING[precision], margin=margin)
-    label = f"{scene} by {chosen.label}, {precision} precision"
-    return RelationsKept(checked=label, scene=scene, kept=kept, signature=signature(kept))
+    able = [each for each in asked if not refused.keys() & {*each.frames}]
+    kept = judge(able, frames, again=made.again, rounding=_ROUNDING[precision], margin=margin)
+    left_out = tuple(
+        f"{each.name} is left out: {refused[name]}"
+        for each in asked
+        for name in each.frames
+        if name in refused
+    )
+    return RelationsKept(
+        checked=f"{scene} by {chosen.label}, {precision} precision",
+        scene=scene,
+        kept=kept,
+        signature=signature(kept),
+        notes=tuple(dict.fromkeys(left_out)),
+    )
 
 
 def _frame(scene: Any, chosen: Any, precision: Any, run: int) -> "dict[str, Array]":

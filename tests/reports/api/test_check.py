@@ -42,7 +42,7 @@ def fading(view, *, kernel=None):
 
 
 def test_a_method_with_a_length_of_its_own_is_found(variant):
-    found = airlight.check("sphere-spot", fading, only="units,intensity", precision="single")
+    found = airlight.check("sphere-spot", fading, only="units,intensity")
     assert [(each.name, each.fails) for each in found.kept] == [
         ("again", False),
         ("intensity", False),
@@ -50,6 +50,22 @@ def test_a_method_with_a_length_of_its_own_is_found(variant):
     ]
     assert "constant in metres" in found["units"].points_to
     assert found.status == 1
+
+
+def without_spots(view, *, kernel=None):
+    """Return the airlight of a method that knows lamps alone."""
+    if any(light.kind == "spot" for light in view.lights):
+        raise InputError("without_spots: needs lamps")
+    return sum(view.lit_by(each, kernel).radiance(0.1) for each in view.lights)
+
+
+def test_a_relation_whose_lights_a_method_refuses_is_left_out_and_named(variant):
+    found = airlight.check("open-fog", without_spots, only="sum,reciprocity")
+    assert [each.name for each in found.kept] == ["again", "sum"]
+    (left_out,) = found.notes
+    assert left_out.startswith("reciprocity is left out: ")
+    assert left_out.endswith("needs lamps")
+    assert left_out in found.text()
 
 
 @pytest.fixture
