@@ -570,6 +570,7 @@ _TRACED_FOG = _all(
             _ESTIMATOR,
             "part.transmittance(x, hit, a_, b_, c_, d_)",
             "part.transmittance(part.start, hit, a_, b_, c_, d_)",
+            times=2,  # of diffuse surfaces and of mirrors
         ),
     },
 )
