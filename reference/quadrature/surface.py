@@ -41,12 +41,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.errors import InputError
 from airlight.reference.quadrature.fields import optical_depth
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene, scene_from
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene, has_mirrors, scene_from
 from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
@@ -165,11 +164,12 @@ def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     (pixels, 3) [W/(m^2 sr)]; of mirrors in mirrors the first alone reflects.
     """
     total, seen = np.zeros((len(hits.distance), 3)), hits.interaction
+    if not has_mirrors(reference):
+        return total
     mirrors = mi.has_flag(seen.bsdf().flags(), mi.BSDFFlags.DeltaReflection) & seen.is_valid()
     rows = np.flatnonzero(np.array(mirrors, dtype=bool))
     if not len(rows):
         return total
-    _check_mirrors(reference)
     at = dr.gather(mi.SurfaceInteraction3f, seen, on_device(mi.UInt32, rows))
     # The direction that a mirror reflects to, and its reflectance; no numbers are drawn for these.
     context = mi.BSDFContext()
@@ -192,17 +192,6 @@ def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     depth = optical_depth(reference, origin, direction, np.zeros(len(rows)), far)
     total[rows] = as_rows(reflectance) * shown * np.exp(-depth)
     return total
-
-
-def _check_mirrors(reference: ReferenceScene) -> None:
-    """Refuse mirrors that a material mixes with others by chance."""
-    for shape in reference.occluders.shapes():
-        bsdf = shape.bsdf()
-        if bsdf.class_name() == "BlendBSDF" and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta):
-            raise InputError(
-                f"shape '{shape.id()}' blends a mirror with another material, which shows area "
-                "lights and skies in part; expected the mirror alone, or a rough one"
-            )
 
 
 def emitted_light(reference: ReferenceScene, distance: Array) -> Array:

@@ -273,6 +273,25 @@ def sorted_shapes(scene: "mi.Scene") -> "tuple[list[mi.Shape], list[mi.Shape]]":
     return opaque, boundaries
 
 
+def has_mirrors(reference: ReferenceScene) -> bool:
+    """Return whether an opaque shape is a mirror, which shows lights that have an extent.
+
+    Raises InputError for one that a material mixes with others by chance.
+    """
+    found = False
+    for shape in reference.occluders.shapes():
+        bsdf = shape.bsdf()
+        if not mi.has_flag(bsdf.flags(), mi.BSDFFlags.DeltaReflection):
+            continue
+        if bsdf.class_name() == "BlendBSDF":
+            raise InputError(
+                f"shape '{shape.id()}' blends a mirror with another material, which shows area "
+                "lights and skies in part; expected the mirror alone, or a rough one"
+            )
+        found = True
+    return found
+
+
 def scene_of(shapes: "list[mi.Shape]", whole: "mi.Scene") -> "mi.Scene":
     """Return a scene of some of the shapes of `whole`, or `whole` itself if these are all of its
     shapes.

@@ -26,7 +26,7 @@ from airlight.reports.api.inputs import (
     pixels_of,
     several,
 )
-from airlight.reports.tables.record import Result
+from airlight.reports.tables.record import OfScene, Result
 from airlight.reports.tables.table import Table
 from airlight.validation.scenes.names import check_scene
 
@@ -153,10 +153,9 @@ class Description(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Variants(Result):
+class Variants(OfScene):
     """The changed scenes that were written for `airlight check`."""
 
-    scene: str
     folder: Path
     frames: tuple[str, ...]  #: names of the images to render
     relations: tuple[str, ...]
@@ -165,11 +164,6 @@ class Variants(Result):
     def title(self) -> str:
         """The scene and the folder."""
         return f"{self.scene}, changed scenes in {self.folder}"
-
-    @property
-    def scene_name(self) -> str:
-        """The scene."""
-        return self.scene
 
     @property
     def lines(self) -> Sequence[str]:

@@ -32,7 +32,7 @@ from airlight.reports.plotting.pictures import (
     write_png,
 )
 from airlight.reports.tables.methods import rate_words
-from airlight.reports.tables.record import Result
+from airlight.reports.tables.record import OfScene, Result
 from airlight.validation.columns import plain
 from airlight.validation.estimates.images import MonteCarloReference
 from airlight.validation.timing import FrameTimes
@@ -70,18 +70,6 @@ class Pictured(Result):
 
     def _repr_png_(self) -> bytes:
         return self._png
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class OfScene(Result):
-    """A result that is about one scene."""
-
-    scene: str  #: name of the scene
-
-    @property
-    def scene_name(self) -> str:
-        """The scene."""
-        return self.scene
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

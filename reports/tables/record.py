@@ -11,6 +11,7 @@ import shutil
 import sys
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -147,6 +148,18 @@ class Result:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class OfScene(Result):
+    """A result that is about one scene."""
+
+    scene: str  #: name of the scene
+
+    @property
+    def scene_name(self) -> str:
+        """The scene."""
+        return self.scene
 
 
 # Pieces of HTML for notebooks, without scripts.

@@ -6,7 +6,7 @@ A description is the dictionary that `mi.load_dict` takes. Meshes in it are Mits
 changed in place: each change builds its scene again.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mitsuba as mi
@@ -123,9 +123,7 @@ def _moved(part: Any, matrix: Array, scale: float) -> Any:
         part[clip] *= scale
     if part.get("type") == "heightfog":
         return _moved_layers(part, float(matrix[2, 3]), scale)
-    if "sigma_t" in part and not (
-        isinstance(part["sigma_t"], dict) and part["sigma_t"]["type"] == "heightfog"
-    ):
+    if _has_scale(part):
         part["scale"] = part.get("scale", 1.0) / scale
     return part
 
@@ -222,16 +220,20 @@ def denser(scene: Description, factor: float) -> Description:
 
     def dense(part: Any) -> Any:
         if isinstance(part, mi.Mesh):
-            return _with_medium(part, {"scale": lambda value: factor * value})
+            return _with_values(part, part.interior_medium(), "scale", lambda value: factor * value)
         if part.get("type") == "heightfog":
             return {k: factor * v if k.startswith("sigma") else v for k, v in part.items()}
-        if "sigma_t" in part and "albedo" in part and not isinstance(part["sigma_t"], dict):
-            return part | {"scale": factor * part.get("scale", 1.0)}
-        if "sigma_t" in part and part.get("type") == "homogeneous":
-            return part | {"scale": factor * part.get("scale", 1.0)}
-        return part
+        return part | {"scale": factor * part.get("scale", 1.0)} if _has_scale(part) else part
 
     return _everywhere(scene, dense)
+
+
+def _has_scale(part: Description) -> bool:
+    """Return whether a description is of a medium whose density its scale multiplies."""
+    sigma_t = part.get("sigma_t")
+    return sigma_t is not None and not (
+        isinstance(sigma_t, dict) and sigma_t["type"] == "heightfog"
+    )
 
 
 def paler(scene: Description, factor: float) -> Description:
@@ -239,10 +241,13 @@ def paler(scene: Description, factor: float) -> Description:
 
     def pale(part: Any) -> Any:
         if isinstance(part, mi.Mesh):
-            return _with_medium(part, {"albedo": lambda value: factor * value})
-        if "albedo" in part and "type" in part:
-            return part | {"albedo": _each(part["albedo"], lambda v: [factor * x for x in v])}
-        return part
+            return _with_values(part, part.interior_medium(), "albedo", lambda v: factor * v)
+        if "albedo" not in part:
+            return part
+        albedo = part["albedo"]
+        if isinstance(albedo, dict):
+            return part | {"albedo": albedo | {"value": [factor * v for v in albedo["value"]]}}
+        return part | {"albedo": factor * albedo}
 
     return _everywhere(scene, pale)
 
@@ -252,7 +257,7 @@ def permuted(scene: Description, order: Sequence[int]) -> Description:
 
     def other(part: Any) -> Any:
         if isinstance(part, mi.Mesh):
-            return _with_medium(part, {"": lambda value: value[list(order)]}, colours=True)
+            return _with_values(part, part, "", lambda v: v[list(order)] if len(v) == 3 else v)
         if part.get("type") == "rgb" and np.size(part["value"]) == 3:
             return part | {"value": [part["value"][number] for number in order]}
         return part
@@ -269,28 +274,18 @@ def _everywhere(part: Any, change: Callable[[Any], Any]) -> Any:
     return change({key: _everywhere(value, change) for key, value in part.items()})
 
 
-def _each(value: Any, change: Callable[[list[float]], list[float]]) -> Any:
-    """Return a number, or an rgb, changed."""
-    if isinstance(value, dict):
-        return value | {"value": change([float(each) for each in value["value"]])}
-    return change([float(value)])[0]
-
-
-def _with_medium(
-    mesh: Any, changes: Mapping[str, Callable[[Array], Any]], *, colours: bool = False
-) -> Any:
-    """Return a mesh whose medium, or with `colours` whose every colour, is changed."""
-    inside = mesh if colours else mesh.interior_medium()
+def _with_values(mesh: Any, inside: Any, begins: str, change: Callable[[Array], Array]) -> Any:
+    """Return a mesh in which the numbers and colours of itself or of its medium, `inside`, are
+    changed whose names begin so; None for no medium.
+    """
     if inside is None:
         return mesh
     parameters = mi.traverse(inside)
     for key in list(parameters.keys()):
-        for name, change in changes.items():
-            values = np.ravel(parameters[key]).astype(np.float64) if key.endswith(_ENDS) else None
-            if values is None or not key.startswith(name) or (colours and len(values) != 3):
-                continue
-            kind = type(parameters[key])
-            new = np.ravel(change(values))
-            parameters[key] = float(new[0]) if kind is float else kind(*new.tolist())
+        if not key.startswith(begins) or not key.endswith(_ENDS):
+            continue
+        old = parameters[key]
+        new = change(np.ravel(old).astype(np.float64)).tolist()
+        parameters[key] = new[0] if isinstance(old, float) else type(old)(*new)
     parameters.update()
     return mesh

@@ -15,7 +15,7 @@ twentieth would be missed.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from airlight.errors import InputError, nearest
 from airlight.validation.arrays import Array
 from airlight.validation.check.check_file import Asked
-from airlight.validation.check.relations import RELATIONS, SIGNATURES, Sides
+from airlight.validation.check.relations import RELATIONS, SIGNATURES, Sides, block_means
 from airlight.validation.columns import column
 
 BLOCK = 8  #: pixels on a side of a block, in images of 8 blocks or more
@@ -44,7 +44,7 @@ class Kept:
     error: float | None = column(
         "error", "1", "of blocks of 8 x 8 pixels beyond sampling, root mean square"
     )
-    limit: float = column("limit", "1", "beyond which a relation fails: noise and rounding")
+    limit: float | None = column("limit", "1", "beyond which a relation fails: noise and rounding")
     ratio: float | None = column("ratio", "1", "sum of what is there over that of what is expected")
     worst: str = column(
         "worst at",
@@ -67,7 +67,6 @@ def judge(
     rounding: float,
     layer: str | None = None,
     margin: float | None = None,
-    progress: Callable[[float, str], None] | None = None,
 ) -> tuple[Kept, ...]:
     """Return the answers to relations.
 
@@ -79,21 +78,21 @@ def judge(
     """
     for each in asked:
         _check(each)
-    found: list[Kept] = []
     twice = (Asked("again", tuple(again)),) if again else ()
-    for number, each in enumerate((*twice, *asked)):
+    found: list[Kept] = []
+    floors: dict[str, float] = {}
+    for each in (*twice, *asked):
         relation = RELATIONS[each.name]
-        values = _layers(each, frames, layer or each.layer or relation.layer)
-        sides = relation.sides(values, each)
-        floor = 0.0
-        if twice and each.name != "again":
-            pair = _layers(
-                Asked("again", tuple(again)), frames, layer or each.layer or relation.layer
-            )
-            floor = block_errors(Sides(pair[1], pair[0])).error
-        found.append(_answer(each, sides, floor, rounding * len(values), margin))
-        if progress is not None:
-            progress((number + 1) / (len(asked) + len(twice)), each.name)
+        judged = layer or each.layer or relation.layer
+        for pair in twice:
+            if judged not in floors:
+                sides = RELATIONS["again"].sides(_layers(pair, frames, judged), pair)
+                floors[judged] = block_errors(sides).error
+        values = _layers(each, frames, judged)
+        floor = floors.get(judged, 0.0)
+        found.append(
+            _answer(each, relation.sides(values, each), floor, rounding * len(values), margin)
+        )
     return tuple(found)
 
 
@@ -139,9 +138,9 @@ def _answer(
     blocks = block_errors(sides)
     limit = _FLOORS * floor + rounding
     limit = limit if margin is None else max(limit, margin)
-    # Without light there is nothing to compare.
-    if not math.isfinite(blocks.error):
-        return Kept(asked.name, UNKNOWN, None, limit, None, "", "")
+    # Without light there is nothing to compare, and no noise is known.
+    if not math.isfinite(blocks.error) or (not math.isfinite(floor) and asked.name != "again"):
+        return Kept(asked.name, UNKNOWN, None, None, None, "", "")
     if asked.name == "again":
         limit = TELLING / _FLOORS
         verdict = HOLDS if blocks.error <= limit else UNKNOWN
@@ -170,7 +169,7 @@ def block_errors(sides: Sides) -> BlockErrors:
     height, width = sides.wanted.shape[:2]
     size = max(1, min(BLOCK, height // BLOCK, width // BLOCK))
     sampling = np.broadcast_to(sides.sampling, sides.wanted.shape)
-    got, wanted, spread = (_means(each, size) for each in (sides.got, sides.wanted, sampling))
+    got, wanted, spread = (block_means(each, size) for each in (sides.got, sides.wanted, sampling))
     known = np.isfinite(got) & np.isfinite(wanted)
     scale = float(np.abs(wanted[known]).mean()) if known.any() else 0.0
     if scale == 0 and not np.abs(got[known]).any():
@@ -190,13 +189,6 @@ def block_errors(sides: Sides) -> BlockErrors:
         float(got[known].sum()) / total if total else math.inf,
         (int(column_) * size + size // 2, int(row) * size + size // 2),
     )
-
-
-def _means(values: Array, size: int) -> Array:
-    """Return means over blocks; what is left at the right and below is a part of no block."""
-    height, width = (side - side % size for side in values.shape[:2])
-    cut = values[:height, :width]
-    return cut.reshape(height // size, size, width // size, size, -1).mean(axis=(1, 3))
 
 
 def signature(found: Sequence[Kept]) -> str:

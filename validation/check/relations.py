@@ -61,7 +61,6 @@ class Relation:
     """A relation between frames."""
 
     name: str
-    why: str
     points_to: str  #: what is likely wrong where it fails
     sides: Callable[[Sequence[Array], Asked], Sides]
     frames: tuple[int, ...] = (2,)  #: how many it may take
@@ -133,13 +132,12 @@ def _sized(frames: Sequence[Array], asked: Asked) -> Sides:
             f"size: got frames of {coarse.shape[1]} x {coarse.shape[0]} and {fine.shape[1]} x "
             f"{fine.shape[0]}; expected the second with twice the sides of the first"
         )
-    means = fine.reshape(coarse.shape[0], 2, coarse.shape[1], 2, -1).mean(axis=(1, 3))
-    return Sides(means, coarse, _MEAN * _bend(coarse))
+    return Sides(block_means(fine, 2), coarse, _MEAN * _bend(coarse))
 
 
 def _thinned(frames: Sequence[Array], asked: Asked) -> Sides:
     # Means over blocks would hide nothing here: a ratio needs light, so that it is one of sums.
-    thick, middle, thin = (_blurred(each) for each in frames)
+    thick, middle, thin = (block_means(each, 2) for each in frames)
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = thick / (2 * middle), middle / (2 * thin)
     ratio = 2 * second - first
@@ -149,10 +147,11 @@ def _thinned(frames: Sequence[Array], asked: Asked) -> Sides:
     return Sides(np.where(lit, ratio, np.nan), one, left)
 
 
-def _blurred(image: Array) -> Array:
-    """Return means over 2 x 2 pixels."""
-    height, width = (side - side % 2 for side in image.shape[:2])
-    return image[:height, :width].reshape(height // 2, 2, width // 2, 2, -1).mean(axis=(1, 3))
+def block_means(values: Array, size: int) -> Array:
+    """Return means over blocks; what is left at the right and below is a part of no block."""
+    height, width = (side - side % size for side in values.shape[:2])
+    cut = values[:height, :width]
+    return cut.reshape(height // size, size, width // size, size, -1).mean(axis=(1, 3))
 
 
 def _multiplied(frames: Sequence[Array], asked: Asked) -> Sides:
@@ -184,77 +183,65 @@ RELATIONS: dict[str, Relation] = {
     for each in (
         Relation(
             "again",
-            "one input, one image",
             "noise, history or dithering: all other relations are judged against it",
             _same,
             layer=TOTAL,
         ),
         Relation(
             "intensity",
-            "twice the light is twice the image",
             "light that is lit density (1 - exp), a tone curve, clipping, automatic exposure, or "
             "intensities that are decoded as colours",
             _scaled,
         ),
         Relation(
             "sum",
-            "two lights are the sum of each",
             "packed or clipped light, a limit of lights in a tile, fog that one light switches on",
             _summed,
             (3, 4),
         ),
         Relation(
             "black-light",
-            "a light of colour 0 adds nothing",
             "fog that grows with the number of lights",
             _same,
         ),
         Relation(
             "colours",
-            "permuted colours give the permuted image",
             "channels that mix: luminance in the place of colour, one extinction for all",
             _permuted,
         ),
         Relation(
             "units",
-            "no length is special",
             "a constant in metres: a softened law, a least distance, a range, steps of a fixed length",
             _same,
         ),
         Relation(
             "moved",
-            "no place and no direction is special",
             "fog that hangs on the origin or on an axis, coordinates that lose digits",
             _moved,
         ),
         Relation(
             "pan",
-            "radiance belongs to a ray",
             "planar depth in the place of distance, fog in screen space",
             _panned,
         ),
         Relation(
             "size",
-            "radiance belongs to a ray, whatever the size of the image",
             "fog that counts pixels, laws that follow the size of a cell, upscaling",
             _sized,
         ),
         Relation(
             "bounds",
-            "fog out of sight changes nothing",
             "a light path of constant length, lights that are lost in large volumes",
             _same,
         ),
         Relation(
             "thin",
-            "thin fog is proportional to its density",
             "opacity that is applied twice (a ratio of 2 in the place of 1), a density that is squared",
             _thinned,
             (3,),
         ),
         Relation(
             "depths-multiply",
-            "transmittances of equal parts multiply",
             "a cap of the fog, a squared exponential, opacity applied twice",
             _multiplied,
             (3,),
@@ -262,20 +249,17 @@ RELATIONS: dict[str, Relation] = {
         ),
         Relation(
             "albedo",
-            "the airlight is proportional to the albedo",
             "an albedo that is decoded as a colour, or that changes the extinction",
             _scaled,
         ),
         Relation(
             "exposure",
-            "a stop is one factor for fog and surfaces",
             "fog that is added after the exposure, or before and after it",
             _scaled,
             layer=TOTAL,
         ),
         Relation(
             "furnace",
-            "fog in its own light is not seen",
             "an ambient light with another transmittance than the background",
             _furnace,
             (1, 2, 3, 4),
@@ -283,7 +267,6 @@ RELATIONS: dict[str, Relation] = {
         ),
         Relation(
             "reciprocity",
-            "camera and spot may change places",
             "no attenuation on the way from the light, a softened law, a constant light path",
             _swapped,
         ),

@@ -51,8 +51,8 @@ def variants(scene: str, size: tuple[int, int]) -> Variants:
     scenes: dict[str, Callable[[], Description]] = {"base": whole, "again": whole}
     asked: list[Asked] = []
 
-    def relate(name: str, *frames: str, **more: object) -> None:
-        asked.append(Asked(name, frames, **more))  # type: ignore[arg-type]
+    def relate(name: str, *frames: str, cameras: tuple[Camera, ...] = ()) -> None:
+        asked.append(Asked(name, frames, cameras=cameras))
 
     def changed(change: Callable[..., Description], *values: object) -> Callable[[], Description]:
         return lambda: change(whole(), *values)

@@ -26,7 +26,7 @@ from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surround
 from airlight.reference.monte_carlo.single_scatter.estimator import Task, source_light
 from airlight.reference.monte_carlo.single_scatter.sources import sources_of
 from airlight.reference.monte_carlo.single_scatter.stretches import double_ray
-from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.read import ReferenceScene, has_mirrors
 from airlight.reference.scene.varying import VaryingMedium
 
 
@@ -77,10 +77,7 @@ def _task(reference: ReferenceScene, samples: int) -> Task:
         Surroundings(scene, bool(scene.shapes()), bounded),
         sources_of(reference),
         samples,
-        mirrors=any(
-            mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.DeltaReflection)
-            for shape in reference.occluders.shapes()
-        ),
+        mirrors=reference.is_sampled and has_mirrors(reference),
         grey=all(len(set(medium.largest.tolist())) == 1 for medium in media),
         start=dr.zeros(mi.MediumPtr) if camera is None else mi.MediumPtr(camera),
         varying=reference.medium if isinstance(reference.medium, VaryingMedium) else None,

@@ -22,6 +22,7 @@ from airlight.reports.commands.main import run
         pytest.param("windows", "shadow-planes", marks=pytest.mark.slow),
         pytest.param("lanterns", "unshadowed", marks=pytest.mark.slow),
         pytest.param("meadow", "unshadowed", marks=pytest.mark.slow),
+        pytest.param("smoke", "ray-march", marks=pytest.mark.slow),
     ],
 )
 def test_methods_keep_the_relations(variant, scene, method):
@@ -136,7 +137,7 @@ def test_changed_scenes_are_written_with_the_file_that_names_their_frames(
         path = target / name
         described = json.loads(path.with_suffix(".json").read_text())["result"]
         assert path.with_suffix(".glb").read_bytes()[:4] == b"glTF"
-        # Whoever renders them renders what the reference sees.
+        # The sizes at which they are to be rendered.
         assert described["camera"]["size"] in ([16, 12], [32, 24], [128, 128])
     base, twice = (
         json.loads((target / f"{name}.json").read_text())["result"]["lights"][0]["intensity"]

@@ -252,6 +252,13 @@ def test_nothing_lit_is_no_answer():
     assert (found.verdict, found.error, found.ratio) == (UNKNOWN, None, None)
 
 
+def test_noise_that_is_not_known_is_not_zero():
+    dark, lit = ({"total": np.full((8, 8, 3), value)} for value in (0.0, 1.0))
+    frames = {"dark": dark, "also": dark, "a": lit, "b": lit}
+    _, found = judge([Asked("units", ("a", "b"))], frames, again=("dark", "also"), rounding=1e-6)
+    assert (found.verdict, found.error, found.limit) == (UNKNOWN, None, None)
+
+
 def test_a_margin_allows_what_is_beyond_noise():
     one, other = ({"total": np.full((8, 8, 3), value)} for value in (1.0, 1.004))
     for margin, verdict in ((None, FAILS), (0.01, HOLDS), (0.001, FAILS)):
