@@ -23,7 +23,8 @@ medium of height alone: over an interval (a, b)
 
     K = int sigma_t p exp(-E) dx = p(cos) exp(-E(a)) tau(a,b) phi(q),     q = (1 - dz/mu) tau(a,b),
 
-and for q < 0, from the other end, p(cos) exp(-E(b)) tau(a,b) phi(-q). This is the result of
+and for q < 0, from the other end, p(cos) exp(-E(b)) tau(a,b) phi(-q). With a fraction a of the
+depth from the camera and b of that to the sun, dE/dx = sigma_t (a - b dz/mu), and so is q. This is the result of
 plane-parallel single scattering (Chandrasekhar 1960). An unbounded interval that goes down or level
 has an infinite tau(a,b), for which tau phi(q) is 1/(1 - dz/mu).
 
@@ -288,6 +289,8 @@ def height_fog_sun(
     *,
     sun: float,
     phase: ArrayLike,
+    camera: ArrayLike = 1.0,
+    light: float = 1.0,
 ) -> Array:
     """Return K of intervals of rays that the sun lights, in closed form [1].
 
@@ -295,24 +298,25 @@ def height_fog_sun(
     component of its unit direction, (n,); `x0`, `x1`: ends of the intervals along the rays [m],
     x0 <= x1; x1 may be infinite; `sun`: vertical component of the unit direction towards the sun,
     above 0, or below 0 where the fog has a floor: the same holds with the column below; `phase`:
-    value of the phase function along each ray, (n,). Raises InputError for a sun at the horizon,
-    one below it without a floor, and a constant part without a cap: every light path is infinitely
-    deep.
+    value of the phase function along each ray, (n,); `camera`, `light`: the fractions of the depths
+    from the camera, (n,), and to the sun that attenuate. Raises InputError, where the way to the sun
+    attenuates, for a sun at the horizon, one below it without a floor, and a constant part without
+    a cap: every light path is infinitely deep.
     """
-    if not -1 <= sun <= 1 or sun == 0 or (sun < 0 and np.isinf(fog.floor)):
+    if light and (not -1 <= sun <= 1 or sun == 0 or (sun < 0 and np.isinf(fog.floor))):
         raise InputError(
             f"the sun's direction has the vertical component {sun:g}: at or below the horizon each "
             "of its light paths "
             "through fog without a floor is infinitely deep; expected a sun above the horizon"
         )
-    if fog.constant > 0 and sun > 0 and np.isinf(fog.cap):
+    if light and fog.constant > 0 and sun > 0 and np.isinf(fog.cap):
         raise InputError(
             "height fog with a constant part has no cap: each light path of the sun is infinitely "
             "deep; expected a "
             "cap, or no constant part"
         )
-    origin, rise, x0, x1, p = np.broadcast_arrays(
-        *(np.asarray(v, dtype=np.float64) for v in (origin, rise, x0, x1, phase))
+    origin, rise, x0, x1, p, camera = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (origin, rise, x0, x1, phase, camera))
     )
     # Infinite ends and level rays divide by 0 in lanes that are not selected.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -333,12 +337,15 @@ def height_fog_sun(
         za, zb = (origin + np.where(level, 0.0, rise * x) for x in (a, b))
         tau = np.where(b > a, fog.along(za, zb, b - a, rise), 0.0)
         # E(a) and E(b). A ray that goes up without end has nothing above it at b.
-        depth_at_a = fog.optical_depth(origin, za, a) + fog.unbounded(za, sun)
-        depth_at_b = fog.along(origin, zb, b, rise) + np.where(
-            np.isinf(zb) & (rise > 0), 0.0, fog.unbounded(zb, sun)
-        )
+        depth_at_a = camera * fog.optical_depth(origin, za, a)
+        depth_at_b = camera * fog.along(origin, zb, b, rise)
         # dE/dx = bend sigma_t, and q of the derivation.
-        bend = 1 - rise / sun
+        bend = camera
+        if light:
+            depth_at_a = depth_at_a + light * fog.unbounded(za, sun)
+            above = np.where(np.isinf(zb) & (rise > 0), 0.0, fog.unbounded(zb, sun))
+            depth_at_b = depth_at_b + light * above
+            bend = bend - light * (rise / sun)
         q = bend * tau
         # From the end where E is smaller, so that phi has an argument of at least 0. An infinite
         # tau has the limit 1/bend.
@@ -360,20 +367,26 @@ def height_fog_segments(
     shadow_scale: float = 1.0,
     weight: Weight | None = None,
     rtol: float = 1e-10,
+    camera: ArrayLike = 1.0,
+    light: float = 1.0,
+    length: float = 0.0,
 ) -> tuple[Array, Array]:
     """Integrate the airlight of lights at places over N intervals of rays.
 
     `fog`, `rays`: the medium and the rays, each over a light; `x0`, `x1`: ends of the intervals
     along the rays [m], x0 <= x1; x1 may be infinite; `phase`, `shadow_scale`, `weight`, `rtol`: as
-    in `analytic.panels.airlight_segments`; `shadow_scale` shortens the light path at the light.
+    in `analytic.panels.airlight_segments`; `shadow_scale` shortens the light path at the light;
+    `camera`, `light`: the fractions of the depths from the camera, (N,), and from the light that
+    attenuate; `length`: of a further path with the extinction at the point [m].
     Returns `value`, `error`: K [1/m^2] and an estimate of its absolute error, of shape (N,); both
     infinite where the light is on an interval.
     """
-    # Columns 0 to 4 are the fields of `HeightRays`, 5 and 6 the ends of the intervals.
+    # Columns 0 to 4 are the fields of `HeightRays`, 5 and 6 the ends of the intervals, 7 the
+    # fraction of the depth from the camera.
     columns = np.broadcast_arrays(
         *(
             np.asarray(v, dtype=np.float64)
-            for v in (rays.origin, rays.rise, rays.foot, rays.height, rays.light, x0, x1)
+            for v in (rays.origin, rays.rise, rays.foot, rays.height, rays.light, x0, x1, camera)
         )
     )
     columns = tuple(np.atleast_1d(column) for column in columns)
@@ -397,12 +410,23 @@ def height_fog_segments(
     start, _, width, height = log_distance(rows.foot, rows.height, low, high)
     # 60 beyond the foot in w, 1/cosh w has fallen to 1e-26: unbounded parts end there.
     unbounded = np.maximum(-start, 0.0) + 60.0
-    parts = _Parts(fog, rows, owner, start, np.minimum(width, unbounded), height)
-    evaluate = partial(_evaluate, parts, phase, shadow_scale, weight)
+    paths = _Paths(shadow_scale, columns[7][owner], light, length)
+    parts = _Parts(fog, rows, owner, start, np.minimum(width, unbounded), height, paths)
+    evaluate = partial(_evaluate, parts, phase, weight)
     # Panels belong to parts, and parts to intervals, whose sums meet the tolerance.
     value, error = adapted(_first_panels(parts, phase.kinks), evaluate, owner, count, rtol)
     value[through] = error[through] = np.inf
     return value, error
+
+
+@dataclass(frozen=True)
+class _Paths:
+    """What of the paths attenuates: see `height_fog_segments`."""
+
+    shadow_scale: float
+    camera: Array  # of each part
+    light: float
+    length: float
 
 
 @dataclass(frozen=True)
@@ -415,6 +439,7 @@ class _Parts:
     start: Array  #: w0
     width: Array  #: w1 - w0
     height: Array  #: of the light over the ray, above 0 [m]
+    paths: _Paths
 
     def heights(self, part: Index, w: Array) -> tuple[Array, Array]:
         """Return distances from the foot and heights at places in w of
@@ -478,7 +503,6 @@ def _first_panels(parts: _Parts, kinks: Array) -> tuple[Index, Array, Array]:
 def _evaluate(
     parts: _Parts,
     phase: PhaseFunction,
-    shadow_scale: float,
     weight: Weight | None,
     part: Index,
     start: Array,
@@ -490,7 +514,7 @@ def _evaluate(
     for first in range(0, len(part), chunk):
         block = slice(first, first + chunk)
         integrals[block], noise[block] = _evaluate_block(
-            parts, phase, shadow_scale, weight, part[block], start[block], width[block]
+            parts, phase, weight, part[block], start[block], width[block]
         )
     return Panels(
         part,
@@ -505,7 +529,6 @@ def _evaluate(
 def _evaluate_block(
     parts: _Parts,
     phase: PhaseFunction,
-    shadow_scale: float,
     weight: Weight | None,
     part: Index,
     start: Array,
@@ -526,11 +549,16 @@ def _evaluate_block(
     cosh = 0.5 * (growth + 1 / growth)
     r = parts.height[part, None] * cosh
     # The light path counts over the fraction `shadow_scale` of its length, next to the point.
-    near = z + shadow_scale * (rays.light - z)
+    paths = parts.paths
+    near = z + paths.shadow_scale * (rays.light - z)
     # sigma_t exp(-depth)/r by the sum of logarithms: both factors may leave the range of numbers
     # where their product does not. Infinite depths leave no light.
     with np.errstate(invalid="ignore", over="ignore"):
-        depth = fog.optical_depth(rays.origin, z, x) + fog.optical_depth(z, near, shadow_scale * r)
+        depth = paths.camera[part, None] * fog.optical_depth(rays.origin, z, x)
+        if paths.light:
+            depth += paths.light * fog.optical_depth(z, near, paths.shadow_scale * r)
+        if paths.length:
+            depth += paths.length * fog.density(z)
         f = np.exp(np.nan_to_num(fog.log_density(z) - depth, nan=-np.inf, neginf=-np.inf)) / r
     if not phase.is_constant:
         # cos = -tanh w: (1 + |cos|)/2 = e^|w|/(2 cosh w) and (1 - |cos|)/2 = e^-|w|/(2 cosh w).

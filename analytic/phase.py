@@ -13,6 +13,7 @@ the functions read
     hazy        (1 + 9 up^8)/2          mean of up^8  = 1/9:   1 + 9/9   = 2      (Biri 2006, annex, after Nishita 1987)
     murky       (1 + 50 up^32) 33/83    mean of up^32 = 1/33:  1 + 50/33 = 83/33  (the same)
     hg          (1 - g^2) / (1 + g^2 - 2 g c)^(3/2)                               (Henyey and Greenstein 1941)
+    cornette-shanks  hg(g) 3 (1 + c^2)/(2 (2 + g^2)),  the mean of c^2 over an hg being (1 + 2 g^2)/3   (1992)
     tabulated   linear between values at regularly spaced c, divided by their mean (the trapezoid rule, exact here)
     hg-draine   (1 - w) hg(g_HG) + w (1 + alpha c^2)/(1 + alpha (1 + 2 g_D^2)/3) hg(g_D)
     mie, mie-modified   water droplets, `analytic.droplets`, at one wavelength
@@ -32,6 +33,7 @@ positive in the first for g > 0, in the second for g < 0.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -234,6 +236,44 @@ class HenyeyGreenstein(PhaseFunction):
 
 
 @dataclass(frozen=True)
+class CornetteShanks(PhaseFunction):
+    """That of Henyey and Greenstein times 1 + c^2, divided by the mean 2 (2 + g^2)/3.
+
+    Raises
+    ------
+    InputError
+        For a g out of range.
+    """
+
+    g: float  #: of Henyey and Greenstein's function [1], in (-1, 1)
+
+    name = "cornette-shanks"
+
+    @cached_property
+    def _lobe(self) -> HenyeyGreenstein:
+        return HenyeyGreenstein(self.g)
+
+    def __post_init__(self) -> None:
+        _ = self._lobe  # refuses a g out of range
+
+    def _value(self, down: Array, up: Array) -> Array:
+        # The mean of c^2 over the lobe is (1 + 2 g^2)/3; up - down is c.
+        rise = 1 + np.square(up - down)
+        return self._lobe.from_half(down, up) * rise * (1.5 / (2 + self.g**2))
+
+    def mp(self, cos_scatter: Any) -> Any:
+        """Evaluate one cosine in mpmath."""
+        c, g = mpf(cos_scatter), mpf(self.g)
+        return self._lobe.mp(c) * (1 + c * c) * 3 / (2 * (2 + g * g))
+
+    def series(self, degree: int) -> list[float]:
+        """Return the coefficients: those of the lobe times 1 + sin^2."""
+        cosine, scale = _cosine(degree), 1.5 / (2 + self.g**2)
+        rise = _scaled_plus(_product(cosine, cosine), scale, scale)
+        return _product(self._lobe.series(degree), rise)
+
+
+@dataclass(frozen=True)
 class Tabulated(PhaseFunction):
     """Linear between values at regularly spaced cosines.
 
@@ -426,6 +466,7 @@ _NUMBERS: dict[str, tuple[Callable[..., PhaseFunction], int]] = {
     "hazy": (Hazy, 0),
     "murky": (Murky, 0),
     "hg": (HenyeyGreenstein, 1),
+    "cornette-shanks": (lambda g=0.0: CornetteShanks(g), 1),
     "tabulated": (Tabulated, 0),
     "hg-draine": (HgDraine, 1),
     "mie": (lambda *numbers: Mie(*_droplets(*numbers)), 3),

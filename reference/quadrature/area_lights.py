@@ -247,7 +247,9 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         rows, rays, normal, weight, lit = work
         # The tolerance of one sample's integral, whose estimate is many digits too large, is far
         # below the error of a mean.
-        terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=1e-6)
+        terms = Terms(
+            cosine_profile(rays, normal), shadow_scale=shadow_scale, edge=lit.edge, rtol=1e-6
+        )
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
         # Parts that shadow rays left in doubt may be lit or not: their largest airlight is added to

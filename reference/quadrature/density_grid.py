@@ -212,7 +212,7 @@ class GridField:
 
         def source(lit: Stretches) -> "_Integrand":
             pieces = cut(whole(lit), self._faces(rays, lit[0], near, far))
-            return self._integrand(rays, pieces, terms.shadow_scale)
+            return self._integrand(rays, pieces, terms)
 
         return sum_stretches(rays, inside, source, terms, rtol=1e-6, step=2048)
 
@@ -239,7 +239,7 @@ class GridField:
         rays_of, places = (np.concatenate(column) for column in zip(*crossings, strict=True))
         return rays_of, places
 
-    def _integrand(self, rays: Rays, pieces: Pieces, shadow_scale: float) -> "_Integrand":
+    def _integrand(self, rays: Rays, pieces: Pieces, terms: Terms) -> "_Integrand":
         count = len(pieces.ray)
         before = self.optical_depth(
             rays.origin, rays.direction[pieces.ray], np.zeros(count), pieces.x0
@@ -248,7 +248,7 @@ class GridField:
             np.ones((count, 3)) * self.medium.albedo,
             np.full(count, self.medium.largest[0]),
         )
-        return _Integrand(self, rays, pieces, shadow_scale, before, factor, extinction)
+        return _Integrand(self, rays, pieces, terms, before, factor, extinction)
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ class _Integrand:
     grid: GridField
     rays: Rays
     pieces: Pieces
-    shadow_scale: float
+    terms: Terms
     before: Array  #: optical depth between the camera and each piece
     factor: Array
     extinction: Array
@@ -285,13 +285,24 @@ class _Integrand:
         place = dr.fma(way, at, start)
         # tau_camera: up to the piece, and from its beginning on within its one cell.
         depth = by_row(self.before[rows]) + walk.within(start, way, begin, at)
-        if rays.w:  # the path to the light in parts of its length
+        paths, density = self.terms.paths, walk.density(place)
+        if isinstance(paths.camera, np.ndarray) or paths.camera != 1:
+            depth *= by_row(paths.of_camera(ray))
+        # tau_shadow, of which a model may take a fraction; the path to the light of a place is in
+        # parts of its length.
+        if rays.w and paths.light:
             path = target - place
-            end = dr.minimum(walk.leave(place, path), dr.opaque(mi.Float64, self.shadow_scale))
-            depth += on_device(mi.Float64, r.ravel()) * walk.depth(place, path, mi.Float64(0), end)
-        else:
-            depth += walk.depth(place, target, mi.Float64(0), walk.leave(place, target))
-        value = walk.density(place) * dr.exp(-depth)
+            end = dr.minimum(
+                walk.leave(place, path), dr.opaque(mi.Float64, self.terms.shadow_scale)
+            )
+            way_out = on_device(mi.Float64, r.ravel()) * walk.depth(place, path, mi.Float64(0), end)
+            depth += way_out if paths.light == 1 else way_out * dr.opaque(mi.Float64, paths.light)
+        elif paths.light:
+            way_out = walk.depth(place, target, mi.Float64(0), walk.leave(place, target))
+            depth += way_out if paths.light == 1 else way_out * dr.opaque(mi.Float64, paths.light)
+        if paths.length:
+            depth += dr.opaque(mi.Float64, paths.length) * density
+        value = density * dr.exp(-depth)
         dr.eval(value, depth)
         values, depths = (np.array(part).reshape(x.shape) for part in (value, depth))
         return (values * medium.phase(scatter))[:, :, None], depths[:, :, None]

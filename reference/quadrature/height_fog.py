@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Height fog: its airlight is `analytic.height_fog` in the rays' planes."""
+"""Height fog: its airlight is `analytic.height_fog` in the rays' planes.
 
-from dataclasses import dataclass
+Under a sun it has a closed form. A weight along the ray, such as the fade of a model, has none: its
+integrand is summed by panels that span four scale heights at most.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +18,22 @@ from airlight.analytic.height_fog import (
     height_fog_segments,
     height_fog_sun,
 )
+from airlight.analytic.panels import Weight
 from airlight.reference.quadrature.integrate import (
     TERMS,
     ErrorKind,
+    Paths,
     Terms,
     strongest,
+    sum_stretches,
     sums_of,
 )
-from airlight.reference.quadrature.intervals import Stretches
+from airlight.reference.quadrature.intervals import Pieces, Stretches, cut, whole
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 def fog_of(medium: HeightMedium) -> HeightFog:
@@ -77,12 +86,19 @@ class HeightField:
         """Return the airlight of each ray from its lit stretches, and a bound of
         its error, (rays, 3) each.
         """
+        if not rays.w and terms.profile is not None:
+            return sum_stretches(
+                rays,
+                stretches,
+                lambda lit: _SunIntegrand.of(self.medium, rays, lit, terms.paths),
+                terms,
+                rtol=1e-10,
+                step=4096,
+            )
         if rays.w:
             value, error = _of_places(self.medium, rays, stretches, terms)
         else:
-            value, error = _of_suns(
-                self.medium, rays, stretches, np.broadcast_to(terms.edge, len(rays.foot))
-            )
+            value, error = _of_suns(self.medium, rays, stretches, terms)
         factor, ray = self.medium.albedo / (4 * np.pi), stretches[0]
         value, error = (
             sums_of(ray, part[:, None] * factor, len(rays.foot)) for part in (value, error)
@@ -106,8 +122,10 @@ def _of_places(
         rays.height[ray],
         of_light,
     )
-    profile = terms.profile
+    profile, law, paths = terms.profile, terms.law, terms.paths
     weight = None if profile is None else lambda x, row: profile(x, ray[row])
+    if law is not None:
+        weight = _with_law(weight, law, heights)
     # The relative tolerance of the integral of each stretch.
     value, error = height_fog_segments(
         fog,
@@ -118,6 +136,9 @@ def _of_places(
         shadow_scale=terms.shadow_scale,
         weight=weight,
         rtol=terms.rtol or 1e-10,
+        camera=paths.of_camera(ray),
+        light=paths.light,
+        length=paths.length,
     )
     # The uncertainty of an end is relative to its distance r from the light: the strip there is r
     # edge long, and r times the integrand, which has 1/r^2, gives 1/r.
@@ -125,16 +146,31 @@ def _of_places(
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
         r = np.maximum(np.hypot(rays.height[ray], s), np.finfo(np.float64).tiny)
         z = heights.origin + heights.rise * (heights.foot + s)
-        depth = fog.optical_depth(heights.origin, z, heights.foot + s)
-        depth = depth + fog.optical_depth(z, of_light, r)
+        depth = paths.of_camera(ray) * fog.optical_depth(heights.origin, z, heights.foot + s)
+        if paths.light:
+            depth = depth + paths.light * fog.optical_depth(z, of_light, r)
+        if paths.length:
+            depth = depth + paths.length * fog.density(z)
         with np.errstate(over="ignore"):
             strip = np.exp(fog.log_density(z) - depth) * medium.phase(-s / r) / r
+        if law is not None:
+            strip = strip * law(r)
         error = error + terms.edge * np.where(np.isfinite(x), strip, 0.0)
     return value, error
 
 
+def _with_law(weight: Weight | None, law: Callable[[Array], Array], rays: HeightRays) -> Weight:
+    """Return a weight of places along rays times a law of the distance from the light."""
+
+    def weighted(x: Array, row: NDArray[np.int64]) -> Array:
+        r = np.hypot(rays.height[row, None], x - rays.foot[row, None])
+        return law(r) if weight is None else law(r) * weight(x, row)
+
+    return weighted
+
+
 def _of_suns(
-    medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array
+    medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Terms
 ) -> tuple[Array, Array]:
     """Return the light of lit stretches under suns of irradiance 1, in closed form, and its
     error, (stretches,) [1].
@@ -148,14 +184,19 @@ def _of_suns(
         if len(rays.direction)
         else 1.0
     )
-    phase = medium.phase(rays.foot[ray])
-    value = height_fog_sun(fog, origin, rise, x0, x1, sun=mu, phase=phase)
+    phase, edge = medium.phase(rays.foot[ray]), np.broadcast_to(terms.edge, len(rays.foot))
+    camera, light = terms.paths.of_camera(ray), terms.paths.light
+    value = height_fog_sun(
+        fog, origin, rise, x0, x1, sun=mu, phase=phase, camera=camera, light=light
+    )
     error = np.zeros_like(value)
     for x in (x0, x1):
         # The strip at an end that is uncertain by `edge` [m]; at infinity there is no light.
         at = np.where(np.isfinite(x), x, 0.0)
         z = origin + rise * at
-        depth = fog.optical_depth(origin, z, at) + fog.unbounded(z, mu)
+        depth = camera * fog.optical_depth(origin, z, at)
+        if light:
+            depth = depth + light * fog.unbounded(z, mu)
         with np.errstate(over="ignore"):
             f = np.exp(fog.log_density(z) - depth) * phase
         error += edge[ray] * np.where(np.isfinite(x), f, 0.0)
@@ -167,3 +208,48 @@ def _of_suns(
             rounding * value * (1 + np.where(np.isfinite(depth), np.minimum(depth, 745.0), 0.0))
         )
     return value, error
+
+
+@dataclass(frozen=True)
+class _SunIntegrand:
+    """sigma_t exp(-tau) p along pieces under a sun; an `Integrand` of `integrate`."""
+
+    medium: HeightMedium
+    rays: Rays
+    pieces: Pieces
+    paths: Paths
+    factor: Array  # the albedo, (pieces, 3)
+    extinction: Array
+    same: Index = field(default_factory=lambda: np.zeros(3, np.int64))
+
+    @staticmethod
+    def of(medium: HeightMedium, rays: Rays, lit: Stretches, paths: Paths) -> "_SunIntegrand":
+        """Cut lit stretches at heights where the density has kinks, and every four scale heights."""
+        fog = fog_of(medium)
+        # Beyond 64 scale heights on either side a layer is as good as nothing, or all is dark.
+        steps = 4.0 * np.arange(-16, 17)
+        layers = [layer.base + layer.scale_height * steps for layer in fog.layers]
+        heights = np.concatenate([np.array(fog.kinks), *layers])
+        ray = np.unique(lit[0])
+        start, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up
+        with np.errstate(divide="ignore", invalid="ignore"):
+            places = (heights - start) / rise[:, None]  # a level ray crosses none
+        row, column = np.nonzero(np.isfinite(places))
+        pieces = cut(whole(lit), (ray[row], places[row, column]))
+        count = len(pieces.ray)
+        largest = np.full(count, float(np.max(medium.largest)))
+        return _SunIntegrand(
+            medium, rays, pieces, paths, np.ones((count, 3)) * medium.albedo, largest
+        )
+
+    def __call__(
+        self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
+    ) -> tuple[Array, Array]:
+        medium, fog, ray = self.medium, fog_of(self.medium), self.pieces.ray[rows]
+        start, mu = float(self.rays.origin @ medium.up), float(self.rays.position[0] @ medium.up)
+        z = start + (self.rays.direction[ray] @ medium.up)[:, None] * x
+        depth = self.paths.of_camera(ray)[:, None] * fog.optical_depth(start, z, x)
+        if self.paths.light:
+            depth = depth + self.paths.light * fog.unbounded(z, mu)
+        value = np.exp(np.nan_to_num(fog.log_density(z) - depth, nan=-np.inf, neginf=-np.inf))
+        return (value * medium.phase(scatter))[:, :, None], np.minimum(depth, 745.0)[:, :, None]

@@ -15,6 +15,8 @@ in a direction (w = 0, `reference.visibility.planes`),
     tau_camera = tau_0 + sigma_m (x - x_0),
     tau_shadow = sigma_0 s r + sum_j (sigma_j - sigma_0) |[enter_j, leave_j] and [0, s r]|,
 
+a model (`reference.quadrature.model_terms`) having a tau_camera + b tau_shadow + sigma_m M instead,
+
 I the intensity or irradiance of the light, r the distance to it, enter_j and leave_j the distances
 from the point x at which the shadow segment enters and leaves body j; s is `shadow_scale`. Under a
 directional light sigma_0 = 0 and r is unbounded. Near a place the integral is taken in the variable
@@ -43,6 +45,7 @@ from airlight.reference.quadrature.integrate import (
     AT_LIGHT,
     TERMS,
     ErrorKind,
+    Paths,
     Terms,
     strongest,
     sum_stretches,
@@ -130,7 +133,7 @@ class HomogeneousField:
         segments = camera_segments(replace(self.reference, direction=rays.direction), distance)
 
         def source(lit: Stretches) -> "_Integrand | None":
-            parts = parts_in_media(self.reference, rays, segments, lit)
+            parts = parts_in_media(self.reference, rays, segments, lit, terms.paths.fall)
             if not len(parts.ray):
                 return None
             pieces, kinks = _cut_at_kinks(self.reference, rays, parts, np.unique(lit[0]))
@@ -142,7 +145,13 @@ class HomogeneousField:
             into = (pieces.x0 - parts.x0[pieces.part])[:, None]
             depth = before[pieces.part] + into * by_medium(self.reference, "sigma_t", pieces.medium)
             return _Integrand(
-                self.reference, pieces, depth, rays[pieces.ray], kinks, terms.shadow_scale
+                self.reference,
+                pieces,
+                depth,
+                rays[pieces.ray],
+                kinks,
+                terms.shadow_scale,
+                terms.paths,
             )
 
         return sum_stretches(rays, stretches, source, terms, rtol=1e-10, step=4096)
@@ -215,11 +224,15 @@ class _Integrand:
     own: Rays  # the ray of each piece
     kinks: list[Kinks]  # of the shadow segments through each bounded medium
     scale: float
+    paths: Paths
     factor: Array = field(init=False)  # albedo sigma_t of the medium of each piece, (pieces, 3)
     extinction: Array = field(init=False)  # the largest of the channels, (pieces,)
     different: Index = field(init=False)  # a channel of each set of extinctions, (sets,)
     same: Index = field(init=False)  # number of the set of each channel, (3,)
-    sigma_t: Array = field(init=False)  # of these sets, (pieces, sets)
+    # of these sets, (pieces, sets): what attenuates from the camera to the piece and along it, and
+    # on the constant length of ways from the light
+    before: Array = field(init=False)
+    along: Array = field(init=False)
     bodies: list["_Body"] = field(init=False)
 
     def __post_init__(self):
@@ -235,7 +248,9 @@ class _Integrand:
         _, self.different, self.same = np.unique(
             every, axis=1, return_index=True, return_inverse=True
         )
-        self.sigma_t = sigma_t[:, self.different]
+        camera, own = self.paths.of_camera(pieces.ray)[:, None], sigma_t[:, self.different]
+        self.before = camera * self.depth[:, self.different] + self.paths.length * own
+        self.along = camera * own
         self.bodies = [
             _Body.of(self.own, pieces, medium.bounds, kinks)
             for medium, kinks in zip(reference.media, self.kinks, strict=True)
@@ -245,20 +260,17 @@ class _Integrand:
         self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
     ) -> tuple[Array, Array]:
         reference = self.reference
-        depth = (
-            self.depth[rows][:, None, self.different]
-            + inside[:, :, None] * self.sigma_t[rows, None]
-        )
-        around = reference.medium.sigma_t[self.different]
+        depth = self.before[rows, None] + inside[:, :, None] * self.along[rows, None]
+        around, fraction = reference.medium.sigma_t[self.different], self.paths.light
         # `tau_shadow` of the derivation: the medium around over all of the segment, and what bodies
         # differ from it over what lies in them. A directional light's segment is unbounded and only
         # bodies attenuate it; around * inf would be no number where around is 0.
         limit = self.scale * r if self.own.w else r
-        if np.any(around > 0):
-            depth += limit[:, :, None] * around
-        for medium, body in zip(reference.media, self.bodies, strict=True):
+        if np.any(around > 0) and fraction:
+            depth += limit[:, :, None] * (fraction * around)
+        for medium, body in zip(reference.media if fraction else (), self.bodies):
             depth += body.length(rows, x, r, limit)[:, :, None] * (
-                medium.sigma_t[self.different] - around
+                fraction * (medium.sigma_t[self.different] - around)
             )
         return np.exp(-depth) * self.phase(rows, scatter)[:, :, None], depth
 

@@ -37,6 +37,7 @@ from airlight.reference.quadrature.area_lights import area_airlight, area_surfac
 from airlight.reference.quadrature.fields import field_of
 from airlight.reference.quadrature.integrate import ErrorKind
 from airlight.reference.quadrature.light_airlight import light_airlight
+from airlight.reference.quadrature.model_terms import route_of, with_sources
 from airlight.reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
@@ -261,7 +262,7 @@ def ray_values(
     hits = surface_hits(reference) if hits is None else hits
     cast = hits.distance
     hits = replace(hits, distance=exact_distance(reference, hits.interaction, cast, shapes))
-    count = len(reference.direction)
+    count, route = len(reference.direction), route_of(reference, hits.distance)
     airlight, error, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     transitions, reports = 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
@@ -272,7 +273,13 @@ def ray_values(
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for number, light in enumerate(lights):
         received = light_airlight(
-            reference, light, hits.distance, shadow_scale=shadow_scale, checks=checks, shapes=shapes
+            reference,
+            light,
+            hits.distance,
+            shadow_scale=shadow_scale,
+            checks=checks,
+            shapes=shapes,
+            route=route,
         )
         airlight += received.radiance
         error += received.error
@@ -293,13 +300,14 @@ def ray_values(
         reached.append(lit_ends)
         if progress is not None:
             progress(number + 1, total, "quadrature")
+    airlight, error = with_sources(reference, route, airlight, error)
     surface, surface_error = lit_surface(
-        reference, hits, reached=reached, shadow_scale=shadow_scale
+        reference, hits, route, reached=reached, shadow_scale=shadow_scale
     )
     # Area lights and the sky have these; in other scenes they are empty.
     emitted, replicates = np.empty((0, 0)), np.empty((0, 0, 0))
     if reference.area or reference.background is not None:
-        emitted = emitted_light(reference, hits.distance)
+        emitted = emitted_light(reference, hits.distance, route)
     if reference.is_sampled:
         shown = mirrored_light(reference, hits)
         surface = surface + shown

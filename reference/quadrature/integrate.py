@@ -21,7 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.kronrod import Pair
-from airlight.analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
+from airlight.analytic.panels import (
+    Panels,
+    adapted,
+    blocks_by_rule,
+    equal_panels,
+    log_distance,
+)
 from airlight.reference.quadrature.intervals import Pieces, Stretches
 from airlight.reference.scene.read import ReferenceLight, ReferenceMedium
 from airlight.reference.scene.varying import VaryingMedium
@@ -40,12 +46,40 @@ _EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
+class Paths:
+    """How much of the extinction attenuates on both ways."""
+
+    camera: float | Array = 1.0  #: fraction a of the depth from the camera; may be by ray
+    light: float = 1.0  #: fraction b of the depth from the light
+    length: float = 0.0  #: M, the constant length of every way from a light [m]
+
+    def of_camera(self, ray: Index) -> Array:
+        """Return the fraction a of rays of these numbers."""
+        if isinstance(self.camera, np.ndarray):
+            return self.camera[ray]
+        return np.full(len(ray), self.camera)
+
+    @property
+    def fall(self) -> float | Array:
+        """The fraction that attenuates along a ray without end, at least; may be by ray."""
+        if isinstance(self.camera, np.ndarray):
+            return np.maximum(self.camera, self.light)
+        return max(self.camera, self.light)
+
+
+WHOLE = Paths()  #: the physical equation
+
+
+@dataclass(frozen=True)
 class Terms:
     """How lights of strength 1 shine on the lit stretches that are summed, and
     how well these are known.
     """
 
     profile: Profile | None = None  #: of lights at places; None: they are isotropic
+    #: r^2 times the distance law of lights at places, by the distance [m]; None for 1
+    law: Callable[[Array], Array] | None = None
+    paths: Paths = WHOLE
     #: fraction of the way to a place that attenuates, from the scattering point on
     shadow_scale: float = 1.0
     #: uncertainty of ends: relative to their distance from a place, or by ray a length [m]
@@ -175,7 +209,7 @@ def _sum_block(
     """Return the sums of the rays of a block, and their errors: infinite where a ray meets a light
     in a medium that scatters.
     """
-    work, pieces = _Sum(rays, integrand, terms.profile), integrand.pieces
+    work, pieces = _Sum(rays, integrand, terms), integrand.pieces
     edge = np.broadcast_to(terms.edge, len(rays.foot))
     rounding = np.zeros(len(rays.foot)) if terms.rounding is None else terms.rounding
     owner, count = pieces.ray - block.start, len(rays.foot[block])
@@ -195,7 +229,7 @@ class _Sum:
 
     rays: Rays
     integrand: Integrand
-    profile: Profile | None
+    terms: Terms
     own: Rays = field(init=False)  # the ray of each piece
     height: Array = field(init=False)
     start: Array = field(init=False)  # where each piece begins, in v or x
@@ -205,14 +239,11 @@ class _Sum:
         pieces = self.integrand.pieces
         self.own = self.rays[pieces.ray]
         if self.rays.w:
-            s0, s1 = pieces.x0 - self.own.foot, pieces.x1 - self.own.foot
-            # Along a ray almost through the light v would grow without bound. A light beside a
-            # piece may as well be at the height of 1e-15 of its distance from the piece: float64
-            # cannot tell.
-            beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
-            self.height = np.maximum(self.own.height, np.maximum(1e-15 * beside, AT_LIGHT))
-            self.start = np.arcsinh(s0 / self.height)
-            self.width = np.arcsinh(s1 / self.height) - self.start
+            # Short pieces far from the foot keep the digits of their width.
+            height = np.maximum(self.own.height, AT_LIGHT)
+            self.start, _, self.width, self.height = log_distance(
+                self.own.foot, height, pieces.x0, pieces.x1
+            )
         else:
             self.height, self.start, self.width = self.own.height, pieces.x0, pieces.x1 - pieces.x0
 
@@ -283,8 +314,10 @@ class _Sum:
                 np.ones_like(v),
             )
         f, depth = self.integrand(rows, x, inside, r, scatter)
-        if self.profile is not None:
-            rate = rate * self.profile(x, self.integrand.pieces.ray[rows])
+        if self.terms.profile is not None:
+            rate = rate * self.terms.profile(x, self.integrand.pieces.ray[rows])
+        if self.terms.law is not None and self.rays.w:
+            rate = rate * self.terms.law(r)
         return f * rate[:, :, None], depth
 
     def edge_error(self, edge: Array, rounding: Array) -> Array:

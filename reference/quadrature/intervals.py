@@ -212,12 +212,17 @@ def whole(lit: Stretches) -> Pieces:
 
 
 def parts_in_media(
-    reference: ReferenceScene, rays: Rays, segments: Segments, lit: Stretches
+    reference: ReferenceScene,
+    rays: Rays,
+    segments: Segments,
+    lit: Stretches,
+    fall: float | Array = 1.0,
 ) -> Pieces:
     """Return the parts of lit stretches in each medium, by ray and distance, for `cut`.
 
     `reference`, `rays`, `segments`: the scene, the rays, and the media along them from
-    `camera_segments`; `lit`: the lit stretches.
+    `camera_segments`; `lit`: the lit stretches; `fall`: the fraction of the extinction that
+    attenuates along a ray without end, a number or by ray [1].
     """
     ray, x0, x1 = lit
     parts = []
@@ -235,7 +240,13 @@ def parts_in_media(
         # It is cut where exp underflows: an optical depth of 745 behind its beginning or the
         # light's foot.
         sigma_t = reference.medium.sigma_t
-        reach = np.maximum(low, rays.foot[ray]) + 745.0 / sigma_t[sigma_t > 0].min()
+        own = fall[ray] if isinstance(fall, np.ndarray) else np.float64(fall)
+        with np.errstate(divide="ignore"):
+            reach = 745.0 / (sigma_t[sigma_t > 0].min() * own)
+        # Where nothing attenuates, light that falls as 1/r^2 has 1e-20 of it behind 1e20 times the
+        # distance of the light.
+        reach = np.minimum(reach, 1e20 * np.maximum(np.hypot(rays.foot, rays.height)[ray], 1.0))
+        reach = np.maximum(low, rays.foot[ray]) + reach
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))
     return Pieces(ray, number, low, high, first, last, np.arange(len(ray)))[order]

@@ -7,8 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.quadrature.fields import field_of
-from airlight.reference.quadrature.integrate import Terms, profile_of
+from airlight.reference.quadrature.integrate import Terms
 from airlight.reference.quadrature.intervals import Stretches, lit_stretches
+from airlight.reference.quadrature.model_terms import (
+    Route,
+    fade_along,
+    lamp_terms,
+    largest_law,
+    of_lamps,
+    ray_factor,
+    route_of,
+    strength_of,
+)
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.scene.shapes import Shapes, read_shapes
@@ -51,27 +61,36 @@ def light_airlight(
     shadow_scale: float = 1.0,
     checks: int = 32,
     shapes: Shapes | None = None,
+    route: Route | None = None,
 ) -> LightAirlight:
     """Compute the airlight of one point, spot or directional light along every ray.
 
     `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface,
     (rays,), infinite where there is none [m]; `shadow_scale`: see
-    `reference.quadrature.image.quadrature_image`; `checks`, `shapes`: see `lit_rays`.
+    `reference.quadrature.image.quadrature_image`; `checks`, `shapes`: see `lit_rays`; `route`:
+    where the fog begins and ends, if that is known.
     """
     illumination = lit_rays(reference, light, distance, checks=checks, shapes=shapes)
+    reached = reaches(illumination.lit, distance)
+    # A model may have fog behind the surface, where other parts are lit.
+    route = route_of(reference, distance) if route is None else route
+    if np.any(route.end > distance):
+        end = np.maximum(route.end, distance)
+        illumination = lit_rays(reference, light, end, checks=checks, shapes=shapes)
     rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
     if isinstance(light, DirectionalLight):
         strength = light.irradiance
-        radiance, error = _sun_sums(reference, light, illumination)
+        radiance, error = _sun_sums(reference, light, illumination, route)
     else:
         strength = light.intensity
-        radiance, error = lit_sums(reference, light, rays, lit, distance, shadow_scale)
+        radiance, error = lit_sums(reference, light, rays, lit, route, shadow_scale)
         # The angle at the camera between ray and light counts where the foot of the light is before
         # the surface.
         in_front = (rays.foot > 0) & (rays.foot < distance)
         angle = np.where(in_front, np.arctan2(rays.height, rays.foot), angle)
     error = error + worth_of_doubt(reference, rays, lit) * strength
-    return LightAirlight(radiance, error, angle, lit, reaches(lit, distance))
+    factor = strength_of(reference, light) * ray_factor(reference, route)
+    return LightAirlight(factor * radiance, factor * error, angle, lit, reached)
 
 
 def lit_sums(
@@ -79,20 +98,21 @@ def lit_sums(
     light: ReferenceLight,
     rays: Rays,
     lit: LitIntervals,
-    distance: Array,
+    route: Route,
     shadow_scale: float = 1.0,
 ) -> tuple[Array, Array]:
     """Return the airlight of a point or spot light from the lit intervals of rays, and
     its error, (rays, 3) each.
     """
-    stretches = lit_stretches(light, rays, lit)
-    terms = Terms(profile_of(light, rays), shadow_scale, lit.edge)
-    value, error = field_of(reference).sums(rays, stretches, distance, terms)
+    lamp = lamp_terms(reference, light, rays, lit_stretches(light, rays, lit), route)
+    terms = Terms(lamp.profile, lamp.law, route.paths, shadow_scale, lit.edge)
+    field = field_of(of_lamps(reference))
+    value, error = field.sums(lamp.rays, lamp.stretches, route.end, terms)
     return value * light.intensity, error * light.intensity
 
 
 def _sun_sums(
-    reference: ReferenceScene, light: DirectionalLight, found: LitRays
+    reference: ReferenceScene, light: DirectionalLight, found: LitRays, route: Route
 ) -> tuple[Array, Array]:
     rays, lit = found.rays, found.lit
     _, _, high = stretches = sun_stretches(reference, found)
@@ -100,8 +120,9 @@ def _sun_sums(
     # kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
-    terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
-    value, error = field_of(reference).sums(rays, stretches, found.distance, terms)
+    rounding = np.finfo(float).eps * scale
+    terms = Terms(fade_along(reference), None, route.paths, edge=edge, rounding=rounding)
+    value, error = field_of(reference).sums(rays, route.clipped(stretches), route.end, terms)
     return value * light.irradiance, error * light.irradiance
 
 
@@ -178,10 +199,11 @@ def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> 
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one,
     and the phase function at most its largest value. For a directional light it is exp(-tau) p, in
-    the distance.
+    the distance. A distance law has its largest r^2 f(r).
     """
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt
-    part = part / rays.height[ray] if rays.w else part
-    np.add.at(worth, ray, part[:, None] * field_of(reference).strongest / (4 * np.pi))
+    field = field_of(of_lamps(reference) if rays.w else reference)
+    part = part / rays.height[ray] * largest_law(reference, rays)[ray] if rays.w else part
+    np.add.at(worth, ray, part[:, None] * field.strongest / (4 * np.pi))
     return worth

@@ -43,6 +43,7 @@ from airlight.reference.quadrature.replicates import Keep, PointPlan
 from airlight.reference.quadrature.replicates import Kept as Part
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.convex_bounds import holds
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
@@ -61,6 +62,10 @@ class ReferenceInputs(Inputs):
     pixel: str = "centre"  #: the same
     #: samples of area lights of each replicate; None for as many as their error needs
     points: int | None = None
+    model: Model = PHYSICAL  #: the equation, whose name counts for nothing
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "model", replace(self.model, name=""))
 
 
 def reference_result(
@@ -84,6 +89,7 @@ def reference_image(
     shadow_scale: float = 1.0,
     pixel: str = "centre",
     points: int | None = None,
+    model: Model = PHYSICAL,
     progress: Progress | None = None,
 ) -> ReferenceImage:
     """Return the quadrature reference of a scene at its own size, from the cache or computed.
@@ -92,7 +98,7 @@ def reference_image(
     ----------
     scene
         The scene.
-    checks, shadow_scale, pixel, points
+    checks, shadow_scale, pixel, points, model
         See `ReferenceInputs`.
     progress
         Called with (done, total, what) as the work goes on.
@@ -107,14 +113,14 @@ def reference_image(
     InputError
         For radiance that is not finite.
     """
-    inputs = ReferenceInputs(scene_content(scene), checks, shadow_scale, pixel, points)
+    inputs = ReferenceInputs(scene_content(scene), checks, shadow_scale, pixel, points, model)
     return reference_result(scene, inputs, progress=progress).value
 
 
 def _computed(
     scene: mi.Scene, inputs: ReferenceInputs, progress: Progress | None
 ) -> ReferenceImage:
-    reference, points = read_reference(scene), inputs.points
+    reference, points = read_reference(scene, inputs.model), inputs.points
     # A given number of points is fixed: first and most are the same, and no error is asked for.
     return _checked_image(
         reference,
@@ -188,6 +194,8 @@ def _parts(key: str | None) -> Keep:
 
 def check_camera(reference: ReferenceScene) -> None:
     """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
+    if not _is_infinite(reference.model):
+        return
     for number, light in enumerate(reference.lights, 1):
         distance = float(np.linalg.norm(light.position - reference.origin))
         if distance <= _uncertainty(reference, light) and _scatters(reference, light):
@@ -202,6 +210,8 @@ def check_rays(reference: ReferenceScene, distance: Array) -> None:
     """Refuse rays through pixel centres that meet a light before the visible surface,
     so far away, (rays,) [m].
     """
+    if not _is_infinite(reference.model):
+        return
     ends = np.ravel(distance)
     for number, light in enumerate(reference.lights, 1):
         origin = np.broadcast_to(reference.origin, reference.direction.shape)
@@ -242,6 +252,12 @@ def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
                 "scene be too large: "
                 "move the light, or use other units"
             )
+
+
+def _is_infinite(model: Model) -> bool:
+    """Return whether the airlight of lamps grows without a bound beside them."""
+    law, (lamps, _, _) = model.law_of(surface=False), model.factors
+    return not law.is_finite and model.constant is None and lamps > 0
 
 
 def _name(number: int, light: ReferenceLight) -> str:

@@ -42,6 +42,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.quadrature.model_terms import (
+    Route,
+    depth_of_behind,
+    route_of,
+    surface_strength,
+)
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
@@ -96,6 +102,7 @@ class Reflection:
 def lit_surface(
     reference: ReferenceScene,
     hits: SurfaceHits,
+    route: Route,
     *,
     reached: Sequence[NDArray[np.bool_]],
     shadow_scale: float = 1.0,
@@ -103,9 +110,9 @@ def lit_surface(
     """Return the radiance of the surface at each pixel centre that point, spot and directional
     lights give it, and an estimate of its error, (pixels, 3) each [W/(m^2 sr)].
 
-    `reference`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones
-    last, whether it reaches the surface at the end of each ray, as its lit intervals say;
-    `shadow_scale`: see `reference.quadrature.image`.
+    `reference`, `hits`, `route`: the scene, what its rays hit, and where their fog is; `reached`:
+    by light, the directional ones last, whether it reaches the surface at the end of each ray, as
+    its lit intervals say; `shadow_scale`: see `reference.quadrature.image`.
     """
     interaction = hits.interaction
     total, error = np.zeros((2, len(hits.distance), 3))
@@ -114,9 +121,7 @@ def lit_surface(
     far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
     point = reference.origin + far[:, None] * reference.direction
     size = np.abs(point).max(axis=1)
-    to_camera = optical_depth(
-        reference, reference.origin, reference.direction, np.zeros(len(far)), far
-    )
+    to_camera, light_scale = depth_of_behind(reference, route), reference.model.surface_paths[1]
     # The emitters are sorted like `lights`: places first, then directions.
     emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
@@ -151,7 +156,12 @@ def lit_surface(
         doubt = np.where(np.isfinite(doubt), doubt, np.abs(radiance))
         # A directional light's segment goes to the end of all floats: only bounded media can be on
         # it.
-        depth = to_camera + optical_depth(reference, point, way, np.zeros(len(point)), r)
+        depth = to_camera
+        if light_scale:
+            to_light = optical_depth(reference, point, way, np.zeros(len(point)), r)
+            depth = depth + light_scale * to_light
+        factor = surface_strength(reference, light, point)[:, None]
+        radiance, doubt = factor * radiance, factor * doubt
         lit = (np.array(facing, dtype=bool) & reaches)[:, None]
         transmittance = np.exp(-depth)
         total += np.where(lit, radiance * transmittance, 0.0)
@@ -194,14 +204,15 @@ def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     return total
 
 
-def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
+def emitted_light(reference: ReferenceScene, distance: Array, route: Route | None = None) -> Array:
     """Return the radiance of area lights before the visible surface, and of the
     background where there is none.
 
     In W/(m^2 sr), (rays, 3).
 
     `reference`: the scene, whose rays may have an origin each, (rays, 3); `distance`: to the
-    visible surface, (rays,), infinite where there is none [m].
+    visible surface, (rays,), infinite where there is none [m]; `route`: where the fog of rays
+    begins and ends, by default from the origin to the surface.
 
     Valid for the side that emits; a light of material `null` is seen with what is behind it,
     a black one ends the ray.
@@ -224,14 +235,8 @@ def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
             total[rows] += light.radiance * np.exp(-depth)
     if reference.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
-        # The background is seen through all media: 1e30 m is beyond their bounds.
-        depth = optical_depth(
-            reference,
-            origin[rows],
-            reference.direction[rows],
-            np.zeros(len(rows)),
-            np.full(len(rows), 1e30),
-        )
+        route = route_of(reference, distance) if route is None else route
+        depth = depth_of_behind(reference, route)[rows]
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
         interaction.wi = vectors(mi.Vector3f, -reference.direction[rows])
         total[rows] += as_rows(reference.background.eval(interaction)) * np.exp(-depth)

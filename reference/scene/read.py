@@ -6,14 +6,23 @@ on purpose: this one asks Mitsuba's emitters for their intensity and reads the p
 medium, where the other does it the other way round.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.phase import HenyeyGreenstein, Isotropic, PhaseFunction, Rayleigh, Tabulated
+from airlight.analytic.phase import (
+    CornetteShanks,
+    HenyeyGreenstein,
+    Isotropic,
+    PhaseFunction,
+    Rayleigh,
+    Tabulated,
+    phase_from_words,
+)
 from airlight.errors import InputError
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from airlight.reference.scene.camera import (
@@ -29,6 +38,7 @@ from airlight.reference.scene.directional_light import (
     is_directional,
     read_directional,
 )
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.transforms import SAME, matrix_of, stretch
 from airlight.reference.scene.varying import (
     NO_EXTINCTION,
@@ -111,6 +121,13 @@ class ReferenceScene:
     #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None
     #: where none arrives: through an unbounded homogeneous medium
     sky: Array | None = None
+    #: the equation; media already have its phase function, and the albedo 1 of a lit density
+    model: Model = PHYSICAL
+
+    @property
+    def axis(self) -> Array:
+        """The direction in which the camera looks, a unit vector."""
+        return camera_matrix(self.scene.sensors()[0])[:3, 2]
 
     @property
     def is_sampled(self) -> bool:
@@ -118,8 +135,8 @@ class ReferenceScene:
         return bool(self.area) or self.sky is not None
 
 
-def read_reference(scene: "mi.Scene") -> ReferenceScene:
-    """Read a Mitsuba scene of the current RGB variant.
+def read_reference(scene: "mi.Scene", model: Model = PHYSICAL) -> ReferenceScene:
+    """Read a Mitsuba scene of the current RGB variant, for the equation of a model.
 
     Raises InputError for a scene whose reference cannot be computed; the message names the shape,
     the light or the medium that is the reason.
@@ -150,7 +167,7 @@ def read_reference(scene: "mi.Scene") -> ReferenceScene:
     suns = tuple(read_directional(emitter) for emitter in emitters if is_directional(emitter))
     # Light from infinity never arrives through an unbounded medium, nor along paths in height fog
     # that do not rise.
-    for sun in suns:
+    for sun in suns if model.light_scale > 0 else ():
         name = sun.emitter.id()
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(
@@ -170,6 +187,12 @@ def read_reference(scene: "mi.Scene") -> ReferenceScene:
             f"light '{background.id()}' is a sky: nothing of it arrives through a medium without "
             "bounds; give the medium bounds, or add a light"
         )
+    if not model.is_physical and (area or sky is not None):
+        wide = [emitter for emitter in emitters if is_area(emitter)] or [background]
+        raise InputError(
+            f"light '{wide[0].id()}' has an extent, of which the model {model.title} says nothing; expected "
+            "points, spots and suns: leave the model out, or take such lights"
+        )
     return ReferenceScene(
         scene=scene if background is None else _rebuilt(scene, emitters),
         occluders=scene_of(opaque, scene),
@@ -177,14 +200,34 @@ def read_reference(scene: "mi.Scene") -> ReferenceScene:
         height=height,
         origin=origin,
         direction=film_directions(sensor, pixel_centres((width, height)), (width, height)),
-        medium=medium,
+        medium=_modelled(medium, model),
         lights=lights,
-        media=media,
+        media=tuple(_modelled(each, model) for each in media),
         directional=suns,
         area=area,
         background=background,
         sky=sky,
+        model=model,
     )
+
+
+AnyMedium = TypeVar("AnyMedium", bound=ReferenceMedium | VaryingMedium)
+
+
+def _modelled(medium: AnyMedium, model: Model) -> AnyMedium:
+    """Return a medium with the phase function of a model, and the albedo 1 of a lit density."""
+    if model.lit_scale is not None:
+        medium = replace(medium, albedo=np.ones(3))
+    if model.phase in ("scene", "none"):  # `none` is one of lamps alone
+        return medium
+    if model.phase != "cornette-shanks":
+        return replace(medium, phase=phase_from_words(model.phase))
+    if not isinstance(medium.phase, HenyeyGreenstein | Isotropic):
+        raise InputError(
+            f"model: cornette-shanks takes the g of the scene, whose phase function is "
+            f"{medium.phase.name}; expected hg or isotropic, or name another in the model"
+        )
+    return replace(medium, phase=CornetteShanks(getattr(medium.phase, "g", 0.0)))
 
 
 def homogeneous_around(reference: ReferenceScene) -> ReferenceMedium:

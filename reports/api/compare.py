@@ -16,11 +16,13 @@ from airlight.reports.api.inputs import (
     Files,
     ImageLike,
     Mask,
+    ModelLike,
     Progress,
     SceneLike,
     Values,
     Words,
     changes_of,
+    chosen_model,
     exclude,
     listed,
     one_error,
@@ -51,6 +53,8 @@ def compare(
     pixel: Literal["centre", "area"] | None = None,
     mask: Mask | None = None,
     margin: float | None = None,
+    margin_total: float | None = None,
+    model: ModelLike | None = None,
     all_metrics: bool = False,
     diagnose: bool = False,
     fit: Words | None = None,
@@ -94,6 +98,12 @@ def compare(
     margin
         Largest relative bias that counts as agreement, such as 0.005; two images need standard
         errors for it, or the bound that a reference states.
+    margin_total
+        With a model: the same against the physical equation.
+    model
+        With a scene: judge by the equation of an engine, such as playcanvas:range=8, see `airlight list models`, or
+        by terms such as light-path=off. The error of the equation and that of the algorithm are then told apart.
+        With `--diagnose` faults are looked for on top of it. physical leaves out the model that a scene file names.
     all_metrics
         Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
@@ -157,16 +167,19 @@ def compare(
             "pixel": pixel,
             "diagnose": diagnose,
             "fit": fit,
+            "model": model,
+            "margin_total": margin_total,
         }
         exclude("compare", "two images have no scene", {**of_scenes, "frames": frames})
     if diagnose:
         exclude(
             "diagnose",
             "asks about all pixels of one image",
-            {"fit": fit, "mask": mask, "frames": frames, **about},
+            {"fit": fit, "mask": mask, "frames": frames, "margin_total": margin_total, **about},
         )
     if fit is not None:
-        exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
+        of_models = {"model": model, "margin_total": margin_total}
+        exclude("fit", "asks for the fog of one image", {"frames": frames, **of_models, **about})
     check_scene(scene)
     # Several files: frames of an animation with frames.json, or independent renders of one frame.
     # Both are judged as a whole, so that a choice of pixels or a diagnosis of one image has no
@@ -179,7 +192,9 @@ def compare(
                 "one of the files"
             )
         exclude(
-            "compare", "several files are judged together", about | {"mask": mask, "margin": None}
+            "compare",
+            "several files are judged together",
+            about | {"mask": mask, "margin": None, "model": model, "margin_total": margin_total},
         )
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         how["changes"] = changes_of(change)
@@ -204,6 +219,7 @@ def compare(
     if scene is None:
         return _two_images(reference, test, layer, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel, "changes": changes_of(change)}
+    how["model"] = chosen_model(model)
     # The diagnosis and the comparison with a scene read files; an array is written to one.
     with _as_file(test) as (path, name):
         from airlight.reference.storage.exr import read_exr
@@ -213,6 +229,7 @@ def compare(
         activate()
         if diagnose:
             return _diagnose(str(scene), path, name, progress=progress, **how)
+        options |= {"margin_total": margin_total}
         return _with_scene(str(scene), path, name, files=files, progress=progress, **how, **options)
 
 

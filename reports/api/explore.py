@@ -6,18 +6,20 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     Files,
     KernelLike,
     MethodLike,
+    ModelLike,
     Progress,
     SceneLike,
     Size,
     Values,
     changes_of,
+    chosen_model,
     configuration_of,
     exclude,
     note,
@@ -30,6 +32,9 @@ from airlight.reports.tables.record import OfScene, Result
 from airlight.reports.tables.table import Table
 from airlight.validation.scenes.names import check_scene
 
+if TYPE_CHECKING:
+    from airlight.validation.scenes.loading import LoadedScene
+
 
 @one_error
 def describe(
@@ -37,6 +42,7 @@ def describe(
     *,
     change: Values = (),
     size: Size | None = None,
+    model: ModelLike | None = None,
     variants: Literal["all"] | None = None,
     output: Files = (),
     progress: Progress = None,
@@ -56,6 +62,9 @@ def describe(
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
+    model
+        Name the equation of an engine, such as playcanvas:range=8, see `airlight list models`; by
+        default the one that a scene file names.
     variants
         all: write the changed scenes of `airlight check` into the folder of `--output`, each as JSON
         and as glTF, and check.json, which names the frames to render.
@@ -72,17 +81,18 @@ def describe(
     """
     # Names are checked before Mitsuba starts.
     if variants is not None:
-        exclude("variants", "are those of a scene as it is", {"change": several(change)})
+        beside = {"change": several(change), "model": model}
+        exclude("variants", "are those of a scene as it is", beside)
         return _variants(scene, size, several(output))
     files = output_files(output, ".glb", ".vol")
     check_scene(scene)
-    changes = changes_of(change)
+    changes, chosen = changes_of(change), chosen_model(model)
     from airlight.reports.api.scenes import opened
     from airlight.reports.interchange.gltf import write_gltf
     from airlight.reports.interchange.scene import describe_scene
     from airlight.validation.scenes.changes import change_words
 
-    loaded = opened(scene, size, changes)
+    loaded = opened(scene, size, changes, chosen)
     # A .vol file holds a medium that varies, sampled to a grid; every other file is glTF.
     described = describe_scene(loaded)
     volumes = [path for path in files if path.suffix.lower() == ".vol"]
@@ -94,6 +104,7 @@ def describe(
         changes=tuple(change_words(changes)),
         gltf=written[-1] if written else None,
         grid=grids[-1] if grids else "",
+        advice=_model_advice(loaded) if chosen is None else "",
     )
 
 
@@ -105,6 +116,7 @@ class Description(Result):
     changes: tuple[str, ...] = ()  #: of the scene, in words
     gltf: Mapping[str, Any] | None = None  #: the glTF file that was written
     grid: str = ""  #: the medium that reads the volume file that was written, as XML
+    advice: str = ""  #: the model that the engine of a height fog solves, where none is named
 
     def __getitem__(self, name: str) -> Any:
         """Return a part of the description, such as 'camera' or 'lights'."""
@@ -134,10 +146,15 @@ class Description(Result):
 
     @property
     def lines(self) -> Sequence[str]:
-        """The command that judges an image, and the files that were written."""
+        """The command that judges an image, the model, and the files that were written."""
+        from airlight.validation.scenes.models import model_line
+
         options = [word for change in self.changes for word in ("--change", change)]
         command = ["airlight", "compare", self["source"], self["file"]["name"], *options]
         lines = [f"to judge it: {shlex.join(command)}"]
+        if self["model"] is not None:
+            lines.append(model_line(**self["model"]))
+        lines += [self.advice] if self.advice else []
         if self.gltf is not None:
             # glTF knows triangles only: shapes that Mitsuba intersects in closed form have become
             # meshes, which the user must know when the silhouettes differ.
@@ -148,8 +165,23 @@ class Description(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the description, its changes, and the files that were written."""
-        own = {"changes": list(self.changes), "gltf": self.gltf, "grid": self.grid}
+        own = {
+            "changes": list(self.changes),
+            "gltf": self.gltf,
+            "grid": self.grid,
+            "advice": self.advice,
+        }
         return {**self.described, **{name: value for name, value in own.items() if value}}
+
+
+def _model_advice(loaded: "LoadedScene") -> str:
+    """Return which model the height fog of an engine asks for, nothing where one is named."""
+    from airlight.validation.scenes.models import preset_of_fog
+
+    preset = preset_of_fog(loaded.fog_engine)
+    if preset is None or not loaded.model.is_physical:
+        return ""
+    return f"--model {preset.usage} solves this engine's own equation ({preset.title})"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -23,6 +23,7 @@ from airlight.reports.machine.progress import progress_bar
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from airlight.reference.scene.model import Model
     from airlight.reference.storage.exr import Image
     from airlight.reports.api.results import LayeredImage
     from airlight.validation.scenes.loading import LoadedScene
@@ -49,13 +50,15 @@ if TYPE_CHECKING:
     #: Pixels that may take part, (height, width) of truth values, or an EXR file that is
     #: 0 in those to leave out.
     Mask: TypeAlias = ArrayLike | str | os.PathLike[str]
+    #: A preset of `airlight list models`, its parameters, or terms, as words; or a model.
+    ModelLike: TypeAlias = Model | str
     #: Values by name, or words NAME=VALUE.
     Values: TypeAlias = Mapping[str, Any] | Sequence[str] | str
     Words: TypeAlias = str | Sequence[Any]
     File: TypeAlias = str | os.PathLike[str]
     Files: TypeAlias = File | Sequence[File]
 else:
-    SceneLike = MethodLike = KernelLike = Size = ImageLike = Words = str
+    SceneLike = MethodLike = KernelLike = ModelLike = Size = ImageLike = Words = str
     Scenes = Methods = Kernels = Values = Sequence[str]
     Progress = bool
     Mask = File = Path
@@ -185,6 +188,20 @@ def changes_of(change: Any) -> dict[str, tuple[float, ...]]:
     if isinstance(change, Mapping):
         change = [f"{name}={_numbers(value)}" for name, value in change.items()]
     return parse_changes(several(change))
+
+
+def chosen_model(model: Any) -> "Model | None":
+    """Return a model, from words or as it is given; None where none is."""
+    from airlight.reference.scene.model import Model
+    from airlight.validation.scenes.models import model_of
+
+    if model is None or isinstance(model, Model):
+        return model
+    if not isinstance(model, str):
+        raise InputError(
+            f"model: got {model!r}, expected words such as 'playcanvas:range=8', or airlight.Model"
+        )
+    return model_of(model)
 
 
 def _numbers(value: Any) -> str:

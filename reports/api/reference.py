@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from airlight.errors import InputError, nearest
 from airlight.reports.api.inputs import (
     Files,
+    ModelLike,
     Progress,
     SceneLike,
     Size,
     Values,
     changes_of,
+    chosen_model,
     exclude,
     note,
     one_error,
@@ -49,6 +51,7 @@ def reference(
     seconds: float | None = None,
     seed: int = 0,
     orders: str | None = None,
+    model: ModelLike | None = None,
     merge: Files = (),
     cluster: str | None = None,
     progress: Progress = None,
@@ -87,6 +90,10 @@ def reference(
     orders
         For clouds, by cloud-paths or volpath: layers by order of scattering, such as 1,2,3-4,5-inf.
         'sets', the default of cloud-paths, are the orders of Bouthors 2008; 'all' writes no layers.
+    model
+        For quadrature and single-scatter: the equation of an engine in place of the physical one, such
+        as playcanvas:range=8, see `airlight list models`, or terms such as light-path=off; physical
+        leaves out the model that a scene file names. From Python also an `airlight.Model`.
     merge
         Trace nothing, and merge the samples of these files: Monte Carlo references of the scene by
         one estimator, with different seeds; may be given several times.
@@ -125,6 +132,7 @@ def reference(
             "orders": orders,
             "cluster": cluster,
             "change": change,
+            "model": model,
         }
         others = {"pixel": pixel != "centre", "estimator": estimator != "quadrature"}
         exclude("merge", "traces nothing", budgets | of_tracing | others)
@@ -170,14 +178,16 @@ def reference(
         exclude("quadrature", "draws no samples", {**budgets, "seed": seed or None})
     # All words are checked; now Mitsuba starts.
     check_scene(scene)
-    changes = changes_of(change)
+    changes, asked = changes_of(change), chosen_model(model)
     from airlight.reports.machine.environment import activate
 
     activate()
     from airlight.realtime.scene.read_scene import scene_notes
     from airlight.reports.api.scenes import opened
+    from airlight.validation.estimates.monte_carlo import check_model
 
-    loaded = opened(scene, pixels_of(size), changes)
+    loaded = opened(scene, pixels_of(size), changes, asked)
+    check_model(loaded.model, estimator)
     note(progress, scene_notes(loaded.scene))
     # A run that would take days is refused with an estimate; a long one begins with a note.
     note(progress, _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None))
@@ -252,14 +262,22 @@ def _elsewhere(
     image = image_of(loaded, (width, height), changes)
     # A worker computes the quadrature now, and it is then in the cache of this machine.
     if budget is None:
-        bring_references(workers, [image], pixel=pixel)
+        bring_references(workers, [image], pixel=pixel, model=loaded.model)
         return None
     batches, samples = batch_plan(budget, width * height)
     # With a number of samples all batches are known before the first is traced; with an error they
     # are asked for until it is reached.
     known = None if budget.samples is None else batches
     chosen = cloud_orders(orders) if orders else None
-    return tracing(workers, image, estimator, samples=samples, batches=known, orders=chosen)
+    return tracing(
+        workers,
+        image,
+        estimator,
+        samples=samples,
+        batches=known,
+        orders=chosen,
+        model=loaded.model,
+    )
 
 
 def _quadrature(
@@ -272,12 +290,15 @@ def _quadrature(
 
     # The whole image, from the cache where it was computed before.
     quadrature = reference_image(
-        loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what)
+        loaded.scene,
+        pixel=pixel,
+        model=loaded.model,
+        progress=lambda done, total, what: tell(done / total, what),
     )
     said = reference_record(quadrature)
     return Reference(
         scene=loaded.name,
-        image=sealed(layered_reference(loaded, quadrature, pixel=pixel)),
+        image=sealed(layered_reference(loaded, quadrature, pixel=pixel, model=loaded.model)),
         estimator="quadrature",
         relative_error=float("nan") if said.relative_error is None else said.relative_error,
         how=said,
@@ -305,6 +326,7 @@ def _sampled(
         budget=budget,
         seed=seed,
         orders=chosen,
+        model=loaded.model,
         progress=tell,
         elsewhere=elsewhere,
     )

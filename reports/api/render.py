@@ -19,11 +19,13 @@ from airlight.reports.api.inputs import (
     Files,
     KernelLike,
     MethodLike,
+    ModelLike,
     Progress,
     SceneLike,
     Size,
     Values,
     changes_of,
+    chosen_model,
     configuration_of,
     exclude,
     kernel_name,
@@ -46,7 +48,9 @@ _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
 
 @one_error
-def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
+def load_scene(
+    scene: SceneLike, size: Size | None = None, *, model: ModelLike | None = None
+) -> "OpenScene":
     """Load a scene.
 
     Parameters
@@ -56,6 +60,9 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
         dictionary, or a Mitsuba scene.
     size
         Width and height of its image [pixels], or 'WxH'; the scene's own by default.
+    model
+        The equation of its references, see `reference`; by default the one that its file names,
+        else the physical one.
 
     Raises
     ------
@@ -72,9 +79,10 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     '1 point'
     """
     check_scene(scene)
+    chosen = chosen_model(model)
     from airlight.reports.api.scenes import opened
 
-    return opened(scene, size)
+    return opened(scene, size, model=chosen)
 
 
 @one_error

@@ -18,10 +18,12 @@ from airlight.reports.api.inputs import (
     File,
     Kernels,
     Methods,
+    ModelLike,
     Progress,
     Scenes,
     Size,
     Values,
+    chosen_model,
     exclude,
     note,
     one_error,
@@ -35,6 +37,7 @@ from airlight.reports.tables.table import Table
 from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
+    from airlight.reference.scene.model import Model
     from airlight.reports.data import records
     from airlight.reports.diff.compare import Difference
     from airlight.validation.engine.images import EngineImage
@@ -139,6 +142,7 @@ def report(
     kernel: Kernels = (),
     settings: Values = (),
     images: File | None = None,
+    model: ModelLike | None = None,
     output: File | None = None,
     from_: File | None = None,
     figures: Literal["single", "double"] | None = None,
@@ -177,6 +181,9 @@ def report(
     images
         Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to
         compare with the reference.
+    model
+        For images: judge them by the equation of an engine, such as playcanvas:range=8, see
+        `airlight list models`; methods are judged by the physical equation.
     output
         Folder for the report; airlight-report by default.
     from_
@@ -216,6 +223,7 @@ def report(
             "kernel": kernel,
             "set": settings,
             "images": images,
+            "model": model,
             "fresh": fresh,
         }
         shown = {"a scene": scenes, "method": method} if figures is None else {}
@@ -229,7 +237,12 @@ def report(
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
     asked = (several(scenes), several(method), several(kernel), settings)
+    if images is None:
+        exclude(
+            "report", "methods are judged by physics; a model is for --images", {"model": model}
+        )
     places = {"images": images, "output": output, "figures": figures, "cluster": cluster}
+    places["model"] = model if model is None or isinstance(model, str) else model.terms
     # report.json says how to make it again.
     pixels = pixels_of(size)
     asked_size = None if pixels is None else f"{pixels[0]}x{pixels[1]}"
@@ -241,6 +254,7 @@ def report(
         *asked,
         size=pixels,
         images=images,
+        model=chosen_model(model),
         fresh=fresh,
         cluster=cluster,
         command=command,
@@ -344,6 +358,7 @@ def _measured(
     *,
     size: tuple[int, int] | None,
     images: Any,
+    model: "Model | None",
     fresh: bool,
     cluster: str | None,
     command: str,
@@ -414,6 +429,7 @@ def _measured(
                 study, scenes=tuple(names), random=RandomScenes(), configurations=tuple(chosen)
             ),
             images=shown,
+            model=model,
             command=command,
             fresh=fresh,
             apart=apart,

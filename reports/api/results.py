@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from airlight.errors import InputError
-from airlight.reference.storage.exr import TOTAL, Image
+from airlight.reference.storage.exr import MODEL, TOTAL, Image
 from airlight.reference.storage.exr import layer as image_layer
 from airlight.reports.data.records import Reference as QuadratureReference
 from airlight.reports.plotting.pictures import (
@@ -35,6 +35,7 @@ from airlight.reports.tables.methods import rate_words
 from airlight.reports.tables.record import OfScene, Result
 from airlight.validation.columns import plain
 from airlight.validation.estimates.images import MonteCarloReference
+from airlight.validation.scenes.models import model_line, model_parts
 from airlight.validation.timing import FrameTimes
 
 Array = NDArray[np.floating]
@@ -282,7 +283,11 @@ class Reference(LayeredImage):
         # JSON has the mean of each layer, (channels,), not its pixels.
         means = {name: layer.mean(axis=(0, 1)) for name, layer in self.image.layers.items()}
         said = {name: self.image.attributes.get(f"airlight:{name}") for name in _MADE}
-        known = {name: value for name, value in said.items() if value is not None}
+        known = {
+            name: value
+            for name, value in {**said, "model": self.model}.items()
+            if value is not None
+        }
         return super().to_dict() | plain({"means": means, **known})
 
     @property
@@ -296,6 +301,8 @@ class Reference(LayeredImage):
         """Its means and its error."""
         # The opacity is a fraction and has no unit.
         lines, made = [self.title], self.to_dict()
+        if self.model is not None:
+            lines.append(f"  {model_line(**self.model)}")
         for name, mean in made["means"].items():
             unit = "" if name == "opacity" else " W/(m^2 sr)"
             lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
@@ -340,8 +347,16 @@ class Reference(LayeredImage):
 
     @property
     def title(self) -> str:
-        """Title of the reference."""
-        return f"{self.scene}, the reference by {self.estimator}"
+        """Title of the reference, of a model by its name."""
+        model = self.model
+        of = "" if model is None else f" of the model {model['name'] or model['terms']}"
+        return f"{self.scene}, the reference{of} by {self.estimator}"
+
+    @property
+    def model(self) -> dict[str, str] | None:
+        """Name and terms of the model whose reference it is; None of the physical equation."""
+        words = self.image.attributes.get(MODEL)
+        return None if words is None else model_parts(str(words))
 
 
 def _error_words(how: MonteCarloReference) -> str:

@@ -3,12 +3,13 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mitsuba as mi
 
 from airlight.errors import InputError
+from airlight.reference.scene.model import Model
 from airlight.reference.storage.scene_digest import build_scene
 from airlight.reports.api.inputs import one_error, pixels_of
 from airlight.validation.scenes.bodies import check_bodies
@@ -50,11 +51,21 @@ class OpenScene(LoadedScene):
 
 
 def opened(
-    scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None
+    scene: Any,
+    size: Any = None,
+    changes: Mapping[str, tuple[float, ...]] | None = None,
+    model: Model | None = None,
 ) -> OpenScene:
     """Return a scene at a size, its own by default; a scene that was loaded
     before is left as it is.
+
+    A `model` stands in the place of that which the scene names.
     """
+    loaded = _opened(scene, size, changes)
+    return loaded if model is None else replace(loaded, model=model)
+
+
+def _opened(scene: Any, size: Any, changes: Mapping[str, tuple[float, ...]] | None) -> OpenScene:
     from airlight.reports.machine.environment import activate
 
     activate()
@@ -83,9 +94,7 @@ def opened(
 def _as_open(loaded: LoadedScene) -> OpenScene:
     if isinstance(loaded, OpenScene):
         return loaded
-    return OpenScene(
-        loaded.name, loaded.scene, loaded.purpose, loaded.published, loaded.path, loaded.animation
-    )
+    return OpenScene(**vars(loaded))
 
 
 def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:

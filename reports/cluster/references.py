@@ -20,6 +20,7 @@ from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.reference import ReferenceInputs, reference_result
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import fresh_results, fresh_since, is_kept, keep
 from airlight.reports.cluster.connect import Client, facts
@@ -48,24 +49,29 @@ def image_of(
 
 
 def bring_references(
-    cluster: Client, images: Sequence[Cell], *, pixel: str = "centre", points: int | None = None
+    cluster: Client,
+    images: Sequence[Cell],
+    *,
+    pixel: str = "centre",
+    points: int | None = None,
+    model: Model = PHYSICAL,
 ) -> None:
     """Let workers compute the quadrature references of images that are not in the
     cache, and keep them here.
 
-    `pixel`, `points`: see `reference.quadrature.reference.ReferenceInputs`.
+    `pixel`, `points`, `model`: see `reference.quadrature.reference.ReferenceInputs`.
     """
 
     def inputs_of(image: Cell) -> ReferenceInputs:
         content = scene_content(load_cell(image).scene)
-        return ReferenceInputs(content, pixel=pixel, points=points)
+        return ReferenceInputs(content, pixel=pixel, points=points, model=model)
 
     # The key of an image needs its scene loaded, here and later: nothing else says what is in the
     # cache.
     lacking = [image for image in images if not is_kept(inputs_of(image).key)]
     named = {f"reference {number}": image for number, image in enumerate(lacking)}
     # Workers must compute what `--fresh` asks for again, and not take it from a cache of their own.
-    given = pixel, points, fresh_since()
+    given = pixel, points, model, fresh_since()
     groups = [
         Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()
     ]
@@ -97,6 +103,7 @@ def tracing(
     batches: int | None = None,
     orders: tuple[str, ...] | None = None,
     counts: NDArray[np.integer] | None = None,
+    model: Model = PHYSICAL,
 ) -> Elsewhere:
     """Return the function that lets workers trace `batches` batches of an estimator, None if
     an error decides how many.
@@ -105,7 +112,11 @@ def tracing(
     """
     # As bytes, by which a worker knows again what it has prepared.
     kind = pickle.dumps(
-        (image, estimator, {"samples": samples, "orders": orders, "counts": counts})
+        (
+            image,
+            estimator,
+            {"samples": samples, "orders": orders, "counts": counts, "model": model},
+        )
     )
 
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
@@ -127,11 +138,11 @@ def spread(cluster: Client, image: Cell) -> ElsewhereFor:
 
 
 def _reference(
-    image: Cell, pixel: str, points: int | None, since: float | None
+    image: Cell, pixel: str, points: int | None, model: Model, since: float | None
 ) -> tuple[ReferenceImage, Spent]:
     with fresh_results(since):
         scene = load_cell(image).scene
-        inputs = ReferenceInputs(scene_content(scene), pixel=pixel, points=points)
+        inputs = ReferenceInputs(scene_content(scene), pixel=pixel, points=points, model=model)
         found = reference_result(scene, inputs)
     return found.value, found.spent
 

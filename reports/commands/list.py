@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.list`: the built-in scenes, methods, kernels, studies and papers."""
+"""`airlight.list`: the built-in scenes, methods, kernels, models, studies and papers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +14,13 @@ _LONG = {"long": True}
 
 
 def list(
-    what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None,
+    what: Literal["scenes", "methods", "kernels", "models", "studies", "papers"] | None = None,
 ) -> "Listing":
-    """List the built-in scenes, methods, kernels, studies and papers.
+    """List the built-in scenes, methods, kernels, models, studies and papers.
 
     The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
+    The list of models has the equations of engines for `--model`: their parameters, their terms, what
+    was read, no engine being run, and what was not checked.
 
     Parameters
     ----------
@@ -29,6 +31,7 @@ def list(
         "scenes": _scenes,
         "methods": _methods,
         "kernels": _kernels,
+        "models": _models,
         "studies": _studies,
         "papers": _papers,
     }
@@ -98,6 +101,26 @@ def _kernels() -> Table:
         (each.name, each.summary, _words(each.parameters), each.source) for each in KERNELS.values()
     ]
     return table("", words("name", "what", "parameters", "source", how=_LONG), rows)
+
+
+def _models() -> Table:
+    from airlight.validation.scenes.models import PRESETS
+
+    rows = [
+        (
+            each.key,
+            f"{each.title} {each.version}",
+            "; ".join(f"{one.words}: {one.what}" for one in each.parameters),
+            each.terms,
+            each.read,
+            each.unchecked,
+        )
+        for each in PRESETS.values()
+    ]
+    columns = words(
+        "name", "engine", "parameters", "terms", "read", how=_LONG, unchecked="not checked"
+    )
+    return table("", columns, rows)
 
 
 def _studies() -> Table:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A scene in numbers, as another renderer needs them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from airlight.analytic.phase import HenyeyGreenstein, Tabulated
 from airlight.errors import InputError
-from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.scene.read_scene import read_scene, scene_notes
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.directional_light import DirectionalLight
@@ -66,14 +67,22 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     the kind of a light or a medium.
 
     These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`,
-    `lights`, `sky`, `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`.
+    `lights`, `sky`, `surfaces`, `radiance`, `model`, `notes` and `file`, of a random scene also
+    `drawn`. `model` is None where the equation is the physical one; lights and media are those of
+    the scene in either case.
     Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in W. Black
     shapes of area lights are among the lights, not the surfaces. `sky` is None where no light of
     one arrives. A scene without a reference is refused, with what is in the way.
     """
     # it refuses what `render` refuses, in its words
-    notes = read_scene(loaded.scene).features.notes
-    scene = read_reference(loaded.scene)
+    model = loaded.model
+    if model.is_physical:
+        notes, scene = read_scene(loaded.scene).features.notes, read_reference(loaded.scene)
+    else:
+        # A model may have light where physics has none. It changes no phase function and no albedo
+        # here: those are the scene's.
+        plain = replace(model, phase="scene", lit="off", name=model.title)
+        notes, scene = tuple(scene_notes(loaded.scene)), read_reference(loaded.scene, plain)
     # A custom scene and a built-in one have the same keys: another renderer reads them by name.
     camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
@@ -102,6 +111,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
             if not shape.is_emitter() or _reflects(shape)
         ],
         "radiance": CONVENTION,
+        "model": None if model.is_physical else {"name": model.name, "terms": model.terms},
         "notes": list(notes),
         "file": {
             "name": f"{scene_stem(str(loaded.path or loaded.name))}.exr",

@@ -176,11 +176,19 @@ def _images(scenes: Scenes) -> Iterator[Claim]:
             continue
         what = "total of airlight and surface" if entry.layer == "total" else entry.layer
         text = (
-            f"The image {entry.label} of {scene}, judged by its {what}: relative RMSE "
+            f"The image {entry.label} of {scene}, judged by its {what}"
+            f"{_of_model(entry)}: relative RMSE "
             f"{100 * error.relative_rmse:.3g} %, relative bias "
             f"{100 * known(error.relative_bias):+.3g} %."
         )
         yield _claim("image", text)
+
+
+def _of_model(entry: Row) -> str:
+    """Say by which equation an image is judged, where it is not the physical one."""
+    if entry.model is None:
+        return ""
+    return f" and the equation of the model {entry.model.name or entry.model.terms}"
 
 
 def _failed(scenes: Scenes) -> Iterator[Claim]:

@@ -22,6 +22,7 @@ from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
 from airlight.realtime.child_process import EndedError
 from airlight.realtime.methods.shader.source import is_shader
+from airlight.reference.scene.model import Model
 from airlight.reference.storage.files import NO_SPACE, alone, ensure_folder
 from airlight.reference.storage.store import Kept, date, fresh_results
 from airlight.reports.data.records import (
@@ -62,6 +63,7 @@ def write_report(
     study: Study,
     *,
     images: Mapping[str, Sequence["EngineImage"]] | None = None,
+    model: Model | None = None,
     command: str = "airlight report",
     fresh: bool = False,
     apart: bool = False,
@@ -73,11 +75,12 @@ def write_report(
     report.json, see docs/formats.md.
 
     Only the first of the sizes of the study counts, and none of its media. `images` from elsewhere
-    are judged, by scene, at their size. The page names `command` under "how to reproduce". `fresh` computes
-    everything again. With `apart` user methods run in separate processes, where a fault becomes a
-    row (`own_faults`); else it ends the report. `noted` is called with notes on the scenes before
-    the work. Workers of `cluster` compute references and the batches that check them; methods run
-    here. Unusable input is refused, and an existing report is not damaged.
+    are judged, by scene, at their size, by the equation of a `model` or of that which their scene
+    names. The page names `command` under "how to reproduce". `fresh` computes everything again.
+    With `apart` user methods run in separate processes, where a fault becomes a row (`own_faults`);
+    else it ends the report. `noted` is called with notes on the scenes before the work. Workers of
+    `cluster` compute references and the batches that check them; methods run here. Unusable input
+    is refused, and an existing report is not damaged.
     """
     # Mistakes are looked for before anything is measured: names, sizes of images, drivers, scenes.
     names = tuple(study.scene_names())
@@ -139,6 +142,7 @@ def write_report(
             result = study_scene(
                 each,
                 images=shown.get(scene_stem(each.path), ()),
+                model=model,
                 apart=process,
                 ended=ended,
                 progress=_begins(step, parts),

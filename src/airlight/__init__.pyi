@@ -16,6 +16,7 @@ from .realtime.parameters import parameter as parameter
 from .realtime.scene.light_table import light_choice as light_choice
 from .realtime.scene.light_table import light_tables as light_tables
 from .realtime.scene.read_scene import read_scene as read_scene
+from .reference.scene.model import Model as Model
 from .reference.storage.exr import read_exr as read_exr
 from .reference.storage.exr import write_exr as write_exr
 from .reports.api.check import check as check

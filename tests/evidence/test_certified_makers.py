@@ -14,6 +14,7 @@ SAMPLES = {
     "airlight_integral_droplets.csv": slice(3, 4),
     "airlight_slopes.csv": slice(1, None, 20),
     "height_fog_rays.csv": slice(7, None, 57),
+    "model_rays.csv": slice(3, None, 23),
 }
 _MIE = 1e-13  # relative: processors round the moments of Mie's series differently
 

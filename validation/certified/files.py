@@ -19,6 +19,10 @@ FILES = {
     "height_fog_rays.csv": (
         "airlight in exponential height fog to 20 digits, of point lights and suns"
     ),
+    "model_rays.csv": (
+        "lamps and suns by the equations of engines to 20 digits: distance laws, ranges, fractions "
+        "of the depths on both ways"
+    ),
     "airlight_slopes.csv": "derivatives of the airlight integral to 17 digits",
 }
 

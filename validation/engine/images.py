@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 
 from airlight.errors import InputError, nearest
 from airlight.reference.storage.exr import read_exr
-from airlight.validation.engine.judge import EngineComparison, ReferenceOf, judge_image
+from airlight.validation.engine.judge import (
+    EngineComparison,
+    ReferenceOf,
+    judge_image,
+    with_model,
+)
 from airlight.validation.engine.observation import AIRLIGHT, SURFACE, judged_layer
 from airlight.validation.metrics.errors import Metrics, error_metrics
 from airlight.validation.scenes.loading import LoadedScene
@@ -89,8 +94,8 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
 def measure_image(
     shown: EngineImage, loaded: LoadedScene, reference_of: ReferenceOf, *, surfaces: bool
 ) -> tuple[EngineComparison, Mapping[str, NDArray[np.floating]], Metrics | None]:
-    """Judge an image from elsewhere by the reference of its scene at its size, as `airlight
-    compare SCENE IMAGE` does.
+    """Judge an image from elsewhere by the reference of its scene at its size, or that of the
+    scene's model, as `airlight compare SCENE IMAGE` does.
 
     `loaded`, `reference_of`: the scene at that size, and what computes its reference for 'centre'
     or 'area'; `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers
@@ -102,9 +107,9 @@ def measure_image(
     layers = {layer.holds: layer.values}
     if layer.name == AIRLIGHT and SURFACE in image.layers:
         layers[SURFACE] = image.layers[SURFACE]
-    judged = judge_image(
-        image, layer, loaded, reference_of, path=shown.path, mask=image.with_data()
-    )
+    mask = image.with_data()
+    judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=mask)
+    judged = with_model(judged, layer, loaded, mask)
     if not (surfaces and AIRLIGHT in layers and SURFACE in layers):
         return judged, layers, None
     held = image.with_data()  # pixels that the file does not hold are no error of the surface
@@ -121,6 +126,8 @@ def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:
         if judged.pixel == "area"
         else []
     )
+    if judged.model is not None:
+        notes += [f"judged by the equation of the model {judged.model.name or judged.model.terms}"]
     notes += [judged.verdict.words]
     return "; ".join([*notes, f"timed on {times[1]}"] if times is not None and times[1] else notes)
 

@@ -33,15 +33,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import InputError
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import REPLICATES
+from airlight.reference.scene.model import Model
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.comparison.images import Comparison, compare_images, read_mask
 from airlight.validation.engine.error_place import ErrorPlace, error_place
 from airlight.validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
+from airlight.validation.engine.model_errors import ModelErrors, model_errors
 from airlight.validation.engine.observation import (
     KINDS,
     PIXEL_WORDS,
@@ -117,12 +120,13 @@ class EngineComparison:
     known: Estimate
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
-    verdict: Verdict
+    verdict: Verdict  #: by the reference of the model where the scene has one
     note: str  #: what the reader of the file changed or left out
     #: the reference that it was judged by, and its layer
     layers: ReferenceImage = field(repr=False, compare=False)
     reference: NDArray[np.floating] = field(repr=False, compare=False)
     image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
+    model: ModelErrors | None = None  #: where the reference is that of a model
 
     @property
     def pixel(self) -> str:
@@ -132,8 +136,9 @@ class EngineComparison:
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
         of = "airlight + surface" if self.expected == TOTAL else self.expected
+        name = "reference" if self.model is None else "reference of the model"
         lines = [
-            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, "
+            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; {name}: {of}, "
             f"{PIXEL_WORDS[self.pixel]}, {known_words(self.known)}",
             f"pixels           {self.kind.words}",
             self.comparison.summary(),
@@ -147,7 +152,12 @@ class EngineComparison:
         lines += [] if self.place is None else [f"where            {self.place.words}"]
         lines += [f"suspect          {words}" for words in self.hints.words]
         lines += [f"file             {self.note}"] if self.note else []
-        return "\n".join([*lines, f"verdict          {self.verdict.words}"])
+        if self.model is None:
+            return "\n".join([*lines, f"verdict          {self.verdict.words}"])
+        own = "it is judged by the equation of the model, which is not the physical one"
+        return "\n".join(
+            [*lines, *self.model.lines, f"verdict          {self.verdict.words}; {own}"]
+        )
 
 
 def compare_scene(
@@ -159,8 +169,10 @@ def compare_scene(
     pixel: str | None = None,
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
+    margin_total: float | None = None,
     all_metrics: bool = False,
     changes: Changes = UNCHANGED,
+    model: Model | None = None,
     progress: Progress | None = None,
 ) -> EngineComparison:
     """Compare an EXR file with the reference of a scene at the file's size.
@@ -181,19 +193,29 @@ def compare_scene(
     margin
         Largest relative bias [1] that counts as agreement; an image with standard errors must show
         with them that its bias is within it.
+    margin_total
+        With a model: the largest relative bias against the physical equation [1].
     all_metrics
         See `validation.comparison.images.compare_images`.
     changes
         Values by name that replace those of the scene, see `validation.scenes.changes`.
+    model
+        The equation to judge by, in the place of that which the scene names.
     progress
         Called with (fraction done, what).
     """
     # The layer, the scene at the size of the image, and the pixels that file and mask have.
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    loaded = scene_of_size(scene, judged.size, path, changes)
+    loaded = scene_of_size(scene, judged.size, path, changes, model)
+    if margin_total is not None and loaded.model.is_physical:
+        raise InputError(
+            "margin_total: the scene is judged by the physical equation; expected a model beside it, "
+            "or margin"
+        )
+    check_margin(margin_total)
     chosen = image.with_data(None if mask is None else read_mask(mask))
-    return judge_image(
+    compared = judge_image(
         image,
         judged,
         loaded,
@@ -204,6 +226,50 @@ def compare_scene(
         margin=margin,
         all_metrics=all_metrics,
     )
+    compared = with_model(compared, judged, loaded, chosen, progress)
+    return compared if margin_total is None else _within_total(compared, margin_total)
+
+
+def with_model(
+    compared: EngineComparison,
+    judged: JudgedLayer,
+    loaded: LoadedScene,
+    mask: Bools | None = None,
+    progress: Progress | None = None,
+) -> EngineComparison:
+    """Return a comparison with the errors of the equation apart from those of the algorithm, where
+    the scene has a model.
+    """
+    if loaded.model.is_physical:
+        return compared
+    shown = judged.values.astype(np.float64)
+    if mask is not None:
+        shown = np.where(np.asarray(mask)[:, :, None], shown, np.nan)
+    tell, side = _telling(progress), compared.verdict.block
+    errors = model_errors(
+        shown,
+        loaded.model,
+        lambda model: expected_layer(
+            reference_image(loaded.scene, pixel=compared.pixel, model=model, progress=tell), judged
+        ),
+        lambda correct, other: _block_errors(correct, other, side)[0],
+    )
+    return replace(compared, model=errors)
+
+
+def _within_total(compared: EngineComparison, margin: float) -> EngineComparison:
+    """Return a comparison that fails where the bias against the physical equation is beyond a
+    margin, or is not known.
+    """
+    total = compared.model and compared.model.total
+    bias = total.mean if total else None
+    if bias is not None and abs(bias) <= margin:
+        return compared
+    said = "is not known" if bias is None else f"is {bias:+.3g}"
+    words = f"the relative bias against physics {said}, not within +-{margin:.3g}"
+    comparison = compared.comparison
+    failed = replace(comparison, failures=(*comparison.failures, words))
+    return replace(compared, comparison=failed)
 
 
 def judge_image(
@@ -299,8 +365,14 @@ def references(
     """Return a function that computes the reference at pixel centres or over their
     areas, or reads the cache.
     """
-    tell = None if progress is None else lambda done, total, what: progress(done / total, what)
-    return cache(lambda pixel: reference_image(loaded.scene, pixel=pixel, progress=tell))
+    tell = _telling(progress)
+    return cache(
+        lambda pixel: reference_image(loaded.scene, pixel=pixel, model=loaded.model, progress=tell)
+    )
+
+
+def _telling(progress: Progress | None) -> Callable[[int, int, str], None] | None:
+    return None if progress is None else lambda done, total, what: progress(done / total, what)
 
 
 def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:

@@ -17,6 +17,7 @@ from scipy.ndimage import binary_dilation
 from airlight.errors import InputError
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.surface import emitted_light, surface_hits
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.varying import GridMedium
 from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names
@@ -221,10 +222,15 @@ def _evenly(count: int, fraction: float) -> Index:
 
 
 def observation_of(
-    image: Image, judged: JudgedLayer, scene: "mi.Scene", *, mask: Bools | None = None
+    image: Image,
+    judged: JudgedLayer,
+    scene: "mi.Scene",
+    *,
+    mask: Bools | None = None,
+    model: Model = PHYSICAL,
 ) -> tuple[Observation, tuple[str, ...]]:
     """Return a layer of an image that is to be explained, and the faults of the file: pixels
-    that are not finite.
+    that are not finite. `model` is the equation that the image should solve.
 
     Neither a fit nor a diagnosis explains an area light itself, whose radiance no fog makes. Pixels
     that show one take no part, nor do their neighbours, nor pixels that the file does not hold or a
@@ -236,7 +242,7 @@ def observation_of(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; give one "
             "of the image's size"
         )
-    reference = read_reference(scene)
+    reference = read_reference(scene, model)
     if isinstance(reference.medium, GridMedium):
         raise InputError(
             "the medium is a density grid, whose images fits and diagnoses do not predict; "
@@ -395,8 +401,12 @@ def scene_of_size(
     size: tuple[int, int],
     path: str | os.PathLike[str],
     changes: Changes = UNCHANGED,
+    model: Model | None = None,
 ) -> LoadedScene:
-    """Return a scene at the size of an image of it; one that was changed says so in its name."""
+    """Return a scene at the size of an image of it; one that was changed says so in its name.
+
+    A `model` stands in the place of that which the scene names.
+    """
     # The shape of the image must be that of the scene, to a pixel in either direction.
     loaded = load_scene(scene)
     width, height = (
@@ -415,5 +425,6 @@ def scene_of_size(
             "fraction of it"
         )
     loaded = load_scene(scene, size, changes)
+    loaded = loaded if model is None else replace(loaded, model=model)
     words = " and ".join(change_words(changes))
     return replace(loaded, name=f"{loaded.name} with {words}") if changes else loaded

@@ -32,14 +32,20 @@ from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.replicates import REPLICATES
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
-from airlight.reference.storage.exr import BATCHES, BOUND, Image
+from airlight.reference.storage.exr import BATCHES, BOUND, MODEL, Image
 from airlight.reference.storage.scene_digest import scene_digest
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
-from airlight.validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
+from airlight.validation.estimates.monte_carlo import (
+    Elsewhere,
+    check_model,
+    monte_carlo_batches,
+)
 from airlight.validation.estimates.quadrature import stated_error
 from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.models import model_words
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
 USUAL_BATCH = 64  #: samples a pixel
@@ -76,10 +82,14 @@ class Budget:
 
 
 def layered_reference(
-    loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre"
+    loaded: LoadedScene,
+    reference: ReferenceImage,
+    *,
+    pixel: str = "centre",
+    model: Model = PHYSICAL,
 ) -> Image:
     """Return the quadrature reference of a loaded scene as layers; the header says of
-    which bytes of the scene.
+    which bytes of the scene, and of which model.
     """
     layers = {"airlight": reference.airlight, "surface": reference.surface}
     for layer in LAYERS:
@@ -98,7 +108,7 @@ def layered_reference(
         "airlight:scene": loaded.name,
         "airlight:estimator": "quadrature",
     }
-    made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
+    made |= {"airlight:pixel": pixel, **_digest_of(loaded), **_model_of(model)}
     if "airlight_bound" in layers:
         made[BOUND] = "proven"
     if reference.airlight_se is not None:
@@ -110,6 +120,11 @@ def _digest_of(loaded: LoadedScene) -> dict[str, str]:
     """Return the attribute that identifies the scene of an image, none where nobody can tell."""
     digest = scene_digest(loaded.scene)
     return {} if digest is None else {"airlight:scene_digest": digest}
+
+
+def _model_of(model: Model) -> dict[str, str]:
+    """Return the attribute that tells the model of an image, none for the physical equation."""
+    return {} if model.is_physical else {MODEL: model_words(model)}
 
 
 @dataclass(frozen=True)
@@ -140,6 +155,7 @@ def monte_carlo_reference(
     budget: Budget,
     seed: int = 0,
     orders: tuple[str, ...] | None = None,
+    model: Model = PHYSICAL,
     progress: Progress | None = None,
     elsewhere: Elsewhere | None = None,
 ) -> MonteCarloReference:
@@ -149,13 +165,14 @@ def monte_carlo_reference(
 
     The `budget` says when to stop by the error of the layers `airlight` and `surface`. The first
     batch has the `seed`, the others count up. A scene of clouds has layers for sets of `orders`,
-    see `cloud_orders`. Progress is called with (share done, what) after every batch; `elsewhere`
-    traces batches in other processes.
+    see `cloud_orders`; `model` is the equation, for single-scatter. Progress is called with (share
+    done, what) after every batch; `elsewhere` traces batches in other processes.
     """
+    check_model(model, estimator)
     first_clouds = None
     # Scenes with lights in fog: the airlight of pixels beside a light is left out of the error.
     if orders is None:
-        reference = read_reference(loaded.scene)
+        reference = read_reference(loaded.scene, model)
         distance = surface_hits(reference).distance
         near = near_light(reference, distance)
         shape = reference.height, reference.width
@@ -179,6 +196,7 @@ def monte_carlo_reference(
         samples=samples,
         first_seed=seed,
         orders=orders,
+        model=model,
         enough=None if budget.error is None else watch.enough,
         go_on=None if budget.seconds is None else watch.go_on,
         progress=watch.tell,
@@ -191,7 +209,9 @@ def monte_carlo_reference(
         if budget.error is None
         else errors.pooled is not None and errors.pooled <= budget.error
     )
-    image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
+    image = _layered_batches(
+        loaded, estimator, run.batches, distance=distance.reshape(shape), model=model
+    )
     if first_clouds is not None:
         # Behind a cloud stands the sky, attenuated along the ray; surfaces have no sky behind them.
         transmittance = first_clouds.transmittance.reshape(*shape, 3)
@@ -271,7 +291,7 @@ class _Watch:
 
 
 def _layered_batches(
-    loaded: LoadedScene, estimator: str, batches: Batches, *, distance: Array
+    loaded: LoadedScene, estimator: str, batches: Batches, *, distance: Array, model: Model
 ) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
@@ -281,6 +301,7 @@ def _layered_batches(
     attributes: dict[str, str | int | float] = {
         "airlight:scene": loaded.name,
         **_digest_of(loaded),
+        **_model_of(model),
         "airlight:estimator": estimator,
         "airlight:spp": batches.samples * len(batches.seeds),
         "airlight:batch_spp": batches.samples,

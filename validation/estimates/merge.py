@@ -21,8 +21,9 @@ from airlight.reference.monte_carlo.batches import (
     parse_seed_ranges,
     seed_ranges,
 )
-from airlight.reference.storage.exr import TOTAL, Attribute, Image
+from airlight.reference.storage.exr import MODEL, TOTAL, Attribute, Image
 from airlight.validation.arrays import Array
+from airlight.validation.scenes.models import PHYSICAL_NAME, model_parts
 
 #: Headers that must be the same in all files, and their meanings.
 _SAME = {
@@ -140,6 +141,12 @@ def _check_same(first: _Part, second: _Part) -> None:
                 f"{values[1][:24]}); "
                 "merge references that were made alike"
             )
+    models = [str(part.image.attributes.get(MODEL, PHYSICAL_NAME)) for part in (first, second)]
+    if model_parts(models[0])["terms"] != model_parts(models[1])["terms"]:
+        raise InputError(
+            f"{first.name} and {second.name} are of two models, {models[0]} and {models[1]}; merge "
+            "references that were made alike"
+        )
     shapes = [part.image.layers[LAYERS[0]].shape for part in (first, second)]
     if shapes[0] != shapes[1]:
         raise InputError(

@@ -13,7 +13,7 @@ import errno
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from airlight.reference.monte_carlo.volpath import volpath_batch, volpath_orders
 from airlight.reference.quadrature.reference import check_camera, check_rays
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.cache import cache_folder
 from airlight.reference.storage.files import NO_SPACE
@@ -76,6 +77,10 @@ class BatchInputs(Inputs):
     max_depth: int
     orders: tuple[str, ...] | None
     counts: NDArray[np.integer] | None
+    model: Model = PHYSICAL  #: the equation, whose name counts for nothing
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "model", replace(self.model, name=""))
 
 
 # Only the modules of the estimators count: this module hands the inputs on as they are.
@@ -113,6 +118,7 @@ def monte_carlo_batches(
     max_depth: int = 2,
     counts: NDArray[np.integer] | None = None,
     orders: tuple[str, ...] | None = None,
+    model: Model = PHYSICAL,
     enough: Callable[[Batches], bool] | None = None,
     go_on: Callable[[int], bool] | None = None,
     progress: Counted | None = None,
@@ -126,7 +132,8 @@ def monte_carlo_batches(
     (`reference.monte_carlo.volpath.volpath_batch`), and `counts`, samples of each pixel in each
     batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.batches`). `orders` are
     names of disjoint sets of orders of scattering, '3-4', each with its own layer: for a scene of
-    clouds, by 'volpath' or 'cloud-paths'.
+    clouds, by 'volpath' or 'cloud-paths'. Only 'single-scatter' knows another `model` than the
+    physical equation.
 
     `enough` is asked after every block, whose last seed is one less than a multiple of eight,
     whether to stop; `go_on` with the number of finished batches before each one that is traced,
@@ -147,9 +154,15 @@ def monte_carlo_batches(
             f"{LARGEST_SEED - batches}"
         )
     # Batches lie in the cache under the key of all inputs; the seed is the name within it.
-    folder = _INPUTS[estimator](scene_content(scene), samples, max_depth, orders, counts).key
+    folder = _INPUTS[estimator](scene_content(scene), samples, max_depth, orders, counts, model).key
     layers, trace = batch_tracer(
-        scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders
+        scene,
+        estimator,
+        samples=samples,
+        max_depth=max_depth,
+        counts=counts,
+        orders=orders,
+        model=model,
     )
     tally: Counter[str] = Counter()
 
@@ -217,13 +230,15 @@ def batch_tracer(
     max_depth: int = 2,
     counts: NDArray[np.integer] | None = None,
     orders: tuple[str, ...] | None = None,
+    model: Model = PHYSICAL,
 ) -> tuple[tuple[str, ...], Trace]:
     """Return the layers of a batch, and the function that traces one from its seed;
     see `monte_carlo_batches`.
     """
+    check_model(model, estimator)
     if orders is None:
         # Scenes with infinite radiance are refused: no number of samples gives their mean.
-        reference = read_reference(scene)
+        reference = read_reference(scene, model)
         check_camera(reference)
         check_rays(reference, surface_hits(reference).distance)
         if estimator == "volpath":
@@ -250,6 +265,16 @@ def batch_tracer(
             )
     given = f"estimator: got {estimator!r} with max_depth {max_depth} and orders {orders}"
     raise ValueError(f"{given}, expected one of {', '.join(ESTIMATORS)}")
+
+
+def check_model(model: Model, estimator: str) -> None:
+    """Refuse a model of an estimator that knows the physical equation alone."""
+    if not model.is_physical and estimator in ("volpath", "cloud-paths"):
+        law = "Mitsuba's own law" if estimator == "volpath" else "its law"
+        raise InputError(
+            f"model: got {model.title}, but {estimator} solves {law}, which is physical; take "
+            "quadrature or single-scatter, or --model physical"
+        )
 
 
 def _has(folder: str | None, seed: int) -> bool:

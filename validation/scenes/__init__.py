@@ -12,6 +12,7 @@ Read in this order:
 - `smoke.py`: smoke as a density grid;
 - `hypertexture.py`: density by the distance into a mesh and gradient noise;
 - `engine_fog.py`: the height fog of engines as layers;
+- `models.py`: the equations of engines by name, and the words that name an equation;
 - `height_fog.py`: the volume `heightfog` of Mitsuba: density by height;
 - `random`: scenes drawn from a seed;
 - `numbers.py`: refuses numbers that cannot give a finite image;

@@ -16,6 +16,7 @@ from types import MappingProxyType
 import mitsuba as mi
 
 from airlight.errors import InputError
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
 from airlight.validation.scenes.bodies import check_bodies
@@ -25,7 +26,9 @@ from airlight.validation.scenes.changes import (
     isotropic_media,
     scene_with_lobes,
 )
+from airlight.validation.scenes.files.text import named_in
 from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.models import DEFAULT, model_of
 from airlight.validation.scenes.names import PREFIX, is_random, random_parts, scene_file
 from airlight.validation.scenes.numbers import check_numbers
 from airlight.validation.scenes.random.design import FILE as RANGES
@@ -45,6 +48,8 @@ class LoadedScene:
     published: str  #: the published figure that it stands for; empty for a file
     path: Path | None = None  #: of the file; None for a built-in or random scene
     animation: Animation = field(default_factory=Animation)  #: what moves in it
+    model: Model = PHYSICAL  #: the equation that its file names
+    fog_engine: str = ""  #: the engine whose height fog its file has
 
 
 def load_scene(
@@ -80,8 +85,15 @@ def load_scene(
         )
     else:
         path = scene_file(name_or_path)
+        scene, named = _read(path), named_in(path, DEFAULT)
         loaded = LoadedScene(
-            path.stem, _read(path), f"The user's own scene, {path.name}.", "", path
+            path.stem,
+            scene,
+            f"The user's own scene, {path.name}.",
+            "",
+            path,
+            model=PHYSICAL if named.model is None else _model(path, named.model),
+            fog_engine=named.engine,
         )
     # Changes are checked first: Mitsuba must not build a phase function of an impossible g.
     if changes:
@@ -202,6 +214,13 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> mi.S
     check_numbers(scene)
     check_bodies(scene)
     return scene
+
+
+def _model(path: Path, words: str) -> Model:
+    try:
+        return model_of(words)
+    except InputError as error:
+        raise InputError(f"scene {path}: {error}") from None
 
 
 def name_shapes(scene: mi.Scene) -> None:

@@ -78,6 +78,22 @@ class StatedError:
 
 
 @dataclass(frozen=True)
+class EquationError:
+    """The error of an engine's equation apart from that of its algorithm
+    (`validation.engine.model_errors`): relative root mean squares.
+    """
+
+    name: str = column("model", meaning="of the equation; empty for terms without a name")
+    terms: str = column("terms", meaning="that differ from the physical equation")
+    algorithm: float | None = column("of the algorithm", "1", "image against model")
+    equation: float | None = column(
+        "of the equation", "1", "model against physics; null where physics has no light"
+    )
+    total: float | None = column("of both", "1", "image against physics")
+    correlation: float | None = column("correlation", "1", "of both parts")
+
+
+@dataclass(frozen=True)
 class Cost:
     """The cost of a cell besides the times of its frames."""
 
@@ -194,6 +210,7 @@ class Row:
         default=None,
     )
     error: Metrics | None = None
+    model: EquationError | None = None
     noise: RunsError | None = None
     surface_error: Metrics | None = column("surface", meaning="of the lit surfaces", default=None)
     published: PublishedErrors | None = None

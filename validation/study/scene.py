@@ -32,6 +32,7 @@ from airlight.reference.quadrature.reference import (
     reference_image,
     reference_result,
 )
+from airlight.reference.scene.model import Model
 from airlight.reference.storage.exr import TOTAL, Image
 from airlight.reference.storage.scene_digest import scene_content, scene_digest
 from airlight.reference.storage.store import Content, Inputs, Kept, is_kept, stored
@@ -46,7 +47,7 @@ from airlight.validation.statistics.records import Agreement, MultipleScattering
 from airlight.validation.study.configuration import Configuration, configuration_work, user_code
 from airlight.validation.study.cost import Work, reference_work, sampled_work
 from airlight.validation.study.reference import of_image
-from airlight.validation.study.row import Row
+from airlight.validation.study.row import EquationError, Row
 from airlight.validation.study.run import cell_row, layered_frame, run, with_times
 from airlight.validation.study.study import Cell, Checks, Study
 from airlight.validation.study.turns import Apart, CellTimes, time_cells
@@ -54,6 +55,7 @@ from airlight.validation.timing import FrameTimes, Timing
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
     from airlight.validation.engine.images import EngineImage
+    from airlight.validation.engine.model_errors import ModelErrors
 
 Layer = NDArray[np.floating]  # frames are float32
 
@@ -269,6 +271,7 @@ class ImageInputs(Inputs):
     label: str
     path: Path  #: which counts by its name and its content
     times: tuple[Timing, str] | None
+    model: Model  #: the equation by which it is judged
 
 
 def _seconds(work: Work) -> float:
@@ -326,6 +329,7 @@ def study_scene(
     study: SceneStudy,
     *,
     images: Sequence[EngineImage] = (),
+    model: Model | None = None,
     apart: Apart | None = None,
     ended: Mapping[Configuration, str] | None = None,
     progress: Callable[[str], None] = lambda part: None,
@@ -334,7 +338,8 @@ def study_scene(
 ) -> SceneResult:
     """Return the results of a study for a scene.
 
-    `images` from elsewhere are judged. `apart` calls a user's method in a separate process;
+    `images` from elsewhere are judged, by the equation of a `model` or of the model that the scene
+    names. `apart` calls a user's method in a separate process;
     configurations that `ended` such a process before, with how, are not called again. `progress` is
     called with the name of each part, as of `SceneStudy.seconds`, before it begins. `spread` lets
     other processes trace the batches that check the reference. `workers` is the number of processes
@@ -368,7 +373,8 @@ def study_scene(
     # all processors.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
-    rows += [_image(study, shown) for shown in images]
+    equation = study.loaded.model if model is None else model
+    rows += [_image(study, shown, equation) for shown in images]
     # The time that each part took when it was computed, now or in an earlier study.
     methods = [result for row in rows for result in row.results]
     seconds = {
@@ -554,16 +560,16 @@ def _with_flip(judged: Judged) -> Judged:
     )
 
 
-def _image(study: SceneStudy, shown: EngineImage) -> Judged:
+def _image(study: SceneStudy, shown: EngineImage, model: Model) -> Judged:
     """Return the row of an image from elsewhere."""
     from airlight.validation.engine.images import image_times
 
     # The key has the inputs of the reference: another reference gives another row.
     times = image_times(shown.path)
     inputs = ImageInputs(
-        study.reference_inputs, study.identity, study.size, shown.label, shown.path, times
+        study.reference_inputs, study.identity, study.size, shown.label, shown.path, times, model
     )
-    result = stored(inputs, lambda: _measured_image(study, shown, times), Judged)
+    result = stored(inputs, lambda: _measured_image(study, shown, times, model), Judged)
     # Whether FLIP is asked for is no input of the row: the image for it is dropped here.
     whole = None if study.study.flip == "none" else result.value.whole
     return replace(
@@ -575,13 +581,19 @@ def _image(study: SceneStudy, shown: EngineImage) -> Judged:
 
 
 def _measured_image(
-    study: SceneStudy, shown: EngineImage, times: tuple[Timing, str] | None
+    study: SceneStudy, shown: EngineImage, times: tuple[Timing, str] | None, model: Model
 ) -> Judged:
     """Return the row of an image with its layers."""
     from airlight.validation.engine.images import measure_image, notes_of
+    from airlight.validation.engine.judge import references
 
+    # An image of a model is judged by the reference of its own equation.
+    loaded = replace(study.loaded, model=model)
     judged, layers, surface = measure_image(
-        shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces
+        shown,
+        loaded,
+        study.reference_of if model.is_physical else references(loaded),
+        surfaces=study.scene.features.surfaces,
     )
     row = replace(
         cell_row(study.cell(Configuration("image"))),
@@ -592,6 +604,7 @@ def _measured_image(
         layer=judged.expected,
         pixel=judged.pixel,
         error=judged.comparison.metrics,
+        model=None if judged.model is None else _equation_error(judged.model),
         surface_error=surface,
         times=None if times is None else FrameTimes(times[0]),
     )
@@ -606,6 +619,19 @@ def _measured_image(
         layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name}
     )
     return Judged(record_of(row, Row), image, judged.reference, whole)
+
+
+def _equation_error(errors: ModelErrors) -> EquationError:
+    """Return the errors of an equation and of an algorithm as columns of a row."""
+    equation, total = errors.against_physics, errors.total
+    return EquationError(
+        errors.name,
+        errors.terms,
+        errors.image.rmse,
+        None if equation is None else equation.rmse,
+        None if total is None else total.rmse,
+        errors.correlation,
+    )
 
 
 def _flip_version() -> str:

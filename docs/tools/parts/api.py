@@ -19,7 +19,7 @@ from parts.listed import table
 #: ends the build.
 TOPICS = {
     "Render and judge": (
-        "render reference compare check error_metrics multiple_scattering_fraction Budget"
+        "render reference Model compare check error_metrics multiple_scattering_fraction Budget"
     ),
     "Measure": "report diff study STUDIES sweep paper configuration time_frame",
     "Scenes": "load_scene describe view SCENES certified_data",

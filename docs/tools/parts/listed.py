@@ -102,6 +102,35 @@ def kernels() -> str:
     return markdown(_named(list_("kernels").tables[0]))
 
 
+def models() -> str:
+    """Return the equations of engines: their terms, what was read, and what was not checked."""
+    from airlight.validation.scenes.models import PRESETS
+
+    rows = [
+        (
+            f"`{each.usage}`",
+            f"{each.title} {each.version}",
+            f"`{each.terms}`",
+            _cell(each.unchecked),
+            _cell(each.read),
+        )
+        for each in PRESETS.values()
+    ]
+    return table(("`--model`", "engine", "its terms", "not checked", "read in"), rows, 5)
+
+
+def model_parameters() -> str:
+    """Return the parameters of the equations of engines with their defaults."""
+    from airlight.validation.scenes.models import PRESETS
+
+    rows = [
+        (f"`{each.key}`" if at == 0 else "", f"`{one.words}`", _cell(one.what))
+        for each in PRESETS.values()
+        for at, one in enumerate(each.parameters)
+    ]
+    return table(("model", "parameter and default", "what it is"), rows, 3)
+
+
 def studies() -> str:
     """Return the studies with what each measures."""
     from airlight.reports.studies.registry import STUDIES, summary

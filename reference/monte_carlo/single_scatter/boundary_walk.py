@@ -122,16 +122,17 @@ def transmittance(
     *,
     media: Segment,
     active: "mi.Bool",
+    fraction: "mi.Float | float" = 1.0,
 ) -> "mi.Spectrum":
     """Return the transmittance from a light to points; 0 where a surface is in between.
 
     `around`: the shapes that rays can meet; `start`, `direction`, `distance`: the place of the
     light, the unit vector from there to the point, and how far the point is [m]; `media`: the media
-    at both ends; `active`: mask.
+    at both ends; `active`: mask; `fraction`: of the optical depth that counts.
     """
     if not around.bounded:
         lit = unblocked(around, start, direction, distance, active)
-        return dr.select(lit, dr.exp(-media.end_sigma_t * distance), 0)
+        return dr.select(lit, dr.exp(-media.end_sigma_t * distance * fraction), 0)
     reach = distance * (1 - _SHORT_OF_POINT)
 
     def walk(walking, lit, done, boundary, medium, depth):
@@ -169,4 +170,4 @@ def transmittance(
     _, lit, _, boundary, medium, depth = final
     # The last stretch ends at the point, in the medium that the last boundary named.
     _, sigma_t = coefficients(medium, lit)
-    return dr.select(lit, dr.exp(-depth - sigma_t * (distance - boundary)), 0)
+    return dr.select(lit, dr.exp((-depth - sigma_t * (distance - boundary)) * fraction), 0)

@@ -13,12 +13,14 @@ A surface at the end of the ray adds f cos E V T T, for such lights as the mean 
 which no sample finds, the radiance of the light that it shows, through both ways. Lights
 come from `reference.monte_carlo.single_scatter.sources`, transmittances from the medium
 (`reference.monte_carlo.single_scatter.stretches.Part`); phase function, scattering and material f
-come from Mitsuba's plugins alone.
+come from Mitsuba's plugins alone. The equation of a model has
+`reference.monte_carlo.single_scatter.model_rays`.
 
 In a scene whose extinction depends on the channel all channels use the same distances, with the
 density of the mixture over the channels, so that no channel's variance can become infinite.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -63,18 +65,22 @@ class Task:
     varying: VaryingMedium | None = None
 
 
+#: what returns the light of a task's sources along camera rays
+Trace: TypeAlias = "Callable[[Task, mi.Sampler, Ray, mi.Bool], Light]"
+
+
 def source_light(
-    task: Task, source: Source, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool"
+    trace: Trace, task: Task, source: Source, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool"
 ) -> Light:
     """Return airlight and lit surface along camera rays, of one light of a source after the
     other.
     """
     if source.count == 1:
-        return ray_light(replace(task, sources=(source,)), sampler, ray, active)
+        return trace(replace(task, sources=(source,)), sampler, ray, active)
 
     def add_light(number, sampler, airlight, surface):
         here = replace(task, sources=(source.light(number),))
-        sent = ray_light(here, sampler, ray, active)
+        sent = trace(here, sampler, ray, active)
         return number + 1, sampler, airlight + sent[0], surface + sent[1]
 
     # One kernel for any number of lights.
@@ -90,14 +96,14 @@ def ray_light(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool") ->
     """
     if task.varying is None:
         return _through_media(task, sampler, ray, active)
-    hit = _next_hit(task, ray, mi.Float(0), active)
+    hit = next_hit(task, ray, mi.Float(0), active)
     part = varying_part(task.varying, task.around, ray, hit.t)
-    airlight, sampler = _airlight(task, sampler, ray, part, active)
-    surface, _ = _surface(task, sampler, ray, hit, hit.t, part, active & hit.is_valid())
+    airlight, sampler = scattered_light(task, sampler, ray, part, active)
+    surface, _ = reflected_light(task, sampler, ray, hit, hit.t, part, active & hit.is_valid())
     return airlight, surface
 
 
-def _next_hit(
+def next_hit(
     task: Task, ray: Ray, done: "mi.Float", active: "mi.Bool"
 ) -> "mi.SurfaceInteraction3f":
     """Return the hits of rays from some distance on [m]."""
@@ -115,7 +121,7 @@ def _through_media(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool
         """Add the stretch up to the next shape on the way: `done` is where the ray goes on, `start`
         the last boundary.
         """
-        hit = _next_hit(task, ray, done, walking)
+        hit = next_hit(task, ray, done, walking)
         met = walking & hit.is_valid()
         end = dr.select(met, done + hit.t, dr.inf)
         sigma_s, sigma_t = coefficients(medium, walking)
@@ -126,9 +132,11 @@ def _through_media(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool
         )
         # The lights send airlight from this stretch; a surface at its end reflects, a boundary of a
         # medium leads on.
-        sent, sampler = _airlight(prepared, sampler, ray, stretch, walking)
+        sent, sampler = scattered_light(prepared, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)
-        reflected, sampler = _surface(prepared, sampler, ray, hit, end, stretch, met & ~passed)
+        reflected, sampler = reflected_light(
+            prepared, sampler, ray, hit, end, stretch, met & ~passed
+        )
         # Behind a boundary the optical depth has grown by the stretch, and the medium is the one
         # that the boundary names. The ray goes on a little behind it, but the next stretch begins
         # at the boundary itself.
@@ -170,7 +178,7 @@ def _through_media(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool
     )[-2:]
 
 
-def _airlight(
+def scattered_light(
     task: Task, sampler: "mi.Sampler", ray: Ray, part: Part, active: "mi.Bool"
 ) -> Estimate:
     """Estimate the airlight of all lights from a part of the rays: for each light a loop over the
@@ -188,10 +196,7 @@ def _airlight(
             u = cell + width * sampler.next_1d(active)
             sample = source.on_ray(u, place_of(index, start), ray, part, active)
             used, point = sample.counts, sample.point
-            sigma_s, _, _ = part.medium.get_scattering_coefficients(point, used)
-            phase, _ = part.medium.phase_function().eval_pdf(
-                mi.PhaseFunctionContext(), point, sample.towards, used
-            )
+            sigma_s, phase = part.scattering(sample.x, point, sample.towards, used)
             transmittance, sampler = part.transmittance(
                 sample.x, point, sample.path, ray, sampler, used
             )
@@ -207,7 +212,7 @@ def _airlight(
     return total, sampler
 
 
-def _surface(
+def reflected_light(
     task: Task,
     sampler: "mi.Sampler",
     ray: Ray,

@@ -7,6 +7,9 @@ integrator checks `reference.quadrature`. The two share facts that `reference.sc
 through the pixel centres, shapes and radiance of area lights, numbers of media) and Mitsuba's ray
 casting, but no derivation beyond the integral itself.
 
+A scene that was read for the equation of a model is traced by
+`reference.monte_carlo.single_scatter.model_rays`.
+
 The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the
 grid of cells is itself at a random place, a new one for each light and medium. The estimate is
 unbiased, its error falls as n^-1.5 where the integrand is smooth and as 1/n at the edge of a
@@ -17,13 +20,21 @@ relative to the light, in the variant's precision. Sums over at most 256 samples
 batches double.
 """
 
+from functools import partial
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings
-from airlight.reference.monte_carlo.single_scatter.estimator import Task, source_light
+from airlight.reference.monte_carlo.single_scatter.estimator import (
+    Task,
+    ray_light,
+    source_light,
+)
+from airlight.reference.monte_carlo.single_scatter.model_rays import fog_glow, model_light
+from airlight.reference.monte_carlo.single_scatter.model_terms import terms_of
 from airlight.reference.monte_carlo.single_scatter.sources import sources_of
 from airlight.reference.monte_carlo.single_scatter.stretches import double_ray
 from airlight.reference.scene.read import ReferenceScene, has_mirrors
@@ -39,7 +50,8 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
     sampled under area lights and a sky alone: without these all batches agree on it.
     """
     check_samples(samples)
-    task = _task(reference, samples)
+    task, terms = _task(reference, samples), terms_of(reference)
+    trace = ray_light if terms is None else partial(model_light, terms)
     sampler = mi.load_dict({"type": "independent"})
     pixels = reference.width * reference.height
     most = 1 << 20  # camera rays in one kernel
@@ -58,10 +70,13 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
         # One source after the other: those of one structure share a compiled kernel, while a kernel
         # of many would hold a loop for each.
         for source in task.sources:
-            sent = source_light(task, source, sampler, ray, dr.full(mi.Bool, True, count))
+            sent = source_light(trace, task, source, sampler, ray, dr.full(mi.Bool, True, count))
             layers = layers[0] + sent[0], layers[1] + sent[1]
             sampler.schedule_state()
             dr.eval(layers)
+        if terms is not None and terms.glows:
+            glow = fog_glow(terms, task, sampler, ray, dr.full(mi.Bool, True, count))
+            layers = layers[0] + glow, layers[1]
         for layer, radiance in enumerate(layers):
             mean[layer, chunk] = np.stack([np.array(c, dtype=np.float64) for c in radiance], axis=1)
     return single_batch(seed, samples, mean)

@@ -5,10 +5,12 @@ A light at a place sends the intensity I to a point at the distance r; a sample 
 density), with the density of the distances along the ray
 (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a point y for each
 sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w the unit
-vector from y. The plane of y clips the ray: points behind it get no light from y. A sun and a sky
-have an irradiance, and a sky has a direction for each sample. Mitsuba's emitters compute the
-emission, except for area lights, whose points are drawn by
-`reference.monte_carlo.single_scatter.area_sampling`, not by Mitsuba's `sample_direction`.
+vector from y. The plane of y clips the ray: points behind it get no light from y. A model has
+another falloff for 1/r^2, and other edges of spots
+(`reference.monte_carlo.single_scatter.model_lamps`). A sun and a sky have an irradiance, and a sky
+has a direction for each sample. Mitsuba's emitters compute the emission, except for area lights,
+whose points are drawn by `reference.monte_carlo.single_scatter.area_sampling`, not by Mitsuba's
+`sample_direction`.
 """
 
 import math
@@ -33,9 +35,16 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     closest_approach,
     cone_ends,
 )
+from airlight.reference.monte_carlo.single_scatter.model_lamps import (
+    Falloff,
+    SpotEdge,
+    falloff_of,
+    spot_edge,
+)
 from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
+from airlight.reference.scene.model import Model
 from airlight.reference.scene.read import ReferenceScene, scene_from, whole_scene
 
 #: points of the unit square
@@ -67,6 +76,7 @@ class _Near(ABC):
     count = 1  # of lights
     position: "mi.Point3d | None" = None  # of all samples, if it is the same for all [m]
     medium: "mi.MediumPtr | None" = None  # where every path begins, if it is known
+    falloff: Falloff | None = None  # with the distance, if it is another than the inverse square
 
     def light(self, number: "mi.UInt32") -> Self:
         """Return one of several lights; a source of one has one."""
@@ -98,10 +108,19 @@ class _Near(ABC):
         # the plane of an area light's point.
         low, high = (approach.foot + end for end in self.ends(light, approach, ray))
         low, high = dr.maximum(part.start, low), dr.minimum(part.end, high)
+        height = approach.height
+        if self.falloff is not None:
+            # The part within the range; the law says the height at which the angles are drawn.
+            half = self.falloff.half_chord(height)
+            low, high = (
+                dr.maximum(approach.foot - half, low),
+                dr.minimum(approach.foot + half, high),
+            )
+            height = self.falloff.sampling_height(height)
         used = active & (high > low) & (light.density > 0)
         low = dr.select(used, low, 0)
         length = dr.select(used, high - low, 1)
-        span = Span(approach.height, low - approach.foot, length)
+        span = Span(height, low - approach.foot, length)
         y, density = part.distances(u, low, length, span)
         s = span.start + y
         square = approach.height * approach.height + s * s
@@ -113,9 +132,10 @@ class _Near(ABC):
         # single precision.
         farthest = 1e15
         used &= (density > 0) & (square < farthest * farthest)
-        value = self.sent(light, point, from_light) * mi.Float(
-            dr.select(used, 1 / (square * density), 0)
-        )
+        falls = 1 / (square * density)
+        if self.falloff is not None:
+            falls = self.falloff.in_fog(square) / density
+        value = self.sent(light, point, from_light) * mi.Float(dr.select(used, falls, 0))
         return Sample(low + y, point, -from_light, self._path(light, way), value, used)
 
     def on_surface(
@@ -126,7 +146,10 @@ class _Near(ABC):
         way = hit.p - mi.Point3f(light.position)
         r = dr.norm(way)
         from_light = way / r
-        return -from_light, self._path(light, way), self.sent(light, hit, from_light) / (r * r)
+        irradiance = self.sent(light, hit, from_light) / (r * r)
+        if self.falloff is not None:
+            irradiance *= mi.Float(self.falloff.on_surface(dr.square(mi.Float64(r))))
+        return -from_light, self._path(light, way), irradiance
 
     def _path(self, light: LightSample, way: "mi.Vector3f") -> Path:
         """Return the paths along ways from the light [m]."""
@@ -144,6 +167,7 @@ class _Placed(_Near):
 
     position: "mi.Point3d"  #: [m]
     medium: "mi.MediumPtr | None" = None  #: the medium that it is in, if it is known
+    falloff: Falloff | None = None  #: that of a model; None for the inverse square
     varies = False
 
     def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
@@ -182,11 +206,16 @@ class SpotSource(_Placed):
     emitter: "mi.Emitter"
     axis: "mi.Vector3d"  #: unit vector
     cutoff: float  #: half angle of the cone [rad]
+    edge: SpotEdge | None = None  #: that of a model; None for the emitter's
 
     def sent(
         self, point: LightSample, at: "mi.Interaction3f", from_light: "mi.Vector3f"
     ) -> "mi.Spectrum":
-        """Return the intensity: the emitter's irradiance times the squared distance."""
+        """Return the intensity: the emitter's irradiance times the squared distance, or that of a
+        model's edge.
+        """
+        if self.edge is not None:
+            return self.edge.sent(from_light)
         sample, irradiance = self.emitter.sample_direction(at, mi.Point2f(0.5))
         return irradiance * sample.dist * sample.dist
 
@@ -317,15 +346,17 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     """Return the lights of a scene; all point lights are one source."""
     emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
     points = [emitter for emitter in emitters if emitter.class_name() == "PointLight"]
-    others = [_source(emitter) for emitter in emitters if emitter not in points]
+    model = reference.model
+    falloff = None if model.is_physical else falloff_of(model)
+    others = [_source(emitter, model, falloff) for emitter in emitters if emitter not in points]
     area = [
         AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()), scene_from([light.shape]))
         for light in reference.area
     ]
-    return (*([_point_lights(points)] if points else []), *others, *area)
+    return (*([_point_lights(points, falloff)] if points else []), *others, *area)
 
 
-def _point_lights(emitters: Sequence["mi.Emitter"]) -> PointSource:
+def _point_lights(emitters: Sequence["mi.Emitter"], falloff: Falloff | None) -> PointSource:
     # A point light sends the same in all directions: its emitter is asked once.
     places, intensities = np.empty((2, 3, len(emitters)))
     for number, emitter in enumerate(emitters):
@@ -334,16 +365,24 @@ def _point_lights(emitters: Sequence["mi.Emitter"]) -> PointSource:
         intensities[:, number] = np.ravel(irradiance * sample.dist * sample.dist)
     # An array for each coordinate: cut out of one, their kernels would hold how many there are.
     return PointSource(
-        position=mi.Point3d(*places), intensity=mi.Color3f(*intensities), count=len(emitters)
+        position=mi.Point3d(*places),
+        intensity=mi.Color3f(*intensities),
+        count=len(emitters),
+        falloff=falloff,
     )
 
 
-def _source(emitter: "mi.Emitter") -> Source:
+def _source(emitter: "mi.Emitter", model: Model, falloff: Falloff | None) -> Source:
     if is_sky(emitter) or is_directional(emitter):
         return FarSource(emitter)
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
     return SpotSource(
-        position=mi.Point3d(sample.p), emitter=emitter, axis=axis, cutoff=math.radians(cutoff)
+        position=mi.Point3d(sample.p),
+        emitter=emitter,
+        axis=axis,
+        cutoff=math.radians(cutoff),
+        falloff=falloff,
+        edge=spot_edge(model, emitter, axis),
     )

@@ -88,6 +88,22 @@ class Part(ABC):
         light infinitely far away.
         """
 
+    def scattering(
+        self,
+        x: "mi.Float64",
+        point: "mi.MediumInteraction3f",
+        towards: "mi.Vector3f",
+        active: "mi.Bool",
+    ) -> "tuple[mi.Spectrum, mi.Spectrum | mi.Float]":
+        """Return scattering coefficients [1/m] at points, x [m] from the camera, and phase
+        functions [1/sr] from light of unit directions to the camera.
+        """
+        sigma_s, _, _ = self.medium.get_scattering_coefficients(point, active)
+        phase, _ = self.medium.phase_function().eval_pdf(
+            mi.PhaseFunctionContext(), point, towards, active
+        )
+        return sigma_s, phase
+
     @abstractmethod
     def transmittance(
         self,

@@ -45,8 +45,8 @@ from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 
 
 def varying_part(
-    medium: VaryingMedium, around: Surroundings, ray: Ray, distance: "mi.Float"
-) -> Part:
+    medium: VaryingMedium, around: Surroundings, ray: Ray, distance: "mi.Float | mi.Float64"
+) -> "FogPart | GridPart":
     """Return the part of camera rays in a medium, up to the surface at a distance [m]."""
     plugin = mi.MediumPtr(medium.plugin)
     if isinstance(medium, HeightMedium):
@@ -62,15 +62,15 @@ def varying_part(
             level, dr.select(inside, farthest, 0), dr.clip(dr.maximum(*ends), 0, farthest)
         )
         last = dr.minimum(last, mi.Float64(distance))
-        return _FogPart(around, first, last, plugin, last > first, medium, up, height, rise)
+        return FogPart(around, first, last, plugin, last > first, medium, up, height, rise)
     meets, near, far = plugin.intersect_aabb(mi.Ray3f(ray.origin, ray.direction))
     start, end = mi.Float64(dr.maximum(near, 0)), mi.Float64(dr.minimum(far, distance))
     majorant = float(dr.max(medium.plugin.get_majorant(dr.zeros(mi.MediumInteraction3f)))[0])
-    return _GridPart(around, start, end, plugin, meets & (end > start), majorant)
+    return GridPart(around, start, end, plugin, meets & (end > start), majorant)
 
 
 @dataclass(frozen=True)
-class _FogPart(Part):
+class FogPart(Part):
     """Camera rays in height fog."""
 
     fog: HeightMedium
@@ -128,17 +128,19 @@ class _FogPart(Part):
         active: "mi.Bool",
     ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
-        z = dr.dot(mi.Vector3d(point.p), self.up)
-        if path.end is None:
-            depth = self._depth(
-                z, dr.dot(mi.Vector3d(path.begin), self.up), mi.Float64(path.length)
-            )
-        else:
-            depth = self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
+        depth = self._light_depth(point, path)
         transmittance = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
         return dr.select(
             unblocked(self.around, *path.shadow_ray(), active), transmittance, 0
         ), sampler
+
+    def _light_depth(self, point: "mi.Interaction3f", path: Path) -> "mi.Float64":
+        """Return the optical depth from the light along paths to points."""
+        z = dr.dot(mi.Vector3d(point.p), self.up)
+        if path.end is None:
+            begin = dr.dot(mi.Vector3d(path.begin), self.up)
+            return self._depth(z, begin, mi.Float64(path.length))
+        return self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
 
     def _depth_to(self, x: "mi.Float64") -> "mi.Float64":
         """Return the optical depth from the camera to distances x [m]."""
@@ -194,7 +196,7 @@ class _FogPart(Part):
 
 
 @dataclass(frozen=True)
-class _GridPart(Part):
+class GridPart(Part):
     """Camera rays in the box of a grid."""
 
     majorant: float  #: Mitsuba's bound of the extinction [1/m]
@@ -235,9 +237,11 @@ class _GridPart(Part):
         line: "tuple[mi.Point3f, mi.Vector3f, mi.Float]",
         sampler: "mi.Sampler",
         active: "mi.Bool",
+        *,
+        fraction: "mi.Float | float" = 1.0,
     ) -> "tuple[mi.Float, mi.Sampler]":
         """Return estimates of the transmittance along lines, given by origin [m], unit direction
-        and length [m], and the sampler.
+        and length [m], through a fraction of the optical depth, and the sampler.
         """
         origin, direction, distance = line
         meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
@@ -245,8 +249,8 @@ class _GridPart(Part):
 
         def fly(x, transmittance, sampler):
             # The next point of the Poisson process of the density m; the product of 1 - sigma_t/m
-            # over its points is the estimate.
-            x = x - dr.log(1 - sampler.next_1d()) / self.majorant
+            # over its points is the estimate. A process of a fraction of m has that of the depth.
+            x = x - dr.log(1 - sampler.next_1d()) / (self.majorant * fraction)
             place = dr.zeros(mi.MediumInteraction3f)
             place.p = origin + direction * x
             _, _, sigma_t = self.medium.get_scattering_coefficients(place, x < end)

@@ -16,7 +16,7 @@ from pathlib import Path
 from mpmath import mp
 
 from airlight.analytic.phase import phase_from_words
-from tests.evidence.certified import airlight_integral, height_fog
+from tests.evidence.certified import airlight_integral, height_fog, model_rays
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 
 FOLDER = airlight_integral.FOLDER
@@ -54,6 +54,7 @@ MAKERS: dict[str, Callable[[Row], dict[str, str]]] = {
     "airlight_integral_droplets.csv": _droplets,
     "airlight_slopes.csv": _slopes,
     "height_fog_rays.csv": lambda row: {"value": height_fog.value(row)},
+    "model_rays.csv": lambda row: {"value": model_rays.value(row)},
 }
 
 

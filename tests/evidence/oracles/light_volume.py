@@ -53,6 +53,7 @@ from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 from airlight.reference.quadrature.light_airlight import lit_sums
+from airlight.reference.quadrature.model_terms import route_of
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.visibility.certificate import LitIntervals
@@ -113,7 +114,8 @@ def oracle_airlight(
         lit = volume_intervals(
             height_field(shadow_map, walls[number] if walls else None), rays, ends
         )
-        total += lit_sums(reference, light, rays, lit, np.reshape(distance, -1))[0]
+        route = route_of(reference, np.reshape(distance, -1))
+        total += lit_sums(reference, light, rays, lit, route)[0]
     return total.reshape(reference.height, reference.width, 3)
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
 from airlight.reference.quadrature.reference import ReferenceInputs
+from airlight.reference.scene.model import Model
 from airlight.reference.storage import store as module
 from airlight.reference.storage.cache import cache_folder
 from airlight.reference.storage.scene_digest import scene_content
@@ -177,6 +178,29 @@ CELL = Cell(
     "hall a", (32, 24), ("medium.sigma_t=0.1",), CHOSEN, Measure(timed_size=(8, 6)), ("map", 64.0)
 )
 MACHINE = {"host": "a"}
+#: by term, words that are not those of the physical equation
+TERMS = {
+    "light-path": "off",
+    "camera-path": "0.5",
+    "law": "softened:1",
+    "range": "quartic:8",
+    "spot": "cosine-smooth",
+    "phase": "none",
+    "depth": "axis",
+    "ends": "planes:0:60",
+    "fade": "48:60",
+    "source": "constant:1",
+    "cap": "0.5",
+    "lobe": "8",
+    "ambient": "1",
+    "lit": "0.01",
+    "lamps": "2",
+    "suns": "8",
+    "surface.light-path": "off",
+    "surface.camera-path": "off",
+    "surface.law": "softened:1",
+    "surface.factor": "2",
+}
 BATCHES = (Content("a"), 16, 2, ("1", "2-3"), np.ones((2, 3), np.int64))
 
 
@@ -210,7 +234,9 @@ def every_inputs(tmp_path) -> list[Inputs]:
         CellInputs(REFERENCE, CELL, code, MACHINE),
         TimesInputs((CELL,), (code,), MACHINE),
         FlipInputs(np.ones((2, 3, 3)), np.ones((2, 3, 3)), "1"),
-        ImageInputs(REFERENCE, "hall a", (32, 24), "mine", tmp_path / "a.exr", (timing, "card")),
+        ImageInputs(
+            REFERENCE, "hall a", (32, 24), "mine", tmp_path / "a.exr", (timing, "card"), Model()
+        ),
         StabilityInputs(100, {"mine.py:k": code}),
         ScalingInputs("map", standard_study("scaling"), MACHINE),
         PaperInputs("maps", "ab", MACHINE),
@@ -221,6 +247,13 @@ def changed(value: Any) -> list[Any]:
     """Return other values in the place of one: one for each number, word and array in it."""
     if isinstance(value, Content):
         return [Content(f"{value.digest} another")]
+    if isinstance(value, Model):
+        assert len(TERMS) == len(fields(value)) - 1  # all but the name
+        source = {"source": TERMS["source"]}
+        return [
+            Model.of({term: words} | (source if term in ("cap", "lobe") else {}))
+            for term, words in TERMS.items()
+        ]
     if is_dataclass(value):
         names = [each.name for each in fields(value)]
         return [
@@ -274,6 +307,14 @@ def subclasses(kind: type) -> set[type]:
     """All kinds of inputs that name a kind of file, and so are cached."""
     below = {each for child in kind.__subclasses__() for each in subclasses(child)}
     return below | ({kind} if "kind" in vars(kind) else set())
+
+
+def test_a_model_counts_by_its_terms_and_not_by_its_name():
+    named = Model(law="softened:1", name="engine 1.0")
+    plain = replace(named, name="")
+    assert replace(REFERENCE, model=named).key == replace(REFERENCE, model=plain).key
+    inputs = SingleScatterInputs(*BATCHES)
+    assert replace(inputs, model=replace(Model(), name="engine")).key == inputs.key
 
 
 def test_the_code_of_inputs_within_inputs_counts(monkeypatch, tmp_path):

@@ -236,7 +236,7 @@ def test_no_color_leaves_letters_alone_on_a_terminal(capsys, monkeypatch):
 def test_lists_have_one_command(capfd):
     assert cli.run(["list", "--json"]) == 0
     data = json.loads(capfd.readouterr().out)["result"]
-    assert list(data) == ["scenes", "methods", "kernels", "studies", "papers"]
+    assert list(data) == ["scenes", "methods", "kernels", "models", "studies", "papers"]
     for name, rows in data.items():
         assert cli.run(["list", name, "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["result"] == {name: rows}

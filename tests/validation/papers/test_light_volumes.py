@@ -88,7 +88,9 @@ def test_figures_of_the_tessellation_are_those_of_small_maps(variant, monkeypatc
     assert figures["best bias"] == min(figures[f"bias {bias:g}"] for bias in light_volumes.BIASES)
     assert figures["best bias"] < figures["bias 0"] / 5
     assert (figures["flat"], figures["jump"]) == (8.0, 1.0)  # texels: edges are divided to the last
-    assert figures["our error"] < 1e-6 < figures["plain error"] < 0.01
+    # The plain filter misses an edge here and there; of 48 pixels one weighs 2 %, and which it is
+    # depends on how a processor rounds the depths of the map.
+    assert figures["our error"] < 1e-6 < figures["plain error"] < 0.05
 
 
 def test_the_error_of_the_mesh_falls_with_the_texels_of_its_map(variant, monkeypatch):

@@ -6,6 +6,8 @@ Mitsuba says of every file that is no XML that it found no element in it, takes 
 each.
 """
 
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
@@ -104,6 +106,35 @@ def _check_elements(text: bytes, where: str) -> None:
         raise InputError(
             f"{where}: its elements are nested {deepest} deep; expected at most {most}"
         )
+
+
+@dataclass(frozen=True)
+class Named:
+    """Words of a scene file that Mitsuba drops."""
+
+    model: str | None  #: the value of the default of that name, the first as in Mitsuba
+    engine: str  #: whose height fog it has; empty where none is named
+
+
+def named_in(path: Path, default: str) -> Named:
+    """Return the model that a scene file names by a default, and the engine of its height fog."""
+    models, engines = list[str](), list[str]()
+    parents = list[tuple[str, str]]()
+    parser = expat.ParserCreate()
+
+    def opens(element: str, attributes: dict[str, str]) -> None:
+        name, value = attributes.get("name", ""), attributes.get("value", "")
+        if element == "default" and name == default:
+            models.append(value)
+        if element == "string" and name == "engine" and parents[-1:] == [("volume", "heightfog")]:
+            engines.append(value)
+        parents.append((element, attributes.get("type", "")))
+
+    parser.StartElementHandler = opens
+    parser.EndElementHandler = lambda element: parents.pop()
+    with suppress(expat.ExpatError):  # see `_check_elements`
+        parser.Parse(path.read_bytes(), True)
+    return Named(models[0] if models else None, engines[0] if engines else "")
 
 
 def _decodes(text: bytes) -> bool:

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The terms of a model in the quadrature: against a march in NumPy, closed forms and limits."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from airlight.errors import InputError
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.reference import reference_image
+from airlight.reference.scene.model import Model
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
+from tests.helpers.model_march import marched
+from tests.helpers.scenes import tiny_scene
+
+#: Every term, each alone.
+TERMS = (
+    {"light_path": "off"},
+    {"light_path": "0.3", "camera_path": "0.5"},
+    {"light_path": "length:4"},
+    # A march of a sun without attenuation needs an end.
+    {"light_path": "off", "camera_path": "off", "ends": "spheres:0:60"},
+    {"law": "softened:1:16"},
+    {"law": "clamped:2"},
+    {"law": "clamped:1:1"},
+    {"law": "power:1"},
+    {"law": "sphere:1.5"},
+    {"range": "quartic:6"},
+    {"range": "fourth:6"},
+    {"range": "square:6"},
+    {"range": "linear:9"},
+    {"spot": "cosine-smooth"},
+    {"spot": "cosine-squared"},
+    {"spot": "rim:2"},
+    {"phase": "none"},
+    {"phase": "hg:0.6"},
+    {"phase": "cornette-shanks"},
+    {"depth": "axis"},
+    {"depth": "axis-ends"},
+    {"depth": "axis-lookup"},
+    {"ends": "planes:1:12"},
+    {"ends": "spheres:2:9"},
+    {"ends": "planes:0:12", "fade": "4:12"},
+    {"ambient": "0.1,0.2,0.3"},
+    {"source": "constant:1,2,3", "cap": "0.7", "lobe": "8:2"},
+    {
+        "lit": "0.01",
+        "light_path": "off",
+        "camera_path": "off",
+        "range": "quartic:8",
+        "ends": "spheres:0:60",
+    },
+    {"lamps": "3", "suns": "2", "depth": "axis", "ends": "planes:1:20", "law": "sphere:1"},
+)
+
+
+@pytest.fixture
+def lamp_ahead(variant):
+    """A lamp in the middle of the image, without anything else."""
+    to_world = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 0, 1], [0, 1, 0])
+    scene = tiny_scene(size=(7, 5), ball=None, floor=None)
+    scene["sensor"] |= {"to_world": to_world}
+    scene["lamp"] |= {"position": [0, 0, 2.5]}
+    return mi.load_dict(scene)
+
+
+@pytest.fixture
+def scaled_scenes(variant):
+    """A scene, and the same with lengths times 2, extinction halved and intensity times 4."""
+    scenes = []
+    for scale in (1.0, 2.0):
+        scene = tiny_scene(size=(8, 6), ball=None, floor=None)
+        scene["fog"] |= {"sigma_t": 0.32 / scale}
+        places = [[scale * x for x in each] for each in ([0.2, -4.1, 1.3], [0.1, 0.0, 0.6])]
+        to_world = mi.ScalarTransform4f().look_at(*places, [0, 0, 1])
+        scene["sensor"] |= {"to_world": to_world}
+        intensity = {"type": "rgb", "value": [scale**2 * each for each in (5.0, 4.0, 3.0)]}
+        scene["lamp"] |= {
+            "position": [scale * x for x in (0.9, 0.7, 1.9)],
+            "intensity": intensity,
+        }
+        scenes.append(mi.load_dict(scene))
+    return scenes
+
+
+@pytest.fixture
+def sun_without_bounds(variant):
+    """A sun over the tiny scene's sphere, in fog without bounds, where no shadow is seen."""
+    sun = {
+        "type": "directional",
+        "direction": [0.3, 0.5, -0.7],
+        "irradiance": {"type": "rgb", "value": [3.0, 2.0, 1.0]},
+    }
+    fog = tiny_scene()["fog"] | {"phase": {"type": "hg", "g": 0.4}}
+    return mi.load_dict(tiny_scene(size=(8, 6), ball=None, floor=None, lamp=sun, fog=fog))
+
+
+def image_of(scene, **terms):
+    return quadrature_image(read_reference(scene, Model(**terms)), checks=0)
+
+
+def agrees(loaded, tolerance, steps=4096, **terms):
+    """Check the airlight of a scene against a march, relative to the largest pixel."""
+    reference = read_reference(loaded.scene, Model(**terms))
+    image = quadrature_image(reference, checks=0)
+    expected = marched(reference, image.distance.ravel(), steps)
+    found = image.airlight.reshape(-1, 3)
+    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
+    # The march is not what states the error: that is far below it.
+    assert image.airlight_error.max() < 1e-7 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("terms", TERMS, ids=lambda terms: ",".join(terms.values()))
+@pytest.mark.claim("models", tolerance="2e-6 of the largest: midpoints of 4096 steps")
+def test_terms_without_shadows(variant, terms):
+    agrees(load_scene("open-fog", (8, 6)), 2e-6, **terms)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terms", TERMS, ids=lambda terms: ",".join(terms.values()))
+@pytest.mark.parametrize("scene", ["street", "meadow", "sphere-spot"])
+@pytest.mark.claim("models", tolerance="1e-3 of the largest: edges of shadows fall between steps")
+def test_terms_among_shadows_and_in_height_fog(variant, scene, terms):
+    if scene == "meadow" and "length" in terms.get("light_path", ""):
+        with pytest.raises(InputError, match="in height fog under a sun"):
+            image_of(load_scene(scene, (8, 6)).scene, **terms)
+        return
+    # A march of logarithmic steps meets edges of shadows far from a lamp by chance.
+    agrees(load_scene(scene, (8, 6)), 1e-3, 16384, **terms)
+
+
+@pytest.mark.claim("models", tolerance="1e-12: float64 of an arctangent")
+def test_a_softened_law_without_attenuation_is_an_arctangent(variant, lamp_ahead):
+    """Also where the light lies on the ray."""
+    softened = {"law": "softened:0.7:3", "light_path": "off", "camera_path": "off"}
+    image = image_of(lamp_ahead, **softened)
+    reference = read_reference(lamp_ahead)
+    light, e = reference.lights[0], 0.7
+    foot = reference.direction @ (light.position - reference.origin)
+    away = reference.origin + foot[:, None] * reference.direction - light.position
+    width = np.sqrt(np.sum(away**2, axis=1) + e)
+    whole = 3 * (0.5 * np.pi + np.arctan(foot / width)) / width
+    albedo_sigma = reference.medium.albedo * reference.medium.sigma_t
+    expected = albedo_sigma * light.intensity / (4 * np.pi) * whole[:, None]
+    np.testing.assert_allclose(image.airlight.reshape(-1, 3), expected, rtol=1e-12)
+
+
+def test_an_infinite_law_on_the_ray_is_refused_and_a_finite_one_is_not(variant, lamp_ahead):
+    with pytest.raises(InputError, match="infinite"):
+        reference_image(lamp_ahead, model=Model(light_path="off"))
+    soft = reference_image(lamp_ahead, model=Model(law="softened:0.01"))
+    assert np.isfinite(soft.airlight).all()
+    assert soft.airlight_error.max() < 1e-9 * soft.airlight.max()
+
+
+def test_laws_become_the_physical_one(variant):
+    scene = load_scene("open-fog", (8, 6)).scene
+    physical = image_of(scene).airlight
+    errors = {
+        name: [
+            np.abs(image_of(scene, **{term: f"{kind}:{value:g}"}).airlight - physical).max()
+            for value in values
+        ]
+        for name, (term, kind, values) in {
+            "softened": ("law", "softened", (1e-3, 1e-4)),
+            "range": ("range", "quartic", (80, 160)),
+        }.items()
+    }
+    # e to the first power, R to the minus fourth.
+    assert 8 < errors["softened"][0] / errors["softened"][1] < 12
+    assert 14 < errors["range"][0] / errors["range"][1] < 18
+
+
+def test_a_fraction_of_the_light_path_lies_between(variant):
+    scene = load_scene("sphere-spot", (8, 6)).scene
+    none, half, whole = (image_of(scene, light_path=path) for path in ("off", "0.5", "on"))
+    for layer in ("airlight", "surface"):
+        low, middle, high = (getattr(each, layer) for each in (whole, half, none))
+        assert np.all(low <= middle)
+        assert np.all(middle <= high)
+        assert low.sum() < high.sum()
+
+
+def test_units_scale_with_the_lengths_of_a_model(variant, scaled_scenes):
+    """Lengths times 2, extinction halved and intensity times 4: lengths of a model are in metres."""
+    one, two = scaled_scenes
+    small = image_of(one, law="softened:0.5", range="quartic:6", ends="spheres:1:9").airlight
+    large = image_of(two, law="softened:2", range="quartic:12", ends="spheres:2:18").airlight
+    np.testing.assert_allclose(large, small, rtol=1e-6, atol=1e-9 * small.max())
+
+
+def test_a_sun_in_fog_without_bounds_has_light_where_its_way_does_not_attenuate(
+    variant, sun_without_bounds
+):
+    with pytest.raises(InputError, match="nothing of it arrives"):
+        read_reference(sun_without_bounds)
+    image = image_of(sun_without_bounds, light_path="off")
+    reference = read_reference(sun_without_bounds, Model(light_path="off"))
+    sun = reference.directional[0]
+    phase = reference.medium.phase(reference.direction @ -sun.direction)[:, None]
+    # p E Omega (1 - exp(-sigma D))/(4 pi), D to the surface or infinite.
+    opacity = -np.expm1(-reference.medium.sigma_t * image.distance.reshape(-1, 1))
+    expected = phase * sun.irradiance * reference.medium.albedo * opacity / (4 * np.pi)
+    np.testing.assert_allclose(image.airlight.reshape(-1, 3), expected, rtol=1e-9)
+
+
+def test_a_sun_without_an_end_is_refused(variant, sun_without_bounds):
+    with pytest.raises(InputError, match="without end"):
+        image_of(sun_without_bounds, light_path="off", camera_path="off")
+
+
+@pytest.mark.claim("models", tolerance="2e-5: depths are those of float32 rays")
+def test_surfaces_of_a_model(variant):
+    """By the law, the paths and the factor; the physical surface has the material."""
+    scene = load_scene("sphere-spot", (12, 9)).scene
+    terms = {
+        "law": "softened:1:16",
+        "range": "quartic:30",
+        "light_path": "off",
+        "surface_factor": "3",
+        "surface_camera_path": "0.5",
+    }
+    physical, image = image_of(scene), image_of(scene, **terms)
+    reference = read_reference(scene)
+    distance = np.where(np.isfinite(physical.distance), physical.distance, 0.0)
+    point = reference.origin + distance.reshape(-1, 1) * reference.direction
+    r = np.linalg.norm(point - reference.lights[0].position, axis=1).reshape(distance.shape)
+    sigma_t = reference.medium.sigma_t
+    lit = physical.surface > 0
+    ratio = 3 * 16 * r**2 / (r**2 + 1) * (1 - np.minimum(r / 30, 1) ** 4) ** 2
+    factor = ratio[..., None] * np.exp(sigma_t * (r + 0.5 * distance)[..., None])
+    assert lit.mean() > 0.1
+    np.testing.assert_allclose(image.surface[lit], (factor * physical.surface)[lit], rtol=2e-5)
