@@ -147,6 +147,11 @@ def reference_of_pixels(
     return _checked_image(chosen, plan)
 
 
+def reference_of(scene: mi.Scene, model: Model = PHYSICAL) -> ReferenceImage:
+    """Return the quadrature reference of a scene at its own size; it is not cached."""
+    return _checked_image(read_reference(scene, model), None)
+
+
 def _checked_image(
     reference: ReferenceScene,
     plan: PointPlan | None,

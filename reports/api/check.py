@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.check`: relations between frames, which need no reference."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,10 +11,13 @@ from airlight.reports.api.inputs import (
     File,
     KernelLike,
     MethodLike,
+    ModelLike,
     Progress,
     Size,
     Words,
+    chosen_model,
     configuration_of,
+    exclude,
     listed,
     one_error,
     pixels_of,
@@ -24,6 +27,7 @@ from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, numbers, table, words
 
 if TYPE_CHECKING:
+    from airlight.reference.scene.model import Model
     from airlight.validation.arrays import Array
     from airlight.validation.check.check_file import Asked
     from airlight.validation.check.judge import Kept
@@ -99,6 +103,7 @@ def check(
     method: MethodLike | None = None,
     kernel: KernelLike | None = None,
     *,
+    model: ModelLike | None = None,
     only: Words = (),
     size: Size = "64x48",
     precision: Literal["single", "double"] | None = None,
@@ -112,23 +117,28 @@ def check(
     special. Sixteen such relations hold in every scene of single scattering, and need no number of
     it. `airlight describe SCENE --variants all -o DIR` writes scenes to render, with the file
     check.json that names their frames; or write that file for frames of your own. With `--method`
-    a method of ours or of yours renders the frames.
+    a method of ours or of yours renders the frames. With `--model` they are references of an
+    engine's own equation: what fails then, no algorithm can make hold.
 
     The exit status is 1 if a relation fails. Each row says what that points to.
 
     Parameters
     ----------
     what
-        The folder of a check.json, or the file; with `--method` a built-in scene of fog.
+        The folder of a check.json, or the file; with `--method` or `--model` a built-in scene of
+        fog.
     method
         Render and check this method: one of `airlight list methods`, or a user's as
         MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python also a function.
     kernel
         Airlight kernel of the method, see `airlight list kernels`.
+    model
+        Check this equation, such as godot:range=9, see `airlight list models`, or terms such as
+        light-path=off. Its lengths stay as they are where `units` doubles those of the scene.
     only
         Check these relations alone, such as units,pan.
     size
-        With a method: width and height of the frames [pixels], or WxH.
+        With a method or a model: width and height of the frames [pixels], or WxH.
     precision
         With a method: its precision; by default double for a built-in one, single for a user's.
     margin
@@ -157,10 +167,16 @@ def check(
             raise InputError(f"only: got {name!r}, expected some of {', '.join(RELATIONS)}")
     if margin is not None and not 0 < margin < 1:
         raise InputError(f"margin: got {margin:g}, expected a fraction above 0, such as 0.01")
-    if method is None:
-        return _files(Path(what), chosen, margin)
     pixels = pixels_of(size)
     assert pixels is not None
+    if model is not None:
+        exclude("model", "is no method", {"method": method, "kernel": kernel, **parameters})
+        equation = chosen_model(model)
+        assert equation is not None
+        with telling(progress, f"{what}: {equation.title}") as tell:
+            return _model(str(what), equation, chosen, pixels, margin, tell)
+    if method is None:
+        return _files(Path(what), chosen, margin)
     asked = configuration_of(method, kernel, parameters)
     # A user's code may be written for single precision alone, as shaders are.
     usual: Literal["single", "double"] = "single" if is_users(asked.method) else "double"
@@ -217,37 +233,87 @@ def _method(
     """Render the frames of a method, and judge them."""
     from airlight.realtime.methods.registry import METHODS
     from airlight.reports.machine.environment import activate
-    from airlight.validation.check.judge import judge, signature
-    from airlight.validation.check.variants import variants
 
     activate()
     if chosen.method in METHODS and METHODS[chosen.method].renders_clouds:
         raise InputError(f"check: {chosen.label} scatters many times; expected a method of fog")
-    made = variants(scene, size)
+    draws = True
+
+    def frame(changed: Any, number: int) -> "dict[str, Array]":
+        nonlocal draws
+        # A noisy method draws other numbers for each frame; one that draws none refuses a run.
+        try:
+            return _frame(changed, chosen, precision, number if draws else 0)
+        except InputError:
+            if not (draws and number):
+                raise
+            image = _frame(changed, chosen, precision, 0)
+            draws = False
+            return image
+
+    by = f"{chosen.label}, {precision} precision"
+    return _rendered(scene, by, frame, only, size, _ROUNDING[precision], margin, tell)
+
+
+def _model(
+    scene: str,
+    model: "Model",
+    only: Sequence[str],
+    size: tuple[int, int],
+    margin: float | None,
+    tell: Any,
+) -> RelationsKept:
+    """Compute the references of an equation, and judge them."""
+    from airlight.reports.machine.environment import activate
+
+    activate()
+    import mitsuba as mi
+
+    from airlight.reference.quadrature.reference import reference_of
+
+    def frame(changed: Any, number: int) -> "dict[str, Array]":
+        image = reference_of(mi.load_dict(changed), model)
+        return {"airlight": image.airlight, "surface": image.surface}
+
+    # A spot of the equation may have another edge, which the camera in its place then has too.
+    edge = {"angle": "linear", "rim": "cosine"}.get(model.spot_of[0], model.spot_of[0])
+    by, rounding = f"the equation of {model.title}", _ROUNDING["double"]
+    return _rendered(scene, by, frame, only, size, rounding, margin, tell, falloff=edge)
+
+
+def _rendered(
+    scene: str,
+    by: str,
+    frame: "Callable[[Any, int], dict[str, Array]]",
+    only: Sequence[str],
+    size: tuple[int, int],
+    rounding: float,
+    margin: float | None,
+    tell: Any,
+    *,
+    falloff: str = "linear",
+) -> RelationsKept:
+    """Judge the frames of changed scenes; `frame` returns the layers of one, by its number, and
+    `falloff` is that of spots to the edge of their cones.
+    """
+    from airlight.validation.check.judge import judge, signature
+    from airlight.validation.check.variants import variants
+
+    made = variants(scene, size, falloff)
     asked = _chosen(made.asked, only)
     names = dict.fromkeys((*made.again, *(name for each in asked for name in each.frames)))
-    frames, refused, draws = {}, dict[str, str](), True
+    frames, refused = {}, dict[str, str]()
     for number, name in enumerate(names):
         tell(number / len(names), name)
-        changed = made.scenes[name]
         try:
-            # A noisy method draws other numbers for each frame; one that draws none refuses a run.
-            try:
-                image = _frame(changed(), chosen, precision, number if draws else 0)
-            except InputError:
-                if not (draws and number):
-                    raise
-                image = _frame(changed(), chosen, precision, 0)
-                draws = False
+            frames[name] = _layers(frame(made.scenes[name](), number))
         except InputError as error:
             # A method may not know a light of a changed scene; the scene as it is it must know.
             if name in made.again:
                 raise
             refused[name] = str(error)
-            continue
-        frames[name] = _layers(image)
     able = [each for each in asked if not refused.keys() & {*each.frames}]
-    kept = judge(able, frames, again=made.again, rounding=_ROUNDING[precision], margin=margin)
+    kept = judge(able, frames, again=made.again, rounding=rounding, margin=margin)
     left_out = tuple(
         f"{each.name} is left out: {refused[name]}"
         for each in asked
@@ -255,7 +321,7 @@ def _method(
         if name in refused
     )
     return RelationsKept(
-        checked=f"{scene} by {chosen.label}, {precision} precision",
+        checked=f"{scene} by {by}",
         scene=scene,
         kept=kept,
         signature=signature(kept),

@@ -201,14 +201,19 @@ def _behind(function, reference, light, rays, lit, *others, **named):
 def _surface(change: Callable[..., Any]) -> Wrap:
     """Change the lit surface: change(function, reference, hits, named) -> radiance."""
 
-    def around(function, reference, hits, **named):
-        def radiance(*arguments, **changed):
-            return function(*arguments, **changed)[0]
+    def around(function, reference, hits, route, **named):
+        def radiance(reference, hits, **changed):
+            return function(reference, hits, route, **changed)[0]
 
         changed = change(radiance, reference, hits, named)
         return changed, np.zeros_like(changed)
 
     return Wrap("airlight.reference.quadrature.surface:lit_surface", around)
+
+
+def _of_model(name: str, around: Callable[..., Any]) -> Wrap:
+    """Change a function of the terms of a model."""
+    return Wrap(f"airlight.reference.quadrature.model_terms:{name}", around)
 
 
 def _without_cosine(function, reference, hits, named):
@@ -333,9 +338,9 @@ _BRIGHT_CAMERA_SEGMENT = Rewrite(
     "part.transmittance(part.start, a_, b_, c_, d_, e_)",
 )
 _TRACED_BACKWARD = Rewrite(
-    _ESTIMATOR,
-    "phase_.eval_pdf(context_, point_, sample.towards, on_)",
-    "phase_.eval_pdf(context_, point_, -sample.towards, on_)",
+    f"{_TRACED}.stretches",
+    "phase_.eval_pdf(context_, point_, towards, on_)",
+    "phase_.eval_pdf(context_, point_, -towards, on_)",
 )
 
 
@@ -485,8 +490,8 @@ _SUN = _all(
         ),
         "directional-surface-bright-segment": Rewrite(
             "airlight.reference.quadrature.surface",
-            "to_camera_ + optical_depth(a_, b_, c_, d_, e_)",
-            "to_camera_",
+            "depth + light_scale * to_light",
+            "depth",
         ),
     },
 )
@@ -635,6 +640,63 @@ _TRACED_WIDE = _all(
     },
 )
 
+_LAWS = f"{_TRACED}.model_lamps"
+_EQUATION = _all(
+    "quadrature",
+    "own-equation",
+    {
+        "model-law-for-law": _of_model(
+            "law_weight",
+            lambda function, law, window: function(replace(law, kind="sphere"), window),
+        ),
+        "model-no-range": _of_model(
+            "law_weight", lambda function, law, window: function(law, None)
+        ),
+        "model-edge-of-the-scene": _of_model(
+            "edge_profile",
+            lambda function, model, *others: function(replace(model, spot="angle"), *others),
+        ),
+        "model-camera-for-light": _terms(
+            lambda terms, *_: {
+                "paths": replace(
+                    terms.paths,
+                    camera=np.full_like(terms.paths.camera, terms.paths.light),
+                    light=float(np.mean(terms.paths.camera)),
+                )
+            }
+        ),
+        "model-depth-is-distance": _of_model(
+            "route_of",
+            lambda function, reference, distance: function(
+                replace(reference, model=replace(reference.model, depth="distance")), distance
+            ),
+        ),
+        "model-begins-at-the-camera": _of_model(
+            "route_of",
+            lambda function, reference, distance: replace(
+                function(reference, distance), start=np.zeros_like(distance)
+            ),
+        ),
+        "model-surface-by-the-inverse-square": _of_model(
+            "surface_strength", lambda function, reference, light, point: np.ones(len(point))
+        ),
+    },
+)
+
+_TRACED_EQUATION = _all(
+    "single-scatter",
+    "own-equation",
+    {
+        "traced-model-law-for-law": Rewrite(
+            _LAWS, "self.scale / (square + self.area)", "1 / (square + self.area)"
+        ),
+        "traced-model-range-of-half-power": Rewrite(_LAWS, "dr.square(1 - s2 * s2)", "1 - s2 * s2"),
+        "traced-model-camera-for-light": Rewrite(
+            f"{_TRACED}.model_terms", "self.camera * step", "self.light * step"
+        ),
+    },
+)
+
 #: Below the margin on purpose: what the comparison cannot see.
 BELOW_THE_MARGIN = Mutation("one-in-ten-thousand", "quadrature", "many-lights", _brighter(1.0001))
 
@@ -648,6 +710,8 @@ MUTATIONS = (
     *_TRACED_MESHES,
     *_TRACED_SUN,
     *_TRACED_WIDE,
+    *_EQUATION,
+    *_TRACED_EQUATION,
 )
 
 #: Faults of what all estimators share: they agree all the same, and the certified

@@ -26,6 +26,7 @@ from airlight.reference.quadrature import image as quadrature
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene import read
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.validation.estimates.agreement import (
     batch_estimate,
@@ -47,7 +48,18 @@ MARGINS = {
     "rayleigh": (5e-4, 5e-4),
     "sun": (2e-3, 2e-3),  # its media have bounds that batches feel as noise
     "wide-lights": (0.01, 0.005),  # eight times PLAN points, which all pixels share
+    "own-equation": (5e-4, 5e-4),
 }
+#: The equation of the stage `own-equation`, in which every term counts, and none hides another.
+EQUATION = Model(
+    light_path="0.4",
+    camera_path="0.7",
+    law="softened:0.3:2",
+    range="quartic:9",
+    spot="cosine-smooth",
+    depth="axis",
+    ends="planes:0.5:11",
+)
 VOLPATH_MARGIN = 0.01
 #: Points of each of eight replicates under area lights.
 PLAN = PointPlan(error=0.0, first=128, most=128)
@@ -61,6 +73,7 @@ class Stage:
     """A scene with the images of unchanged estimators."""
 
     scene: Any  # the `mi.Scene`
+    model: Model
     image: ReferenceImage
     masks: dict[str, NDArray[np.bool_]]  # pixels to compare, by layer
     margins: dict[str, float]  # by layer
@@ -79,10 +92,12 @@ class Sighting:
 
 
 def stage_scene(name: str) -> Any:
-    """Return a built-in scene, a probe, or `rayleigh`, the probe `many-lights` in air."""
+    """Return a built-in scene, a probe, or the probe `many-lights`, in air as `rayleigh`."""
     size = (16, 12) if name in WIDE_PROBES else (24, 18)
     if name in PROBES | WIDE_PROBES:
         entries = (PROBES | WIDE_PROBES)[name]()
+    elif name == "own-equation":
+        entries = PROBES["many-lights"]()
     elif name == "rayleigh":
         entries = PROBES["many-lights"]()
         entries["fog"] |= {"phase": {"type": "rayleigh"}}
@@ -98,7 +113,8 @@ def stage_of(name: str) -> Stage:
     enough, whatever they say.
     """
     scene, margins = stage_scene(name), dict(zip(LAYERS, MARGINS[name]))
-    reference = read.read_reference(scene)
+    model = EQUATION if name == "own-equation" else PHYSICAL
+    reference = read.read_reference(scene, model)
     image = quadrature.quadrature_image(reference, plan=PLAN)
     masks = {
         layer: mask
@@ -114,7 +130,7 @@ def stage_of(name: str) -> Stage:
         batches = merged(
             batches, _batches(reference, range(len(batches.seeds), 2 * len(batches.seeds)))
         )
-    return Stage(scene, image, masks, margins, batches)
+    return Stage(scene, model, image, masks, margins, batches)
 
 
 def _batches(reference, seeds: range) -> Batches:
@@ -139,7 +155,7 @@ def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Si
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore")
-        reference = read.read_reference(stage.scene)
+        reference = read.read_reference(stage.scene, stage.model)
         image, batches = stage.image, stage.batches
         if estimator == "quadrature":
             image = quadrature.quadrature_image(reference, plan=PLAN)

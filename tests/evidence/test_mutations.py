@@ -29,7 +29,7 @@ from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
 #: Faults that the default tier tries besides those of the quadrature on its stages: 32
 #: batches and their own kernels.
 QUICK = ("traced-shadow-epsilon",)
-QUICK_STAGES = ("many-lights", "two-pens")
+QUICK_STAGES = ("many-lights", "two-pens", "own-equation")
 ESTIMATORS = ("quadrature", "single-scatter")
 
 

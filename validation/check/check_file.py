@@ -34,9 +34,18 @@ FILE = "check.json"
 ROUNDING = {"float32": 1e-6, "half": 2.8e-4, "r11g11b10": 8e-3}
 
 
-def _cosine_squared(cosine: Array, cone: float) -> Array:
+def _cosine(cosine: Array, cone: float) -> Array:
     edge = math.cos(cone)
-    return np.maximum((cosine - edge) / (1 - edge), 0.0) ** 2
+    return np.maximum((cosine - edge) / (1 - edge), 0.0)
+
+
+def _cosine_squared(cosine: Array, cone: float) -> Array:
+    return _cosine(cosine, cone) ** 2
+
+
+def _cosine_smooth(cosine: Array, cone: float) -> Array:
+    t = _cosine(cosine, cone)
+    return t * t * (3 - 2 * t)
 
 
 def _linear(cosine: Array, cone: float) -> Array:
@@ -45,7 +54,9 @@ def _linear(cosine: Array, cone: float) -> Array:
 
 
 FALLOFFS: dict[str, Callable[[Array, float], Array]] = {
+    "cosine": _cosine,
     "cosine-squared": _cosine_squared,
+    "cosine-smooth": _cosine_smooth,
     "linear": _linear,
 }
 

@@ -40,8 +40,9 @@ class Variants:
     again: tuple[str, str]
 
 
-def variants(scene: str, size: tuple[int, int]) -> Variants:
-    """Return the changed scenes of a built-in scene, with images of a size [pixels].
+def variants(scene: str, size: tuple[int, int], falloff: str = "linear") -> Variants:
+    """Return the changed scenes of a built-in scene, with images of a size [pixels]; spots of the
+    renderer have a `falloff` to the edge of their cones.
 
     Raises InputError for another scene.
     """
@@ -104,14 +105,16 @@ def variants(scene: str, size: tuple[int, int]) -> Variants:
     # Camera and spot in a scene of their own.
     scenes |= {"seen": partial(camera_and_spot, False), "swapped": partial(camera_and_spot, True)}
     cameras = tuple(
-        camera_of(camera_and_spot(swapped), _CONES[swapped]) for swapped in (False, True)
+        camera_of(camera_and_spot(swapped), _CONES[swapped], falloff) for swapped in (False, True)
     )
     relate("reciprocity", "seen", "swapped", cameras=cameras)
     return Variants(scenes, tuple(asked), ("base", "again"))
 
 
-def camera_of(scene: Description, cone: float | None = None) -> Camera:
-    """Return where the camera of a description looks."""
+def camera_of(
+    scene: Description, cone: float | None = None, falloff: str = "cosine-squared"
+) -> Camera:
+    """Return where the camera of a description looks; `falloff`: its own within a cone."""
     axes = np.array(scene["sensor"]["to_world"].matrix, dtype=np.float64)[:3]
     forward, up = (axes[:, column] / np.linalg.norm(axes[:, column]) for column in (2, 1))
     return Camera(
@@ -119,7 +122,7 @@ def camera_of(scene: Description, cone: float | None = None) -> Camera:
         tuple(forward.tolist()),
         tuple(up.tolist()),
         cone,
-        "cosine-squared" if cone is None else "linear",
+        falloff,
     )
 
 
