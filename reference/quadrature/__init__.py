@@ -8,6 +8,7 @@ Read in this order:
 - `image.py`: all lights along every ray, by pixel centres or by means over pixels;
 - `light_airlight.py`: the airlight of one point, spot or directional light;
 - `fields.py`: what every medium answers, the door for new ones;
+- `model_terms.py`: the terms of an engine's own equation: where its fog is, how its lamps fall off;
 - `intervals.py`: lit intervals, cut at media and at the corners of the integrand;
 - `integrate.py`: pieces to a value and its error, panels halved until a sum meets its tolerance;
 - `homogeneous.py`: homogeneous media, bounded or not;

@@ -14,6 +14,8 @@ Read in this order:
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: area lights, read and checked;
 - `varying.py`: media whose extinction differs from place to place: height fog and density grids;
+- `model_words.py`: the terms of an engine's equation in words, and what each may be;
+- `model.py`: an engine's equation by its terms: facts about it, and no physics;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;

@@ -50,15 +50,19 @@ equation alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
-from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError, nearest
-
-#: fields and words of terms: 'light_path' is 'light-path', 'surface_law' is 'surface.law'
-SURFACE = "surface_"
+from airlight.reference.scene.model_words import (
+    READERS,
+    light_path,
+    split,
+    switch,
+    word_of,
+    wrong,
+)
 
 
 @dataclass(frozen=True)
@@ -190,19 +194,17 @@ class Model:
         # Words of one meaning become one, so that equal models have equal keys.
         for field in fields(self):
             if field.name != "name":
-                word = _READERS[field.name](word_of(field.name), str(getattr(self, field.name)))
+                word = READERS[field.name](word_of(field.name), str(getattr(self, field.name)))
                 object.__setattr__(self, field.name, word)
         if self.cap != "none" and not self.constant:
-            raise _wrong("cap", self.cap, "a constant source beside it")
+            raise wrong("cap", self.cap, "a constant source beside it")
         if self.lobe != "none" and not self.constant:
-            raise _wrong("lobe", self.lobe, "a constant source beside it")
+            raise wrong("lobe", self.lobe, "a constant source beside it")
         # Without attenuation and without an end the light of a lamp must fall as 1/r^2 at least.
         bare = self.camera_scale == 0 and self.light_scale == 0
         endless = self.range == "none" and math.isinf(self.ends_of.far)
         if bare and endless and self.law_of(surface=False).power < 2:
-            raise _wrong(
-                "law", self.law, "a range, an end, or attenuation beside it: it has no sum"
-            )
+            raise wrong("law", self.law, "a range, an end, or attenuation beside it: it has no sum")
 
     @staticmethod
     def of(terms: Mapping[str, str], name: str = "") -> Model:
@@ -210,7 +212,7 @@ class Model:
 
         Raises InputError for unknown terms.
         """
-        by_word = {word_of(each): each for each in _READERS}
+        by_word = {word_of(each): each for each in READERS}
         for word in terms:
             if word not in by_word:
                 raise InputError(
@@ -230,7 +232,7 @@ class Model:
         plain = Model()
         return ",".join(
             f"{word_of(each)}={getattr(self, each)}"
-            for each in _READERS
+            for each in READERS
             if getattr(self, each) != getattr(plain, each)
         )
 
@@ -242,7 +244,7 @@ class Model:
     def alone(self) -> tuple[tuple[str, Model], ...]:
         """Return each term that differs from the physical equation, as a model of its own."""
         plain, single = Model(), list[tuple[str, Model]]()
-        for each in _READERS:
+        for each in READERS:
             if getattr(self, each) == getattr(plain, each) or each in ("cap", "lobe"):
                 continue
             kept = {each: getattr(self, each)}
@@ -257,17 +259,17 @@ class Model:
     @cached_property
     def light_scale(self) -> float:
         """The fraction b of the depth between a light and the fog."""
-        return _light_path(self.light_path)[0]
+        return light_path(self.light_path)[0]
 
     @cached_property
     def light_length(self) -> float:
         """The constant length M of light paths [m]; 0 for none."""
-        return _light_path(self.light_path)[1]
+        return light_path(self.light_path)[1]
 
     @cached_property
     def camera_scale(self) -> float:
         """The fraction a of the depth between the fog and the camera."""
-        return _switch(self.camera_path)
+        return switch(self.camera_path)
 
     @cached_property
     def surface_paths(self) -> tuple[float, float]:
@@ -276,12 +278,12 @@ class Model:
         camera = (
             self.camera_path if self.surface_camera_path == "same" else self.surface_camera_path
         )
-        return _switch(camera), _light_path(light)[0]
+        return switch(camera), light_path(light)[0]
 
     def law_of(self, *, surface: bool) -> Law:
         """Return the distance law, in the fog or on surfaces."""
         words = self.surface_law if surface and self.surface_law != "same" else self.law
-        kind, numbers = _split(words)
+        kind, numbers = split(words)
         if kind == "power":
             return Law(kind, power=numbers[0])
         if kind == "softened":
@@ -291,19 +293,19 @@ class Model:
     @cached_property
     def range_of(self) -> Range | None:
         """The range of lamps; None without one."""
-        kind, numbers = _split(self.range)
+        kind, numbers = split(self.range)
         return Range(kind, numbers[0]) if numbers else None
 
     @cached_property
     def spot_of(self) -> tuple[str, float]:
         """The kind of the edge of spots, and the power of a rim."""
-        kind, numbers = _split(self.spot)
+        kind, numbers = split(self.spot)
         return kind, numbers[0] if numbers else 1.0
 
     @cached_property
     def ends_of(self) -> Ends:
         """Where the fog begins and ends before the camera."""
-        kind, numbers = _split(self.ends)
+        kind, numbers = split(self.ends)
         return Ends(numbers[0], numbers[1], kind == "planes") if numbers else Ends()
 
     @cached_property
@@ -317,7 +319,7 @@ class Model:
     @cached_property
     def constant(self) -> tuple[float, ...] | None:
         """The colour of a constant source; None where lights are the source."""
-        return _split(self.source)[1] or None
+        return split(self.source)[1] or None
 
     @cached_property
     def ambient_of(self) -> tuple[float, ...] | None:
@@ -344,248 +346,6 @@ class Model:
         """The factors on lamps and on suns in the fog, and on surfaces."""
         return float(self.lamps), float(self.suns), float(self.surface_factor)
 
-
-def word_of(field: str) -> str:
-    """Return the word of a term by the name of its field."""
-    surface = field.startswith(SURFACE)
-    return "surface." * surface + field.removeprefix(SURFACE if surface else "").replace("_", "-")
-
-
-# Reading of words. Each reader takes the word of its term for messages, and returns the value in
-# the one way in which equal values are written.
-
-
-def _wrong(term: str, value: str, expected: str) -> InputError:
-    return InputError(f"model: {term} is '{value}'; expected {expected}")
-
-
-def _numbers(term: str, cells: list[str], value: str, expected: str) -> list[float]:
-    try:
-        numbers = [float(cell) for cell in cells]
-    except ValueError:
-        raise _wrong(term, value, expected) from None
-    if any(math.isnan(number) or number < 0 for number in numbers):
-        raise _wrong(term, value, f"{expected}, and no number below 0")
-    return numbers
-
-
-def _split(words: str) -> tuple[str, tuple[float, ...]]:
-    """Return the kind of a value that was read, and its numbers."""
-    kind, _, rest = words.partition(":")
-    return kind, tuple(float(cell) for cell in rest.replace(",", ":").split(":") if cell)
-
-
-def _text(number: float) -> str:
-    return f"{number:.12g}" if float(f"{number:.12g}") == number else repr(number)
-
-
-def _switch(word: str) -> float:
-    """Return the factor of a path that was read."""
-    return {"on": 1.0, "off": 0.0}[word] if word in ("on", "off") else float(word)
-
-
-def _light_path(word: str) -> tuple[float, float]:
-    """Return the fraction b and the length M of a light path that was read."""
-    return (0.0, _split(word)[1][0]) if word.startswith("length") else (_switch(word), 0.0)
-
-
-def _path(*, length: bool, most: float) -> Callable[[str, str], str]:
-    expected = "on, off, or a factor" if most > 1 else "on, off, or a fraction from 0 to 1"
-    expected += ", or length:M in metres" if length else ""
-
-    def read(term: str, value: str) -> str:
-        word = value.strip().lower()
-        if word in ("on", "off"):
-            return word
-        kind, _, rest = word.partition(":")
-        if length and kind == "length":
-            (number,) = _numbers(term, [rest], value, expected)
-            if math.isinf(number):
-                raise _wrong(term, value, expected)
-            return f"length:{_text(number)}"
-        (number,) = _numbers(term, [word], value, expected)
-        if not number <= most or math.isinf(number):
-            raise _wrong(term, value, expected)
-        return {0.0: "off", 1.0: "on"}.get(number, _text(number))
-
-    return read
-
-
-def _choice(
-    kinds: Mapping[str, tuple[float | None, ...]], expected: str, positive: bool = True
-) -> Callable[[str, str], str]:
-    """Return a reader of kinds with numbers: None for one that is needed, else its default."""
-
-    def read(term: str, value: str) -> str:
-        kind, *cells = value.strip().lower().replace(",", ":").split(":")
-        if kind not in kinds:
-            raise _wrong(term, value, expected)
-        defaults = kinds[kind]
-        given = _numbers(term, cells, value, expected)
-        needed = sum(default is None for default in defaults)
-        if not needed <= len(given) <= len(defaults):
-            raise _wrong(term, value, expected)
-        numbers = [*given, *defaults[len(given) :]]
-        if positive and any(number == 0 for number in given[:1]):
-            raise _wrong(term, value, f"{expected}, with numbers above 0")
-        return ":".join([kind, *(_text(number) for number in numbers if number is not None)])
-
-    return read
-
-
-def _law(term: str, value: str) -> str:
-    expected = "power:d, softened:e[:s], clamped:r0[:d] or sphere:R0"
-    kinds: dict[str, tuple[float | None, ...]] = {
-        "power": (2.0,),
-        "softened": (None, 1.0),
-        "clamped": (None, 2.0),
-        "sphere": (None,),
-    }
-    word = _choice(kinds, expected, positive=False)(term, value)
-    if any(math.isinf(number) for number in _split(word)[1]):
-        raise _wrong(term, value, expected)
-    # Lengths of 0 leave a power.
-    kind, numbers = _split(word)
-    if kind == "clamped" and numbers[0] == 0:
-        return f"power:{_text(numbers[1])}"
-    if (kind == "sphere" and numbers == (0.0,)) or (kind == "softened" and numbers == (0.0, 1.0)):
-        return "power:2"
-    return word
-
-
-def _surface_law(term: str, value: str) -> str:
-    return "same" if value.strip().lower() == "same" else _law(term, value)
-
-
-def _surface_path(read: Callable[[str, str], str]) -> Callable[[str, str], str]:
-    return lambda term, value: "same" if value.strip().lower() == "same" else read(term, value)
-
-
-def _phase(term: str, value: str) -> str:
-    word = value.strip().lower()
-    if word not in ("scene", "none", "cornette-shanks"):
-        phase_from_words(word)  # refuses what is none
-    return word
-
-
-def _ends(term: str, value: str) -> str:
-    expected = "none, planes:NEAR:FAR or spheres:NEAR:FAR"
-    if value.strip().lower() == "none":
-        return "none"
-    word = _choice({"planes": (None, None), "spheres": (None, None)}, expected, positive=False)(
-        term, value
-    )
-    near, far = _split(word)[1]
-    if not near < far:
-        raise _wrong(term, value, f"{expected}, FAR behind NEAR")
-    return "none" if (near, far) == (0.0, math.inf) else word
-
-
-def _fade(term: str, value: str) -> str:
-    expected = "none, or START:END in metres, one behind the other"
-    if value.strip().lower() == "none":
-        return "none"
-    numbers = _numbers(term, value.split(":"), value, expected)
-    if len(numbers) != 2 or not numbers[0] < numbers[1] < math.inf:
-        raise _wrong(term, value, expected)
-    return ":".join(map(_text, numbers))
-
-
-def _colour(term: str, value: str, expected: str) -> str:
-    cells = value.split(",") if "," in value else value.split(":")
-    numbers = _numbers(term, cells, value, expected)
-    if len(numbers) == 1:
-        numbers *= 3
-    if len(numbers) != 3 or not all(math.isfinite(number) for number in numbers):
-        raise _wrong(term, value, expected)
-    return ",".join(map(_text, numbers))
-
-
-def _source(term: str, value: str) -> str:
-    expected = "lights, or constant:R,G,B"
-    kind, _, rest = value.strip().lower().partition(":")
-    if kind == "lights" and not rest:
-        return "lights"
-    if kind != "constant":
-        raise _wrong(term, value, expected)
-    return f"constant:{_colour(term, rest, expected)}"
-
-
-def _ambient(term: str, value: str) -> str:
-    word = value.strip().lower()
-    if word == "none":
-        return word
-    colour = _colour(term, word, "none, or R,G,B")
-    return "none" if colour == "0,0,0" else colour
-
-
-def _lobe(term: str, value: str) -> str:
-    if value.strip().lower() == "none":
-        return "none"
-    expected = "none, or n[:START]"
-    numbers = _numbers(term, value.split(":"), value, expected)
-    if not 1 <= len(numbers) <= 2 or not all(math.isfinite(number) for number in numbers):
-        raise _wrong(term, value, expected)
-    return ":".join(map(_text, (*numbers, 0.0)[:2]))
-
-
-def _number(none: str, least: float, most: float, expected: str) -> Callable[[str, str], str]:
-    def read(term: str, value: str) -> str:
-        if value.strip().lower() == none:
-            return none
-        (number,) = _numbers(term, [value], value, expected)
-        if not least <= number <= most or math.isinf(number):
-            raise _wrong(term, value, expected)
-        # The most that a source can cover is no cap.
-        return none if number == most else _text(number)
-
-    return read
-
-
-_WINDOWS: Mapping[str, tuple[float | None, ...]] = {
-    "none": (),
-    "quartic": (None,),
-    "fourth": (None,),
-    "square": (None,),
-    "linear": (None,),
-    "cut": (None,),
-}
-_EDGES: Mapping[str, tuple[float | None, ...]] = {
-    "angle": (),
-    "cosine-squared": (),
-    "cosine-smooth": (),
-    "rim": (1.0,),
-}
-_DEPTHS: Mapping[str, tuple[float | None, ...]] = {
-    "distance": (),
-    "axis": (),
-    "axis-ends": (),
-    "axis-lookup": (),
-}
-
-#: By the name of a field, what reads its words; in the order in which terms are told.
-_READERS: Mapping[str, Callable[[str, str], str]] = {
-    "light_path": _path(length=True, most=1.0),
-    "camera_path": _path(length=False, most=math.inf),
-    "law": _law,
-    "range": _choice(_WINDOWS, "none, or quartic:R, fourth:R, square:R, linear:R or cut:R"),
-    "spot": _choice(_EDGES, "angle, cosine-squared, cosine-smooth or rim:k"),
-    "phase": _phase,
-    "depth": _choice(_DEPTHS, "distance, axis, axis-ends or axis-lookup"),
-    "ends": _ends,
-    "fade": _fade,
-    "source": _source,
-    "cap": _number("none", 0.0, 1.0, "none, or a number from 0 to 1"),
-    "lobe": _lobe,
-    "ambient": _ambient,
-    "lit": _number("off", 1e-300, 1e300, "off, or a number above 0"),
-    "lamps": _number("1", 0.0, 1e300, "a factor"),
-    "suns": _number("1", 0.0, 1e300, "a factor"),
-    "surface_light_path": _surface_path(_path(length=False, most=1.0)),
-    "surface_camera_path": _surface_path(_path(length=False, most=math.inf)),
-    "surface_law": _surface_law,
-    "surface_factor": _number("1", 0.0, 1e300, "a factor"),
-}
 
 #: The physical equation.
 PHYSICAL = Model()

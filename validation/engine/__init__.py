@@ -18,6 +18,7 @@ Read in this order:
 - `error_place.py`: where an error lies;
 - `diagnose.py`: what is wrong with an image;
 - `hints.py`: what may be wrong with an image as a whole, without any path of light;
+- `model_errors.py`: the error of an engine's equation apart from that of its algorithm;
 - `judge.py`: whether an image is right;
 - `images.py`: a folder of images, found by scene, for the report.
 """

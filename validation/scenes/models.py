@@ -24,7 +24,8 @@ from types import MappingProxyType
 from typing import Any
 
 from airlight.errors import InputError, nearest
-from airlight.reference.scene.model import Model, word_of
+from airlight.reference.scene.model import Model
+from airlight.reference.scene.model_words import word_of
 
 #: the name of the physical equation, and that of the default in a scene file which names a model
 PHYSICAL_NAME, DEFAULT = "physical", "airlight-model"
