@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.model import Model
@@ -232,3 +233,24 @@ def test_surfaces_of_a_model(variant):
     factor = ratio[..., None] * np.exp(sigma_t * (r + 0.5 * distance)[..., None])
     assert lit.mean() > 0.1
     np.testing.assert_allclose(image.surface[lit], (factor * physical.surface)[lit], rtol=2e-5)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize(
+    "terms",
+    [
+        {"light_path": "0.5", "camera_path": "0.6"},
+        {"light_path": "off", "law": "softened:0.5:2"},
+        {"light_path": "length:0.4", "range": "quartic:5"},
+    ],
+    ids=lambda terms: ",".join(terms.values()),
+)
+@pytest.mark.claim("models", tolerance="4 standard errors of the other estimator")
+def test_density_grids_agree_with_samples(variant, terms):
+    reference = read_reference(load_scene("smoke", (8, 6)).scene, Model(**terms))
+    image = quadrature_image(reference, checks=0)
+    batches = [single_scatter_batch(reference, seed, 128) for seed in range(16)]
+    means = np.array([batch.mean[0].mean() for batch in batches])
+    error = means.std(ddof=1) / np.sqrt(len(means))
+    assert abs(image.airlight.mean() - means.mean()) < 4 * error
+    assert error < 0.01 * means.mean()  # half a fraction of a path would be 10 %
