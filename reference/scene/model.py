@@ -202,8 +202,8 @@ class Model:
             raise wrong("lobe", self.lobe, "a constant source beside it")
         # Without attenuation and without an end the light of a lamp must fall as 1/r^2 at least.
         bare = self.camera_scale == 0 and self.light_scale == 0
-        endless = self.range == "none" and math.isinf(self.ends_of.far)
-        if bare and endless and self.law_of(surface=False).power < 2:
+        no_end = self.range == "none" and math.isinf(self.ends_of.far)
+        if bare and no_end and self.law_of(surface=False).power < 2:
             raise wrong("law", self.law, "a range, an end, or attenuation beside it: it has no sum")
 
     @staticmethod

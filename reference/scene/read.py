@@ -190,8 +190,8 @@ def read_reference(scene: "mi.Scene", model: Model = PHYSICAL) -> ReferenceScene
     if not model.is_physical and (area or sky is not None):
         wide = [emitter for emitter in emitters if is_area(emitter)] or [background]
         raise InputError(
-            f"light '{wide[0].id()}' has an extent, of which the model {model.title} says nothing; expected "
-            "points, spots and suns: leave the model out, or take such lights"
+            f"light '{wide[0].id()}' has an extent, of which the equation of a model says nothing; "
+            "expected points, spots and suns: leave the model out, or take such lights"
         )
     return ReferenceScene(
         scene=scene if background is None else _rebuilt(scene, emitters),

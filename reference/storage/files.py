@@ -140,7 +140,8 @@ def temporary_folder() -> Iterator[Path]:
     for folder in Path(tempfile.gettempdir()).glob(f"{_FOLDER}*"):
         if _age(folder) > 24 * _STALE:
             shutil.rmtree(folder, ignore_errors=True)
-    with tempfile.TemporaryDirectory(prefix=_FOLDER) as name:
+    # A program that was ended may still write there: a later call removes what is left.
+    with tempfile.TemporaryDirectory(prefix=_FOLDER, ignore_cleanup_errors=True) as name:
         yield Path(name)
 
 

@@ -14,5 +14,6 @@ Read in this order:
 - `report.py`: `report`, `diff`, `paper`
 - `sweep.py`: `sweep`
 - `explore.py`: `describe`, `view`
+- `capture.py`: `capture`, a scene in an engine of others
 - `export.py`: `export`, a kernel as shader code
 """

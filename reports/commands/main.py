@@ -26,6 +26,7 @@ from cyclopts import App, Group, Parameter
 
 from airlight.errors import InputError
 from airlight.reference.storage.build import build
+from airlight.reports.api.capture import capture
 from airlight.reports.api.check import check
 from airlight.reports.api.compare import compare
 from airlight.reports.api.explore import describe, view
@@ -75,7 +76,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
 _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
     "Start": (doctor, list_, render, view, completion),
     "Measure": (report, diff, sweep, run_study),
-    "Images": (reference, compare, check, describe, export),
+    "Images": (reference, compare, check, describe, capture, export),
     "Papers": (paper,),
     "Develop": (run_tests,),
 }

@@ -34,11 +34,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.build import build
 from airlight.reference.storage.files import write_bytes
 from airlight.reports.interchange.meshes import ShapeMesh, shape_mesh
-from airlight.reports.interchange.scene import describe_scene, surface
+from airlight.reports.interchange.scene import describe_scene, scene_as_it_is, surface
 from airlight.validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
@@ -64,7 +63,7 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     """
     # The description refuses scenes that no renderer here could render, before a file exists.
     described = describe_scene(loaded)
-    scene = read_reference(loaded.scene)
+    scene = scene_as_it_is(loaded)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
     # Surfaces, bounds of media, lights: the order in which `_document` lists their materials.
     opaque = [shape for shape in scene.occluders.shapes() if not shape.is_emitter()]

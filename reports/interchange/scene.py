@@ -76,13 +76,10 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     """
     # it refuses what `render` refuses, in its words
     model = loaded.model
-    if model.is_physical:
-        notes, scene = read_scene(loaded.scene).features.notes, read_reference(loaded.scene)
-    else:
-        # A model may have light where physics has none. It changes no phase function and no albedo
-        # here: those are the scene's.
-        plain = replace(model, phase="scene", lit="off", name=model.title)
-        notes, scene = tuple(scene_notes(loaded.scene)), read_reference(loaded.scene, plain)
+    notes = tuple(
+        read_scene(loaded.scene).features.notes if model.is_physical else scene_notes(loaded.scene)
+    )
+    scene = scene_as_it_is(loaded)
     # A custom scene and a built-in one have the same keys: another renderer reads them by name.
     camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
@@ -132,6 +129,16 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         else {}
     )
     return described | drawn
+
+
+def scene_as_it_is(loaded: LoadedScene) -> ReferenceScene:
+    """Return what a reference reads of a scene, with its own phase function and albedo."""
+    model = loaded.model
+    if model.is_physical:
+        return read_reference(loaded.scene)
+    # A model may have light where physics has none.
+    plain = replace(model, phase="scene", lit="off", name=model.title)
+    return read_reference(loaded.scene, plain)
 
 
 def up_axis(up: Array) -> str:

@@ -14,5 +14,7 @@ Read in this order:
 - `mitsuba_log.py`: Mitsuba's warnings on the error stream, each once
 - `environment.py`: chooses the variant; versions and processor
 - `own_process.py`: the user's code, and kernels that compile quickly, in a separate process
+- `own_program.py`: a program of others with a limit in time
+- `engine_adapter.py`: the adapters of engines, which are such programs
 - `doctor.py`: examines all of these
 """

@@ -19,6 +19,7 @@ from .realtime.scene.read_scene import read_scene as read_scene
 from .reference.scene.model import Model as Model
 from .reference.storage.exr import read_exr as read_exr
 from .reference.storage.exr import write_exr as write_exr
+from .reports.api.capture import capture as capture
 from .reports.api.check import check as check
 from .reports.api.compare import compare as compare
 from .reports.api.explore import describe as describe

@@ -7,6 +7,7 @@ Read in this order:
 - `prediction.py`: the image of a scene for a fog, lights, a camera and an encoding;
 - `fault.py`: what a fault is, and the numbers that are looked for in it;
 - `faults.toml` and `faults.py`: the catalogue of all faults, and the faults of single lights;
+- `equations.py`: the equations of engines as faults, and their terms in words;
 - `targets.py`: what of a guess of an image a fault changes;
 - `transforms.py`: the formulas of faults;
 - `curves.py`: encodings and tone curves;

@@ -379,7 +379,7 @@ def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
     """Return the distance of each pixel from the nearest light, (height, width) [pixels in the
     middle of the image].
     """
-    angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one pixel
+    angle = pixel_angle(read_reference(loaded.scene, loaded.model))  # zero in an image of one pixel
     return (
         reference.light_angle / angle
         if angle > 0

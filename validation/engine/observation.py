@@ -142,6 +142,7 @@ class Observation:
     #: distance of the two pixels of a pair [pixels], where not all are looked at; 0: no pairs
     apart: int = APART
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
+    model: Model = PHYSICAL  #: the equation that the image should solve
 
     def view(self, scenery: Scenery = SCENERY) -> View:
         """Return the rays of the pixels that take part: one at random of each of as many
@@ -242,7 +243,8 @@ def observation_of(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; give one "
             "of the image's size"
         )
-    reference = read_reference(scene, model)
+    # The media stay those of the scene: hypotheses may have other phase functions.
+    reference = read_reference(scene, replace(model, phase="scene", lit="off"))
     if isinstance(reference.medium, GridMedium):
         raise InputError(
             "the medium is a density grid, whose images fits and diagnoses do not predict; "
@@ -280,7 +282,12 @@ def observation_of(
         )
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
     observation = Observation(
-        reference, values, judged.holds, np.asarray(used), samples=needed_samples(reference)
+        reference,
+        values,
+        judged.holds,
+        np.asarray(used),
+        samples=needed_samples(reference),
+        model=model,
     )
     return observation, wrong_pixels(
         ~finite.reshape(reference.height, reference.width), "left out, NaN or infinite"

@@ -19,7 +19,7 @@ from parts.listed import table
 #: ends the build.
 TOPICS = {
     "Render and judge": (
-        "render reference Model compare check error_metrics multiple_scattering_fraction Budget"
+        "render reference Model compare check capture error_metrics multiple_scattering_fraction Budget"
     ),
     "Measure": "report diff study STUDIES sweep paper configuration time_frame",
     "Scenes": "load_scene describe view SCENES certified_data",
@@ -41,6 +41,7 @@ _RESULTS = (
     "reports.api.comparisons.FittedFog",
     "reports.api.comparisons.FramesComparison",
     "reports.api.check.RelationsKept",
+    "reports.api.capture.Capture",
     "validation.check.judge.Kept",
     "reports.api.explore.Description",
     "reports.api.report.Report",

@@ -210,8 +210,16 @@ def test_a_sun_that_physics_drowns_is_described_by_a_model(tmp_path, capfd):
     path = tmp_path / "sun.xml"
     path.write_text(SUN)
     assert "medium without bounds" in printed(capfd, "describe", str(path), status=2)
-    told = printed(capfd, "describe", str(path), "--model", "babylon:enableExtinction=1")
-    assert "model  babylon 9.35: light-path=off, lamps=0" in told
+    glb = str(tmp_path / "sun.glb")
+    words = ["describe", str(path), "--model", "babylon:enableExtinction=1", "-o", glb]
+    assert "model  babylon 9.35: light-path=off, lamps=0" in printed(capfd, *words)
+    # An image that is wrong by its own equation is judged too.
+    own = str(tmp_path / "own.exr")
+    printed(capfd, "reference", str(path), "--model", "light-path=off", "-o", own)
+    other = "light-path=off,camera-path=0.5"
+    told = printed(capfd, "compare", str(path), own, "--model", other, "--pixel", "centre")
+    assert "model against physics              -            -            -   no reference" in told
+    assert "verdict          not right" in told
 
 
 def test_the_physical_model_is_public():
