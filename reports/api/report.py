@@ -183,7 +183,8 @@ def report(
         compare with the reference.
     model
         For images: judge them by the equation of an engine, such as playcanvas:range=8, see
-        `airlight list models`; methods are judged by the physical equation.
+        `airlight list models`; by default by that which a capture names. Methods are judged by the
+        physical equation.
     output
         Folder for the report; airlight-report by default.
     from_

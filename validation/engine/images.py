@@ -12,14 +12,15 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airlight.errors import InputError, nearest
-from airlight.reference.storage.exr import read_exr
+from airlight.reference.scene.model import Model
+from airlight.reference.storage.exr import MODEL, read_exr
 from airlight.validation.engine.judge import (
     EngineComparison,
     ReferenceOf,
@@ -29,6 +30,7 @@ from airlight.validation.engine.judge import (
 from airlight.validation.engine.observation import AIRLIGHT, SURFACE, judged_layer
 from airlight.validation.metrics.errors import Metrics, error_metrics
 from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.models import model_of
 from airlight.validation.timing import Timing
 
 TIMES = "times.json"  #: what lies beside images and says how long they took
@@ -114,6 +116,19 @@ def measure_image(
         return judged, layers, None
     held = image.with_data()  # pixels that the file does not hold are no error of the surface
     return judged, layers, error_metrics(judged.layers.surface, layers[SURFACE], mask=held)
+
+
+def captured_model(path: Path) -> Model | None:
+    """Return the equation that a capture (`airlight.capture`) says that it solves; None for others.
+
+    A reference of a model names one too: it is no image of an engine.
+    """
+    attributes = read_exr(path).attributes
+    words, engine = attributes.get(MODEL), attributes.get("airlight:engine")
+    if not words or not engine:
+        return None
+    version = attributes.get("airlight:engine-version", "")
+    return replace(model_of(str(words)), name=f"{engine} {version}".strip())
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:

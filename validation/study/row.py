@@ -80,7 +80,7 @@ class StatedError:
 @dataclass(frozen=True)
 class EquationError:
     """The error of an engine's equation apart from that of its algorithm
-    (`validation.engine.model_errors`): relative root mean squares.
+    (`validation.engine.model_errors`): relative root mean squares over blocks of pixels.
     """
 
     name: str = column("model", meaning="of the equation; empty for terms without a name")

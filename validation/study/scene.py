@@ -338,8 +338,8 @@ def study_scene(
 ) -> SceneResult:
     """Return the results of a study for a scene.
 
-    `images` from elsewhere are judged, by the equation of a `model` or of the model that the scene
-    names. `apart` calls a user's method in a separate process;
+    `images` from elsewhere are judged, by the equation of a `model`, of the model that a capture
+    names, or of that which the scene names. `apart` calls a user's method in a separate process;
     configurations that `ended` such a process before, with how, are not called again. `progress` is
     called with the name of each part, as of `SceneStudy.seconds`, before it begins. `spread` lets
     other processes trace the batches that check the reference. `workers` is the number of processes
@@ -373,8 +373,7 @@ def study_scene(
     # all processors.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
-    equation = study.loaded.model if model is None else model
-    rows += [_image(study, shown, equation) for shown in images]
+    rows += [_image(study, shown, model) for shown in images]
     # The time that each part took when it was computed, now or in an earlier study.
     methods = [result for row in rows for result in row.results]
     seconds = {
@@ -560,10 +559,11 @@ def _with_flip(judged: Judged) -> Judged:
     )
 
 
-def _image(study: SceneStudy, shown: EngineImage, model: Model) -> Judged:
+def _image(study: SceneStudy, shown: EngineImage, model: Model | None) -> Judged:
     """Return the row of an image from elsewhere."""
-    from airlight.validation.engine.images import image_times
+    from airlight.validation.engine.images import captured_model, image_times
 
+    model = model or captured_model(shown.path) or study.loaded.model
     # The key has the inputs of the reference: another reference gives another row.
     times = image_times(shown.path)
     inputs = ImageInputs(
@@ -624,12 +624,13 @@ def _measured_image(
 def _equation_error(errors: ModelErrors) -> EquationError:
     """Return the errors of an equation and of an algorithm as columns of a row."""
     equation, total = errors.against_physics, errors.total
+    # By blocks: one pixel beside a lamp outweighs all others in a root mean square of pixels.
     return EquationError(
         errors.name,
         errors.terms,
-        errors.image.rmse,
-        None if equation is None else equation.rmse,
-        None if total is None else total.rmse,
+        errors.image.blocks,
+        None if equation is None else equation.blocks,
+        None if total is None else total.blocks,
         errors.correlation,
     )
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the error of an engine's equation is told apart from that of its algorithm."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,13 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.engine.images import EngineImage, captured_model
 from airlight.validation.engine.judge import compare_scene
 from airlight.validation.engine.model_errors import model_errors
 from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study import scene as scene_study
+from airlight.validation.study.scene import open_scene
+from airlight.validation.study.study import standard_study
 
 MODEL = Model(light_path="off", law="softened:1:16", range="quartic:8", name="an engine")
 
@@ -136,3 +142,35 @@ def test_a_sun_without_a_physical_reference_has_a_dash(variant, tmp_path, images
     rows = [line.split() for line in found.lines if "physics" in line]
     assert [row[3:6] for row in rows] == [["-", "-", "-"]] * 2
     assert all("nothing of it arrives" in " ".join(row) for row in rows)
+
+
+def test_a_capture_is_judged_by_the_equation_that_it_names(tmp_path):
+    layers = {"airlight": np.ones((2, 2, 3), np.float32)}
+    named = {"airlight:model": "light-path=off,law=softened:1"}
+    engine = {"airlight:engine": "PlayCanvas", "airlight:engine-version": "2.23.3"}
+    write_exr(tmp_path / "capture.exr", Image(layers, attributes=named | engine))
+    model = captured_model(tmp_path / "capture.exr")
+    assert (model.name, model.terms) == ("PlayCanvas 2.23.3", "light-path=off,law=softened:1:1")
+    # A reference of a model is no image of an engine, and an engine may not say its equation.
+    for attributes in (named, engine):
+        write_exr(tmp_path / "other.exr", Image(layers, attributes=attributes))
+        assert captured_model(tmp_path / "other.exr") is None
+
+
+def test_the_row_of_an_image_has_both_errors(variant, tmp_path):
+    """By blocks, as the verdict."""
+    write_exr(
+        tmp_path / "sphere-spot.engine.exr",
+        Image(
+            {"airlight": (1.02 * airlight(MODEL)).astype(np.float32)},
+            attributes={"airlight:engine": "E", "airlight:model": MODEL.terms},
+        ),
+    )
+    study = replace(standard_study("quick"), scenes=("sphere-spot",), configurations=())
+    opened = open_scene("sphere-spot", study.of("sphere-spot").at((32, 24)), {})
+    judged = scene_study._image(
+        opened, EngineImage("sphere-spot", "engine", tmp_path / "sphere-spot.engine.exr"), None
+    )
+    assert judged.row.model.algorithm == pytest.approx(0.02, rel=1e-3)
+    assert judged.row.model.equation > 1
+    assert "judged by the equation of the model E" in judged.row.note
