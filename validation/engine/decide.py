@@ -198,7 +198,11 @@ class Candidates:
         alike = [
             each for weight, each in weighed if weight >= most - 5.0 or self._is_as_good(each, best)
         ]
-        return min(alike, key=lambda each: (each.parameters, len(each.faults)))
+
+        def cost(each: Explanation) -> tuple[int, int, int]:
+            return each.parameters, len(each.faults), sum(fault.rank for fault in each.faults)
+
+        return min(alike, key=cost)
 
     def _is_as_good(self, one: Explanation, best: Explanation) -> bool:
         """Return whether an explanation is nearly the image of the best one, and

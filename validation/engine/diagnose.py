@@ -13,9 +13,11 @@ import os
 from dataclasses import dataclass, replace
 
 from airlight.errors import InputError
+from airlight.reference.scene.model import Model
 from airlight.reference.storage.exr import NOTE, Image, read_exr
 from airlight.validation.arrays import Progress
 from airlight.validation.engine.decide import Candidates
+from airlight.validation.engine.equations import asked_words
 from airlight.validation.engine.error_place import place_words
 from airlight.validation.engine.judge import (
     EngineComparison,
@@ -38,6 +40,7 @@ from airlight.validation.engine.search import Explanation
 from airlight.validation.engine.stages import QUICK, Attempt
 from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.models import model_of
 
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
 
@@ -77,14 +80,16 @@ class Diagnosis:
     #: what is wrong with the file, such as pixels that are not finite
     failures: tuple[str, ...] = ()
     note: str = ""  #: what the reader of the file changed or left out, such as other primaries
+    model: str = ""  #: the equation that the image should solve; empty for the physical one
+    #: the equation of an engine that it solves instead, as a user types it; empty for none
+    solves: str = ""
 
     @property
     def lines(self) -> list[str]:
         """The first explanation and the error that it leaves, in sentences."""
         off = f"values are {_percent(self.residual)} off in the mean"
-        lines = [
-            f"{self.path}, {self.layer}, against {self.scene}, {PIXEL_WORDS[self.pixel]}: {off}."
-        ]
+        scene = self.scene + (f" in the equation of {self.model}" if self.model else "")
+        lines = [f"{self.path}, {self.layer}, against {scene}, {PIXEL_WORDS[self.pixel]}: {off}."]
         lines += self._said()
         lines += [f"Failed: {reason}." for reason in self.failures]
         return [*lines, *([f"The file: {self.note}."] if self.note else [])]
@@ -110,11 +115,14 @@ class Diagnosis:
             else ""
         )
         more = f"more than noise: something else is wrong too{place}"
-        return [
+        lines = [
             pair or f"{self.first}: {self.ranked[0].words}.",
             f"Without that, values are {_percent(self.left)} off in the mean, which is "
             f"{self.rest or more}.",
         ]
+        if self.solves:
+            lines.append(f"To look for faults on top of this equation: --model {self.solves}")
+        return lines
 
 
 def diagnose_file(
@@ -126,6 +134,7 @@ def diagnose_file(
     pixel: str | None = None,
     light: SceneLight | None = None,
     changes: Changes = UNCHANGED,
+    model: Model | None = None,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both.
@@ -142,15 +151,16 @@ def diagnose_file(
         Which layer, and what it holds, see `validation.engine.observation.judged_layer`.
     pixel, light, progress
         See `diagnose_image`.
-    changes
+    changes, model
         See `validation.engine.judge.compare_scene`.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
-    loaded = scene_of_size(scene, several[0].size, path, changes)
+    loaded = scene_of_size(scene, several[0].size, path, changes, model)
     reference_of = references(loaded)
-    diagnoses = [
-        diagnose_image(
+    diagnoses: list[Diagnosis] = []
+    for each in several:
+        diagnosis = diagnose_image(
             image,
             loaded,
             path=str(path),
@@ -161,8 +171,11 @@ def diagnose_file(
             reference_of=reference_of,
             progress=progress,
         )
-        for each in several
-    ]
+        diagnoses.append(diagnosis)
+        # Surfaces have the equation that the fog tells: alone they do not tell whose it is.
+        if diagnosis.solves:
+            loaded = replace(loaded, model=model_of(diagnosis.solves))
+            reference_of = references(loaded)
     # A black layer without an error is right: it is left out, unless there is no other layer.
     telling = tuple(each for each in diagnoses if each.first != BLACK or each.residual > 0)
     return telling or tuple(diagnoses)
@@ -185,7 +198,8 @@ def diagnose_image(
     Parameters
     ----------
     image, loaded
-        The layers, and the scene at their size.
+        The layers, and the scene at their size. The image should solve its equation: the faults
+        are looked for on top of it.
     layer, holds
         Which layer, and what it holds: 'airlight', 'surface' or 'total'.
     pixel
@@ -203,7 +217,7 @@ def diagnose_image(
         If fewer than 16 pixels say something, or fits and diagnoses do not predict the scene.
     """
     judged = judged_layer(image, path, name=layer, holds=holds)
-    observation, failures = observation_of(image, judged, loaded.scene)
+    observation, failures = observation_of(image, judged, loaded.scene, model=loaded.model)
     fewest = 16  # pixels
     if (count := int(observation.used.sum())) < fewest:
         raise InputError(
@@ -249,6 +263,7 @@ def diagnose_image(
         verdict=compared.verdict.words,
         failures=failures,
         note=str(image.attributes.get(NOTE, "")),
+        model="" if loaded.model.is_physical else loaded.model.title,
     )
     if compared.verdict.right:
         return diagnosis
@@ -280,6 +295,10 @@ def _concluded(
         first, chosen = RIGHT, candidates.right
     else:
         first = UNEXPLAINED
+    solved = next((i for i, fault in enumerate(chosen.faults) if fault.equation), None)
+    solves = ""
+    if solved is not None and first != UNEXPLAINED:
+        solves = asked_words(chosen.faults[solved].equation, chosen.values[solved])
     # The record has eight rows. Where the error lies is said only if it is not explained.
     rest = candidates.remainder(chosen)
     explained = bool(rest) and first != UNEXPLAINED
@@ -292,6 +311,7 @@ def _concluded(
         explained=explained,
         place="" if explained else place_words(attempt.predictor, chosen),
         few="" if explained else few,
+        solves=solves,
     )
 
 

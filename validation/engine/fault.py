@@ -85,6 +85,11 @@ class Fault:
     #: the image without it, (height, width, 3) -> the same
     undo: Callable[[Array], Array] | None = None
     factor: bool = False  #: whether its number is a factor that may have a name
+    #: the words of an engine's equation, see `validation.engine.equations`
+    equation: str = ""
+    #: of faults that leave the same, with as many numbers, the one of the lowest rank is named
+    rank: int = 0
+    tell: Callable[[Values], str] | None = None  #: the words by the numbers, where they are long
     kind: str = ""  #: of the table that it is in: one of `validation.engine.faults.KINDS`
 
     @property
@@ -94,7 +99,8 @@ class Fault:
 
     def sentence(self, values: Values) -> str:
         """Return the words for an image with the fault."""
-        return self.words.format(*values) + (factor_name(values[0]) if self.factor else "")
+        told = self.words.format(*values) if self.tell is None else self.tell(values)
+        return told + (factor_name(values[0]) if self.factor else "")
 
 
 def factor_name(times: float) -> str:

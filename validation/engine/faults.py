@@ -15,8 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from airlight.validation.arrays import Array
-from airlight.validation.engine.fault import Begin, Change, Fault, Number
-from airlight.validation.engine.prediction import Predictor
+from airlight.validation.engine.equations import (
+    equation_sentence,
+    equation_title,
+    faults_of_terms,
+)
+from airlight.validation.engine.fault import Begin, Change, Fault, Number, Values
+from airlight.validation.engine.prediction import Guess, Predictor
 from airlight.validation.engine.starts import STARTS
 from airlight.validation.engine.targets import (
     BY_NAME,
@@ -33,7 +38,7 @@ from airlight.validation.engine.transforms import TURNS, VALUES, reordered
 from airlight.validation.fog_model.view import light_sources
 
 #: The kinds of faults, in the order in which they happen.
-KINDS = ("medium", "light", "layers", "camera", "brightness", "values")
+KINDS = ("model", "medium", "light", "layers", "camera", "brightness", "values")
 _MANY_LIGHTS = 6  # in a scene with more lights, no faults of single lights are looked for
 
 
@@ -76,8 +81,17 @@ def _begin(starts: str, numbers: Sequence[Number], change: Change) -> Begin | No
     if starts == "all":
         together = tuple(product(*(number.starts for number in numbers)))
         return lambda predictor, guess: together
+    # What the image shows is the first numbers; each of them goes with all starts of the others.
     start = STARTS[starts]
-    return lambda predictor, guess: start(predictor, guess, change)
+
+    def begin(predictor: Predictor, guess: Guess) -> list[Values]:
+        return [
+            (*first, *more)
+            for first in start(predictor, guess, change)
+            for more in product(*(number.starts for number in numbers[len(first) :]))
+        ]
+
+    return begin
 
 
 def _undo(name: str) -> Callable[[Array], Array]:
@@ -91,6 +105,11 @@ def _fault(kind: str, entry: Mapping[str, Any]) -> Fault:
     # nothing reads is an error there.
     row = dict(entry)
     is_factor = "factor" in row
+    if "equation" in row:
+        words = row["equation"]
+        # An equation is one fault in the place of the several terms that it is.
+        row |= {"words": equation_title(words), "tell": equation_sentence(words), "rank": -1}
+    equation = row.get("equation", "")
     change, part = _change(row), row.pop("part", "")
     if part:
         change = PARTS[part](change)
@@ -103,6 +122,7 @@ def _fault(kind: str, entry: Mapping[str, Any]) -> Fault:
         undo=_undo(row.pop("undo")) if "undo" in row else None,
         needs=tuple(row.pop("needs", ())),
         factor=is_factor,
+        equation=equation,
         kind=kind,
         **row,
     )
@@ -151,6 +171,9 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
     faults = [*FAULTS]
     for which, lights in groups.items():
         faults += _of_lights(which, lights)
+    model = predictor.observation.equation
+    if not model.is_physical:
+        faults += faults_of_terms(model)
     traits_of_scene = traits(predictor)
     return tuple(fault for fault in faults if all(traits_of_scene[need] for need in fault.needs))
 

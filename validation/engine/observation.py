@@ -142,7 +142,7 @@ class Observation:
     #: distance of the two pixels of a pair [pixels], where not all are looked at; 0: no pairs
     apart: int = APART
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
-    model: Model = PHYSICAL  #: the equation that the image should solve
+    equation: Model = PHYSICAL  #: that the image should solve
 
     def view(self, scenery: Scenery = SCENERY) -> View:
         """Return the rays of the pixels that take part: one at random of each of as many
@@ -287,7 +287,7 @@ def observation_of(
         judged.holds,
         np.asarray(used),
         samples=needed_samples(reference),
-        model=model,
+        equation=model,
     )
     return observation, wrong_pixels(
         ~finite.reshape(reference.height, reference.width), "left out, NaN or infinite"

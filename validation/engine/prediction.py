@@ -16,7 +16,8 @@ from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.observation import Observation, relative_errors
-from airlight.validation.fog_model.radiance import Fog, FogModel, scene_fog
+from airlight.validation.fog_model.equation import fog_of_model, scenery_of_model
+from airlight.validation.fog_model.radiance import Fog, FogModel
 from airlight.validation.fog_model.view import Ends, Scenery, View
 
 Value = TypeVar("Value")
@@ -174,10 +175,16 @@ class Predictor:
         """Height and width of the image [pixels]."""
         return self.reference.height, self.reference.width
 
+    @cached_property
+    def unchanged(self) -> Guess:
+        """The scene as it is, in the equation that the image should solve."""
+        model = self.observation.equation
+        return Guess(fog_of_model(self.reference, model), scenery_of_model(model))
+
     @property
     def fog(self) -> Fog:
-        """The fog as the scene has it."""
-        return scene_fog(self.observation.reference)
+        """The fog as the scene and its equation have it."""
+        return self.unchanged.fog
 
     @cached_property
     def many(self) -> bool:
@@ -278,7 +285,7 @@ class Predictor:
     @cached_property
     def _least(self) -> float:
         # An image that is dimmer than 1e-7 of the mean that the scene itself would have is black.
-        return 1e-7 * float(np.mean(np.abs(self.predicted(Guess(self.fog))))) + 1e-300
+        return 1e-7 * float(np.mean(np.abs(self.predicted(self.unchanged)))) + 1e-300
 
     def _floor(self, shown: Array) -> float:
         # Below 1 % of the mean of the image values count relative to that.
@@ -289,8 +296,11 @@ class Predictor:
         """Return the errors of a guess, relative to the larger of both
         values, (m, 3), from -1 to 1.
         """
-        shown = self.shown(guess)
-        return relative_errors(self.predicted(guess), shown, self._floor(shown))
+        return self.relative(self.predicted(guess), self.shown(guess))
+
+    def relative(self, predicted: Array, shown: Array) -> Array:
+        """Return the errors of predicted values, as `errors` has them, (m, 3)."""
+        return relative_errors(predicted, shown, self._floor(shown))
 
     def lit(self, guess: Guess) -> Bools:
         """Return which values of the image are not dark, (m, 3): the others have no

@@ -122,6 +122,19 @@ def best_of_starts(
     return min(errors), _parted(faults, starts[int(np.argmin(errors))])
 
 
+def best_shape(predictor: Predictor, fault: Fault) -> Values:
+    """Return the start of a fault with the least error but for a factor on the image."""
+    shown = predictor.shown(predictor.unchanged)
+
+    def error(start: Values) -> float:
+        predicted = predictor.predicted(fault.change(predictor, predictor.unchanged, start))
+        lit = (predicted > 0.01 * predicted.mean()) & (shown > 0)
+        factor = float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0
+        return float(np.abs(predictor.relative(factor * predicted, shown)).mean())
+
+    return min(starts_of(predictor, (fault,)), key=error)
+
+
 def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
     """Return a predictor with fewer pixels, by what the paths of faults cost."""
     if any(fault.stage == "extent" for fault in faults) and not predictor.many:
@@ -141,10 +154,10 @@ def guess_of(
     """Return the guess for some faults with these values.
 
     `at`: values for which paths are found, and held for others by the faults that can do with that;
-    `guess`: what the faults change; the scene as it is by default.
+    `guess`: what the faults change; the scene as it is, in its equation, by default.
     """
     # Faults change the guess in turn, each with its own part of the values.
-    guess = guess or Guess(predictor.fog)
+    guess = guess or predictor.unchanged
     olds = _parted(faults, values if at is None else at)
     for fault, part, old in zip(faults, _parted(faults, values), olds, strict=True):
         if at is None or fault.held is None:

@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 
 from airlight.validation.arrays import Progress
 from airlight.validation.engine.decide import MODEL_ERROR, MOST_LEFT, Blocks, Candidates
+from airlight.validation.engine.equations import terms_that_matter
 from airlight.validation.engine.fault import Fault
 from airlight.validation.engine.faults import KINDS, faults_of
+from airlight.validation.engine.judge import RIGHT
 from airlight.validation.engine.prediction import Predictor
-from airlight.validation.engine.search import Explanation, best_of_starts, explain
+from airlight.validation.engine.search import Explanation, best_of_starts, best_shape, explain
 
 QUICK, PAIRS = "quick", "pairs"
 STAGES = (QUICK, PAIRS, "paths", "extent")
@@ -70,8 +72,21 @@ def _alone(attempt: Attempt, stage: str, tell: Progress) -> list[Explanation]:
     explanations: list[Explanation] = []
     for number, fault in enumerate(faults):
         tell(number / len(faults), fault.name)
-        explanations.append(explain(attempt.predictor, (fault,), fine=False))
+        found = explain(attempt.predictor, (fault,), fine=False)
+        if not (fault.equation and _is_one_term(attempt, found)):
+            explanations.append(found)
     return _refined(attempt, explanations)
+
+
+def _is_one_term(attempt: Attempt, found: Explanation) -> bool:
+    """Return whether one term at most makes the image of an engine's equation: a term is a fault
+    with a name of its own.
+    """
+    # What leaves most of the error is not named anyway.
+    if found.error > MOST_LEFT * attempt.candidates.right.error:
+        return False
+    words = found.faults[0].equation
+    return len(terms_that_matter(attempt.predictor, words, found.values[0], RIGHT)) < 2
 
 
 def _refined(attempt: Attempt, explanations: Sequence[Explanation]) -> list[Explanation]:
@@ -96,22 +111,29 @@ def _pairs(attempt: Attempt, tell: Progress) -> list[Explanation]:
     """
     # The faults of the first stage, by what they leave; some are never half of a pair.
     ordered = sorted(attempt.candidates.tried, key=lambda each: each.error)
-    halves = [each.faults[0] for each in ordered if not each.faults[0].single]
+    few = attempt.predictor.few
+    halves = [_half(few, each) for each in ordered if not each.faults[0].single]
     # An exposure is wrong beside anything else, and alone explains little
     # where a curve comes after it.
     halves.sort(key=lambda fault: fault.name != "factor")
-    # The first six faults are tried with all that follow them.
+    # The first six faults are tried with all that follow them; of two that make up for one another
+    # neither need leave little alone.
     pairs = [
         in_order(first, second)
-        for number, first in enumerate(halves[:6])
+        for number, first in enumerate(halves)
         for second in halves[number + 1 :]
-        if differ(first, second)
+        if differ(first, second) and (number < 6 or _near_lamps(first, second))
     ]
-    # First half of the time: the error of each pair at its best start, on few pixels.
-    few, begun = attempt.predictor.few, []
+    # First half of the time: the error of each pair at its best start, on few pixels. Where numbers
+    # of one fault alone make up for some of the other they are looked for again.
+    begun = []
     for number, pair in enumerate(pairs):
         tell(0.5 * number / len(pairs), _names(pair))
-        begun.append((*best_of_starts(few, pair), pair))
+        least, near = best_of_starts(few, pair)
+        if _near_lamps(*pair) or (pair[0].equation and not pair[1].moves):
+            rough = explain(few, pair, near, fine=False)
+            least, near = rough.error, rough.values
+        begun.append((least, near, pair))
     begun.sort(key=lambda each: each[0])
     # Second half: the twelve pairs that leave least are followed, on few pixels first. All
     # pixels are looked at only if a pair leaves much less than the best single fault.
@@ -125,6 +147,25 @@ def _pairs(attempt: Attempt, tell: Progress) -> list[Explanation]:
             if attempt.candidates.is_enough(explanations[-1]):
                 break
     return explanations
+
+
+def _half(few: Predictor, alone: Explanation) -> Fault:
+    """Return a fault as one of a pair. An equation, which has many starts, begins with what was
+    found for it alone, or where it has the shape of the image.
+    """
+    (fault,) = alone.faults
+    if not fault.equation:
+        return fault
+    starts = *alone.values, best_shape(few, fault)
+    return replace(fault, begin=lambda predictor, guess: starts)
+
+
+def _near_lamps(first: Fault, second: Fault) -> bool:
+    """Return whether two faults are the law of lamps and the path of their light, which make up for
+    one another.
+    """
+    names = {first.name, second.name}
+    return "light-path" in names and bool(names & {"distance-law", "light-range"})
 
 
 def _names(faults: Sequence[Fault]) -> str:

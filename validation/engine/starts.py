@@ -72,6 +72,17 @@ def _ambient_light(predictor: Predictor, guess: Guess, change: Change) -> Sequen
     return [tuple(max(_weighted_median(e / o, o), 0.0) for e, o in channels)]
 
 
+def _fog_colour(predictor: Predictor, guess: Guess, change: Change) -> Sequence[Values]:
+    """Return the colour of fog that sends what most of the image has beyond surfaces."""
+    # By channel the image is surfaces plus the colour times the opacity: the median of the ratios,
+    # with the opacity as weights.
+    rest = predictor.predicted(change(predictor, guess, (0.0, 0.0, 0.0)))
+    part = predictor.predicted(change(predictor, guess, (1.0, 1.0, 1.0))) - rest
+    excess, part = predictor.shown(guess) - rest, np.maximum(part, 1e-6)
+    channels = zip(excess.T, part.T, strict=True)
+    return [tuple(max(_weighted_median(e / o, o), 0.0) for e, o in channels)]
+
+
 def _dark_excess(predictor: Predictor, guess: Guess, change: Change) -> Sequence[Values]:
     """Return the excess of the darker half of the image over the guess."""
     # A level above 0, since it is looked for by its logarithm.
@@ -82,19 +93,33 @@ def _dark_excess(predictor: Predictor, guess: Guess, change: Change) -> Sequence
 
 def _ranges(predictor: Predictor, guess: Guess, change: Change) -> Sequence[Values]:
     """Return ranges of lights: multiples of the usual distance from a light."""
-    # Distances of the nodes in the fog; of lit surface points where no ray has fog.
-    r = np.concatenate(
-        [each.nodes.r for each in predictor.light.model(predictor.observation, SCENERY, 0).lights]
-    )
-    if not len(r):
-        r = np.concatenate(
-            [
-                each.surface.r
-                for each in predictor.light.model(predictor.observation, SCENERY, 1).lights
-            ]
-        )
-    usual = float(np.median(r)) if len(r) else 1.0
+    usual = _usual_distance(predictor)
     return [(usual * part,) for part in (0.5, 1.0, 2.0, 4.0)]
+
+
+def _many_ranges(predictor: Predictor, guess: Guess, change: Change) -> Sequence[Values]:
+    """Return ranges of lights near one another, of which none is far from any range."""
+    usual = _usual_distance(predictor)
+    return [(usual * 2.0 ** (0.5 * step),) for step in range(-2, 7)]
+
+
+def _usual_distance(predictor: Predictor) -> float:
+    """Return the usual distance from a light of what it lights [m]."""
+    # By ray, the mean distance of its nodes, which count as 1/r^2: unbounded rays have nodes far
+    # from all light. Of lit surface points where no ray has fog.
+    observation, means = predictor.observation, [np.empty(0)]
+    for each in predictor.light.model(observation, SCENERY, 0).lights:
+        nodes, weight = each.nodes, each.nodes.value[:, 0]
+        if not nodes.towards.any():  # a sun has no distance
+            continue
+        total = np.bincount(nodes.ray, weight / nodes.r**2)
+        summed = np.bincount(nodes.ray, weight / nodes.r)
+        means.append(summed[total > 0] / total[total > 0])
+    r = np.concatenate(means)
+    if not len(r):
+        lights = predictor.light.model(observation, SCENERY, 1).lights
+        r = np.concatenate([np.empty(0), *(each.surface.r for each in lights)])
+    return float(np.median(r)) if len(r) else 1.0
 
 
 def _sizes_and_ranges(predictor: Predictor, guess: Guess, change: Change) -> Sequence[Values]:
@@ -136,8 +161,10 @@ STARTS: Mapping[str, Start] = {
     "ratio": _ratio,
     "part": _part,
     "ambient light": _ambient_light,
+    "colour of the fog": _fog_colour,
     "excess of the dark half": _dark_excess,
     "ranges": _ranges,
+    "many ranges": _many_ranges,
     "sizes and ranges": _sizes_and_ranges,
     "depths": _depths,
     "scale heights and factors": _heights,

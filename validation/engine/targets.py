@@ -11,9 +11,11 @@ from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.arrays import Array
 from airlight.validation.engine.curves import PRIMARIES
+from airlight.validation.engine.equations import equation
 from airlight.validation.engine.fault import Change, Held, Values
 from airlight.validation.engine.prediction import Guess, Layers, Predictor
 from airlight.validation.engine.transforms import (
+    LAWS,
     LAYERS,
     LOBES,
     MIXES,
@@ -108,8 +110,24 @@ def planar(words: Sequence[str]) -> Change:
     return changed_fog(lambda fog: replace(fog, planar=fog.planar | set(words)))
 
 
+def _law(factor: Callable[..., Array]) -> Change:
+    return changed_fog(lambda fog, *p: replace(fog, law=(lambda r: factor(r, *p),) * 2))
+
+
 def _window(factor: Callable[..., Array]) -> Change:
     return changed_fog(lambda fog, *p: replace(fog, window=lambda r: factor(r, *p)))
+
+
+def _lit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return fog whose density is lit, times a factor, whatever its albedo."""
+    white = ((1.0, 1.0, 1.0),) * len(guess.fog.albedo)
+    return replace(guess, fog=replace(guess.fog, albedo=white, lit=p[0]))
+
+
+def _softened_with_end(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    """Return light that is softened near its source, and has a range."""
+    softened = _law(LAWS["softened"])(predictor, guess, p[:1])
+    return _window(WINDOWS["(1 - (r/R)^4)^2"])(predictor, softened, p[1:])
 
 
 def scaled(field: str, lights: Sequence[int] | None = None) -> Change:
@@ -305,6 +323,8 @@ def _turned(turn: Callable[[Array], Array]) -> Change:
 #: Changes that need more of the guess than one quantity.
 GUESSES: Mapping[str, Change] = {
     "unit of length": _unit,
+    "softened, with an end": _softened_with_end,
+    "lit density": _lit,
     "falling density": _falling,
     "even density": _even,
     "first light moved": _moved,
@@ -323,6 +343,8 @@ BY_NAME: Mapping[str, Callable[[str], Change]] = {
     "lobes": lambda name: _lobes(LOBES[name]),
     "phase": lambda name: _phase(PHASES[name]),
     "layer": lambda name: _layers(LAYERS[name]),
+    "equation": equation,
+    "law": lambda name: _law(LAWS[name]),
     "window": lambda name: _window(WINDOWS[name]),
     "factor": scaled,
     "mix": lambda name: _mixed(MIXES[name]),

@@ -3,8 +3,9 @@
 
 import numpy as np
 
+from airlight.analytic.phase import HenyeyGreenstein, Isotropic
 from airlight.validation.engine.observation import stopped
-from airlight.validation.engine.prediction import Guess, Predictor
+from airlight.validation.engine.prediction import Predictor
 
 
 def traits(predictor: Predictor) -> dict[str, bool]:
@@ -13,7 +14,7 @@ def traits(predictor: Predictor) -> dict[str, bool]:
     holds, values = predictor.observation.holds, predictor.observation.values
     shapes = bool(reference.occluders.shapes())
     spots = [light for light in reference.lights if light.axis is not None]
-    right = Guess(fog)
+    right, model = predictor.unchanged, predictor.observation.equation
     # Henyey and Greenstein's phase functions have a g, which is a number.
     lobes = any(isinstance(g, float) for g in fog.phase)
     # The pairs of extinction and albedo of all channels of all media.
@@ -25,6 +26,8 @@ def traits(predictor: Predictor) -> dict[str, bool]:
     return {
         "shapes": shapes,
         "lamps": bool(reference.lights),  # point and spot lights
+        "suns": bool(reference.directional),
+        "physics": model.is_physical,  # no other equation is asked for
         "point lights": len(spots) < len(reference.lights),
         "spots": bool(spots),
         "soft spots": any(0 < light.beam < light.cutoff for light in spots),
@@ -39,6 +42,10 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "absorption": any(s > 0 and a < 1 - 1e-6 for s, a in optics),
         "lobes": lobes and holds != "surface",  # of Henyey and Greenstein
         "g": lobes and holds != "surface" and any(fog.phase),  # other than 0
+        "known g": all(
+            isinstance(medium.phase, HenyeyGreenstein | Isotropic)
+            for medium in (reference.medium, *reference.media)
+        ),
         "isotropy": not lobes
         and any(medium.phase.is_constant for medium in (reference.medium, *reference.media)),
         "square": predictor.shape[0] == predictor.shape[1],
@@ -47,6 +54,8 @@ def traits(predictor: Predictor) -> dict[str, bool]:
             np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))
         ),
         "stop": bool(stopped(values).any()),  # of many values
-        # More light than there should be: higher orders take none away.
-        "more light": float(np.median(predictor.shown(right) - predictor.predicted(right))) > 0,
+        # More light than there should be: higher orders take none away. Those of another equation
+        # nobody knows.
+        "more light": model.is_physical
+        and float(np.median(predictor.shown(right) - predictor.predicted(right))) > 0,
     }

@@ -25,6 +25,8 @@ from airlight.validation.engine.curves import (
     to_pq,
     to_srgb,
 )
+from airlight.validation.fog_model.laws import WINDOWS as RANGES
+from airlight.validation.fog_model.laws import Falloff, clamped, of_a_disk, softened
 from airlight.validation.fog_model.radiance import PhaseLaw
 
 # The medium: extinction and albedo, phase functions, layers of height fog.
@@ -117,34 +119,27 @@ LAYERS: Mapping[str, Callable[..., Layer]] = {
 # The light of lights by the distance r from them [m], as a factor on what it should be.
 
 
-def softened(r: Array, size: float) -> Array:
-    """Return the factor of light that falls as 1/(r^2 + size)."""
-    return r**2 / (r**2 + size)
+#: r^2 f(r) of another distance law f than 1/r^2.
+LAWS: Mapping[str, Callable[..., Array]] = {
+    "one over the distance": lambda r: r,
+    "no fall": lambda r: r**2,
+    "softened": softened,
+    "of a disk": of_a_disk,
+    "clamped": clamped,
+}
 
 
-def of_a_disk(r: Array, radius: float) -> Array:
-    """Return the light of a disk at a point that it faces, as a fraction of
-    the light of a point light.
-    """
-    return 2 * r**2 / (r**2 + radius**2 + r * np.sqrt(r**2 + radius**2))
-
-
-def _in_range(factor: Callable[[Array], Array]) -> Callable[[Array, float], Array]:
+def _in_range(factor: Falloff) -> Callable[[Array, float], Array]:
     """Return a factor by the distance r, of a function of r/R up to the range R."""
     return lambda r, end: factor(np.minimum(r / end, 1.0))
 
 
 WINDOWS: Mapping[str, Callable[..., Array]] = {
-    "softened": softened,
-    "of a disk": of_a_disk,
-    "softened, with an end": lambda r, size, end: (
-        softened(r, size) * (1 - np.minimum(r / end, 1.0) ** 4) ** 2
-    ),
-    "(1 - (r/R)^4)^2": _in_range(lambda s: (1 - s**4) ** 2),
-    "1 - (r/R)^4": _in_range(lambda s: 1 - s**4),
-    "(1 - (r/R)^2)^2": _in_range(lambda s: (1 - s**2) ** 2),
-    "1 - r/R": _in_range(lambda s: 1 - s),
-    "r < R": _in_range(lambda s: (s < 1).astype(float)),
+    "(1 - (r/R)^4)^2": _in_range(RANGES["quartic"]),
+    "1 - (r/R)^4": _in_range(RANGES["fourth"]),
+    "(1 - (r/R)^2)^2": _in_range(RANGES["square"]),
+    "1 - r/R": _in_range(RANGES["linear"]),
+    "r < R": _in_range(RANGES["cut"]),
 }
 
 
@@ -173,6 +168,10 @@ MIXES: Mapping[str, Callable[..., tuple[Array, Array]]] = {
     "mixed by opacity": lambda airlight, surface, transmittance: (
         airlight * (1 - transmittance),
         surface * transmittance,
+    ),
+    "fog of a largest opacity": lambda airlight, surface, transmittance, most: (
+        airlight * np.minimum(1.0, most / np.maximum(1 - transmittance, _LEAST_OPACITY)),
+        surface,
     ),
     "fog plus light times opacity": lambda airlight, surface, transmittance, *light: (
         airlight + np.array(light) * (1 - transmittance),

@@ -10,5 +10,7 @@ Read in this order:
 
 - `places.py`: nodes on lit parts of rays, and lit surface points, of one light;
 - `view.py`: the rays of some pixels, what lights reach on them, and all places of a scene;
-- `radiance.py`: what describes the fog and how its laws are read, and the radiance of every pixel.
+- `laws.py`: how the light of lamps falls with the distance;
+- `radiance.py`: what describes the fog and how its laws are read, and the radiance of every pixel;
+- `equation.py`: the fog and the scenery of the equation of an engine.
 """

@@ -44,7 +44,7 @@ from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.distances import crossings
-from airlight.reference.visibility.planes import falloff, rays_at
+from airlight.reference.visibility.planes import Rays, falloff, rays_at
 from airlight.validation.arrays import Array, Bools, Index
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
@@ -113,15 +113,18 @@ def point_nodes(
     light: ReferenceLight,
     reach: LitRays,
     ends: tuple[Array, Array] | None = None,
+    corners: Sequence[float] = (),
 ) -> Places:
     """Return the nodes of a point or spot light, or of a sample of an area light.
 
     `reach`: which parts of the rays it reaches; `ends`: distances between which rays have nodes,
-    (rays,) each [m]; all by default.
+    (rays,) each [m]; all by default; `corners`: distances from the light at which panels end [m].
     """
     # Lit stretches are cut where the medium changes, so that a piece lies in one medium.
     rays = reach.rays
     stretches = _within(lit_stretches(light, rays, reach.lit), ends)
+    for distance in corners:
+        stretches = _parted(rays, stretches, distance)
     if reference.media:
         pieces = smooth_pieces(
             reference, rays, camera_segments(reference, reach.distance), stretches
@@ -188,6 +191,13 @@ def parallel_nodes(
         pieces = smooth_pieces(
             reference, rays, camera_segments(reference, reach.distance), stretches
         )
+        # The first piece of every long stretch is halved towards its beginning: what is left of the
+        # light beyond four depths falls over further and further lengths.
+        sigma_t = max(
+            float(medium.sigma_t.max()) for medium in (reference.medium, *reference.media)
+        )
+        while np.any(long := pieces.first & ((pieces.x1 - pieces.x0) * sigma_t > _DEEP)):
+            pieces = cut(pieces, (pieces.ray[long], 0.5 * (pieces.x0 + pieces.x1)[long]))
         depth = (pieces.x1 - pieces.x0) * by_medium(reference, "sigma_t", pieces.medium).max(axis=1)
     # The depth of a piece says how many panels it has; in x these panels are equally long.
     width, depth = pieces.x1 - pieces.x0, np.maximum(depth, 1e-300)
@@ -299,6 +309,17 @@ def _within(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches
     return ray[inside], x0[inside], x1[inside]
 
 
+def _parted(rays: Rays, stretches: Stretches, distance: float) -> Stretches:
+    """Return lit stretches, parted where rays are at a distance from the light."""
+    half = np.sqrt(np.maximum(distance**2 - rays.height**2, 0.0))
+    for x in (rays.foot - half, rays.foot + half):
+        ray, x0, x1 = stretches
+        middle = np.clip(x[ray], x0, x1)
+        parts = np.tile(ray, 2), np.concatenate([x0, middle]), np.concatenate([middle, x1])
+        stretches = _within(parts, None)
+    return stretches
+
+
 def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) -> Pieces:
     """Return lit stretches in a medium without bounds, cut at the heights at which the density
     of height fog has kinks.
@@ -325,8 +346,10 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
         number, row = np.nonzero(np.isfinite(x) & (x > 0))
         kinks = row, x[number, row]
     # After the optical depth 40, e^-40 = 4e-18 of the light is left. The fog that is tried may be
-    # thinner than the scene's: rays are long enough down to a thirtieth of its extinction.
-    far = 40.0 / (1 / 30 * sigma_t[sigma_t > 0].min()) if np.any(sigma_t > 0) else 0.0
+    # thinner than the scene's: rays are long enough down to a thirtieth of its extinction. Where
+    # the scene's own equation attenuates less, they are longer, up to a million times.
+    least = 1 / 30 * np.clip(reference.model.camera_scale, 1e-6, 1.0)
+    far = 40.0 / (least * sigma_t[sigma_t > 0].min()) if np.any(sigma_t > 0) else 0.0
     foot = np.sum((place - reference.origin) * direction[ray], axis=1)
     pieces = whole((ray, x0, np.where(np.isinf(x1), np.maximum(x0, foot) + far, x1)))
     return cut(pieces, kinks) if len(ray) and len(kinks[0]) else pieces
@@ -370,7 +393,8 @@ def _before_sun(
     low, high = _heights(reference, pieces.ray, pieces.x0, pieces.x1)
     # Where the ray climbs by dz, the light path to it changes by dz/mu: the exponent of a node
     # changes with the depth of both paths. A panel of four depths spans two scale heights at most.
-    steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
+    # (An equation without light paths may have a sun below the horizon.)
+    steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu if mu > 0 else 1.0
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
     return pieces, np.minimum(
         np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP

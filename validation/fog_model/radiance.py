@@ -16,6 +16,10 @@ and the lengths of its segment change as r'/r, which is right where the medium h
 height fog a path counts by its length times the mean density between its ends
 (`analytic.height_fog`), and one to a directional light by the column above over the cosine of the
 light's height; the extinction is then a factor on that density.
+
+A fog may have light without lights: an ambient light A adds the sum of albedo sigma exp(-a tau) A
+along a ray, in a stretch of one medium albedo A (exp(-a tau_0) - exp(-a tau_1))/a; and a constant
+source C (1 - exp(-a tau)) stands for the light of all lights.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,11 +31,13 @@ import numpy as np
 from airlight.analytic.height_fog import HeightFog
 from airlight.analytic.phase import HenyeyGreenstein
 from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.quadrature.intervals import camera_segments
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
-from airlight.validation.arrays import Array
-from airlight.validation.fog_model.places import AROUND, Places
+from airlight.validation.arrays import Array, Index
+from airlight.validation.fog_model.laws import Falloff
+from airlight.validation.fog_model.places import AROUND, Places, lengths
 from airlight.validation.fog_model.view import Ends, LightPaths, View
 
 Colour = tuple[float, float, float]
@@ -76,17 +82,35 @@ class Fog:
     #: of what the medium scatters, and of what surfaces reflect [1].
     camera_segment: tuple[float, float] = (1.0, 1.0)
     light_segment: tuple[float, float] = (1.0, 1.0)
-    #: the medium without bounds is missing before this plane, along the camera's axis [m]
+    #: length of a further path that attenuates what the medium scatters, with the extinction at the
+    #: place that scatters [m]
+    light_length: float = 0.0
+    #: the medium is missing before this plane, along the camera's axis [m]
     near: float = 0.0
     far: float = np.inf  #: it ends at this plane, or at this distance [m]
     spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
     #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in
     #: what attenuates them, 'steps' in the length of ray that a node stands for, 'ends' where rays
-    #: end.
+    #: end; 'lookup': rays end where their depth is the distance of the surface.
     planar: frozenset[str] = frozenset()
-    distance_power: float = 2.0  #: the irradiance falls as the distance to this power [1]
-    #: factor on the light by the distance from it [m]
-    window: Callable[[Array], Array] | None = None
+    #: factor on the light of a point light by the distance from it, of another law than 1/r^2: in
+    #: the fog, and on surfaces
+    law: tuple[Falloff | None, Falloff | None] = (None, None)
+    window: Falloff | None = None  #: factor on the light of lamps with a range
+    #: distances from lamps at which their light has corners: nodes lie between them [m]
+    corners: tuple[float, ...] = ()
+    #: whether lamps scatter without a phase function: it is 4 pi
+    bare: bool = False
+    #: depths at which a factor along a line on what the medium scatters is 1 and 0 [m]
+    fade: tuple[float, float] | None = None
+    ambient: Colour = (0.0, 0.0, 0.0)  #: light that all of the fog scatters [W/(m^2 sr)]
+    #: the colour of opaque fog, in the place of the light of all lights [W/(m^2 sr)]
+    constant: Colour | None = None
+    most: float = 1.0  #: the most that such a fog covers [1]
+    #: power of the cosine about directional lights in such a fog, and where it begins [m]
+    lobe: tuple[float, float] | None = None
+    #: factor k: the light X of lights is 1 - exp(-k X) in the image
+    lit: float | None = None
     #: how the density of the medium without bounds depends on height
     height: HeightFog | None = None
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
@@ -99,23 +123,32 @@ class Fog:
 
     @property
     def ends(self) -> Ends | None:
-        """Between which distances rays are in the fog; None where all of every ray is in it."""
-        if "ends" in self.planar:
-            return 0.0, np.inf, "depth"
-        bounded = self.near > 0 or np.isfinite(self.far)
-        return (self.near, self.far, "spheres" if self.spherical else "planes") if bounded else None
+        """Between which distances rays have nodes; None where that is all of every ray."""
+        end = next((word for word in ("ends", "lookup") if word in self.planar), "")
+        faded = np.inf if self.fade is None else self.fade[1]
+        ends = Ends(self.near, self.far, self.spherical, end, faded, self.corners)
+        return None if ends == Ends() else ends
 
     @property
     def without_factors(self) -> "Fog":
-        """The fog without the factors that multiply the light of each source, see `combined`."""
+        """The fog without what multiplies the light of each source or changes their sum, see
+        `combined`.
+        """
         one = (1.0,) * len(self.intensity)
-        return replace(self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
+        return replace(
+            self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0), lit=None
+        )
 
     def combined(self, by_light: Array) -> Array:
         """Return airlight and surfaces, (2, m, 3), from what `FogModel.by_light` returns."""
         # Axes of the sum: k the layer, l the light, p the pixel, c the channel.
         factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
-        return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
+        layers = np.einsum("kl,klpc->kpc", factors, by_light[:, :-1])
+        if self.lit is not None:
+            layers[0] = -np.expm1(-self.lit * layers[0])
+        # Light without lights has the factor that the fog of all lights has.
+        shared = self.airlight[0] if len(set(self.airlight)) == 1 else 1.0
+        return np.asarray((layers + shared * by_light[:, -1]) * np.array(self.exposure))
 
 
 def scene_fog(reference: ReferenceScene) -> Fog:
@@ -176,19 +209,22 @@ class FogModel:
         return fog.combined(self.by_light(fog.without_factors))
 
     def by_light(self, fog: Fog) -> Array:
-        """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)];
-        no number is out of range.
+        """Return airlight and surfaces from each light, and last what no light sends,
+        (2, lights + 1, m, 3) [W/(m^2 sr)]; no number is out of range.
         """
         # Extreme parameters of a search overflow: values out of range become a number whose square
         # is a number too, so that its loss can be computed.
         largest = 1e100
         view = self.view
-        radiance = np.zeros((2, len(self.lights), len(view.pixels), 3))
+        radiance = np.zeros((2, len(self.lights) + 1, len(view.pixels), 3))
         with np.errstate(over="ignore", invalid="ignore"):
             for number, light in enumerate(self.lights):
                 for layer, places in enumerate((light.nodes, light.surface)):
-                    if len(places.r):
+                    if fog.constant is not None and layer == 0:
+                        radiance[0, number] = self._lobe(fog, number) * light.intensity
+                    elif len(places.r):
                         radiance[layer, number] = self._sums(places, fog, number) * light.intensity
+            radiance[0, -1] = self._without_lights(fog)
         # Each pixel has the sum over its rays so far: the mean is this sum over their number.
         radiance *= len(view.pixels) / len(view.ray_pixel)
         return np.nan_to_num(radiance, nan=largest, posinf=largest, neginf=-largest)
@@ -197,27 +233,101 @@ class FogModel:
         """Return the transmittance of the rays up to their ends, the mean over each pixel,
         (m, 3) [1].
         """
-        view = self.view
-        length = _between_ends(view.length, fog, 1 / (view.reference.direction @ view.axis))
+        left = self._of_pixels(np.exp(-self._depth(fog, *self._ray_ends(fog))))
+        return left / np.bincount(self.view.ray_pixel)[:, None]
+
+    # Light without lights, of whole rays.
+
+    def _of_pixels(self, values: Array) -> Array:
+        """Return the sums of values of rays, (rays, 3), over those of each pixel, (m, 3)."""
+        return np.stack([np.bincount(self.view.ray_pixel, column) for column in values.T], axis=1)
+
+    def _lobe(self, fog: Fog, number: int) -> Array | float:
+        """Return the lobe of a directional light of irradiance 1 in fog of one colour, (m, 3)."""
+        sun = self._sun(number)
+        if fog.lobe is None or sun is None:
+            return 0.0
+        power, start = fog.lobe
+        begin, end = self._ray_ends(fog)
+        begin = np.maximum(begin, start)
+        towards = np.maximum(self.view.reference.direction @ -sun.direction, 0.0)
+        opacity = -np.expm1(-self._fraction(fog) * self._depth(fog, begin, np.maximum(end, begin)))
+        return self._of_pixels((towards**power)[:, None] * opacity)
+
+    def _without_lights(self, fog: Fog) -> Array:
+        """Return the airlight that no light sends, the sum over the rays of each pixel, (m, 3)."""
+        begin, end = self._ray_ends(fog)
+        total = np.zeros((len(begin), 3))
+        if any(fog.ambient):
+            total += np.array(fog.ambient) * self._scattered(fog, begin, end)
+        if fog.constant is not None:
+            opacity = -np.expm1(-self._fraction(fog) * self._depth(fog, begin, end))
+            total += np.array(fog.constant) * np.minimum(opacity, fog.most)
+        return self._of_pixels(total)
+
+    def _fraction(self, fog: Fog) -> Array:
+        """Return the fraction of the depths of rays that attenuates what they scatter, (rays, 1)."""
+        flat = self.view.reference.direction @ self.view.axis if "nodes" in fog.planar else 1.0
+        count = len(self.view.reference.direction)
+        return np.broadcast_to(fog.camera_segment[0] * flat, (count,))[:, None]
+
+    def _ray_ends(self, fog: Fog) -> tuple[Array, Array]:
+        """Return the distances at which the fog of rays begins and ends, (rays,) each [m]."""
+        slant = 1 / (self.view.reference.direction @ self.view.axis)
+        return _way(fog, slant, self.view.distance, ends_at_surface=True)
+
+    def _depth(self, fog: Fog, low: Array, high: Array) -> Array:
+        """Return the optical depth of rays between two distances, (rays, 3) [1]; 0 where the second
+        is not beyond the first. It may be infinite.
+        """
+        reference, inside = self.view.reference, high > low
+        low = np.where(inside, low, 0.0)
+        high = np.where(inside, high, low)
         if fog.height is not None:
-            # In height fog the length becomes the optical depth of the ray. A horizontal ray stays
-            # at its height, even if it is unbounded: 0 times infinity is not a number.
-            origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
-            end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
-            length[:, AROUND] = fog.height.along(origin, end, length[:, AROUND], rise)
+            # A horizontal ray stays at its height, even if it is unbounded: 0 times infinity is not
+            # a number. The length becomes the depth in a density of 1.
+            origin, rise = reference.origin @ fog.up, reference.direction @ fog.up
+            z0, z1 = (origin + np.where(rise == 0, 0.0, rise * x) for x in (low, high))
+            length = fog.height.along(z0, z1, high - low, rise)[:, None]
+        else:
+            length, before = (
+                lengths(reference, reference.origin, reference.direction, x) for x in (high, low)
+            )
+            length = length - before
+            length[np.isinf(high), AROUND] = np.inf
         # A medium that does not attenuate a channel does so over any length, even an infinite one:
         # it is left out there.
         depth = [length[:, own > 0] @ own[own > 0] for own in np.array(fog.sigma_t).T]
-        count = np.bincount(view.ray_pixel)
-        return np.stack(
-            [np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth], axis=1
-        )
+        return np.stack(depth, axis=1)
+
+    def _scattered(self, fog: Fog, begin: Array, end: Array) -> Array:
+        """Return the sum of albedo sigma exp(-a tau) along rays, (rays, 3) [1]."""
+        reference, albedo = self.view.reference, np.array(fog.albedo)
+        # The parts of rays in each medium, which the reference counts from 0, and -1 around them.
+        if isinstance(reference.medium, HeightMedium):
+            spans = [(begin, end, np.zeros(len(begin), np.int64))]
+        else:
+            parts = camera_segments(reference, end)
+            spans = list(zip(parts.start, parts.end, parts.medium + 1, strict=True))
+        total, fraction = np.zeros((len(begin), 3)), self._fraction(fog)
+        for start, stop, medium in spans:
+            low = np.clip(start, begin, end)
+            high = np.clip(stop, low, np.maximum(end, low))
+            before, depth = self._depth(fog, begin, low), self._depth(fog, low, high)
+            with np.errstate(divide="ignore"):
+                fallen = np.exp(-fraction * before) * -np.expm1(-fraction * depth) / fraction
+            total += albedo[medium] * np.where(fraction > 0, fallen, depth)
+        if "steps" in fog.planar:
+            total *= (reference.direction @ self.view.axis)[:, None]
+        return total
+
+    # Light of lights, from nodes and surface points.
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:
         """Return the light from the places to each pixel, for intensity 1, (m, 3)."""
         # `slant` is the length of a ray over its depth along the axis of the camera; `away` leads
         # from the light to the places [m].
-        view = self.view
+        view, sun = self.view, self._sun(number)
         layer = int(places.is_surface)
         direction, pixel = view.reference.direction[places.ray], view.ray_pixel[places.ray]
         slant = 1 / (direction @ view.axis)
@@ -237,7 +347,7 @@ class FogModel:
         # The radiance of surface points contains 1/r^2, which is taken out for the law of the fog;
         # the weight of nodes has no distance in it. A march that takes steps of depth for steps of
         # distance makes the nodes' lengths of ray shorter by `slant`.
-        strength = _falls(r, fog) if self._sun(number) is None else np.ones_like(r)
+        strength = _falls(r, fog, layer) if sun is None else np.ones_like(r)
         if places.is_surface:
             strength = strength * places.r**2
         else:
@@ -246,15 +356,30 @@ class FogModel:
                 * places.value[:, 0]
                 / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
             )
+            if fog.fade is not None:
+                full, none = fog.fade
+                strength *= np.maximum((none - places.x / slant) / (none - full), 0.0)
         # The lengths to the camera, or the depths that are taken for them, within the near and far
-        # ends of the medium without bounds.
-        flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
-        camera = _between_ends(
-            places.camera / slant[:, None] if flat else places.camera, fog, slant
-        )
-        log_density = np.zeros(len(places.r))
+        # ends of the fog.
+        begin, end = _way(fog, slant, places.x, ends_at_surface=places.is_surface)
+        camera, log_density = places.camera, np.zeros(len(places.r))
+        if np.any(begin > 0) or np.any(end != places.x):
+            camera = self._camera_lengths(places.ray, begin, end)
+        if ("surfaces" if places.is_surface else "nodes") in fog.planar and not (
+            places.is_surface and "ends" in fog.planar
+        ):
+            camera = camera / slant[:, None]
         if fog.height is not None:
-            camera, light, log_density = self._by_height(places, fog, number, camera, light, away)
+            camera, light, log_density = self._by_height(
+                places, fog, sun, (begin, end), camera, light, away
+            )
+        # Both ways together, as lengths in each medium. A way that does not attenuate may have an
+        # infinite length.
+        ways = fog.camera_segment[layer] * camera
+        if fog.light_segment[layer]:
+            ways = ways + fog.light_segment[layer] * light
+        if fog.light_length and not places.is_surface:
+            ways[np.arange(len(ways)), places.medium] += fog.light_length * np.exp(log_density)
         total, sigma_t, count = (
             np.zeros((len(view.pixels), 3)),
             np.array(fog.sigma_t),
@@ -263,11 +388,10 @@ class FogModel:
         # One exponential serves all channels of the same extinction. A node whose exponent is no
         # number, such as 0 times an infinite length, sends nothing.
         for channels in _alike(fog):
-            depth = (
-                fog.camera_segment[layer] * camera + fog.light_segment[layer] * light
-            ) @ sigma_t[:, channels[0]]
             attenuated = strength * np.exp(
-                np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf)
+                np.nan_to_num(
+                    log_density - ways @ sigma_t[:, channels[0]], nan=-np.inf, neginf=-np.inf
+                )
             )
             if places.is_surface:
                 for channel in channels:
@@ -286,6 +410,16 @@ class FogModel:
                     )
         return total
 
+    def _camera_lengths(self, ray: Index, begin: Array, end: Array) -> Array:
+        """Return the lengths of parts of rays in each medium, (n, media) [m]."""
+        reference = self.view.reference
+        if not reference.media:
+            return (end - begin)[:, None]
+        whole, before = (
+            lengths(reference, reference.origin, reference.direction[ray], x) for x in (end, begin)
+        )
+        return whole - before
+
     def _sun(self, number: int) -> DirectionalLight | None:
         """Return the directional light of a number; None for a light that has a place."""
         # Lights count point and spot lights first, then directional ones, then area lights.
@@ -294,19 +428,27 @@ class FogModel:
         return reference.directional[number - numbers.start] if number in numbers else None
 
     def _by_height(
-        self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
+        self,
+        places: Places,
+        fog: Fog,
+        sun: DirectionalLight | None,
+        between: tuple[Array, Array],
+        camera: Array,
+        light: Array,
+        away: Array,
     ) -> tuple[Array, Array, Array]:
         """Return lengths that in a density of 1 have the depths of height fog, and the
         logarithm of its density.
 
-        `away` is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
+        `between`: distances at which the way to the camera ends and begins, (n,) each [m]; `away`
+        is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
         """
         reference, density = self.view.reference, fog.height
         assert density is not None
-        origin = reference.origin @ fog.up
-        z = origin + places.x * (reference.direction[places.ray] @ fog.up)
-        camera, light, sun = camera.copy(), light.copy(), self._sun(number)
-        camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
+        origin, rise = reference.origin @ fog.up, reference.direction[places.ray] @ fog.up
+        z, begin, end = (origin + x * rise for x in (places.x, *between))
+        camera, light = camera.copy(), light.copy()
+        camera[:, AROUND] = density.optical_depth(begin, end, camera[:, AROUND])
         if sun is not None:
             # The column above a place over the sine of the light's height over the horizon.
             light[:, AROUND] = density.column(z) / max(float(-sun.direction @ fog.up), 1e-300)
@@ -315,11 +457,13 @@ class FogModel:
         return camera, light, np.zeros_like(z) if places.is_surface else density.log_density(z)
 
     def _phase(self, places: Places, number: int, medium: int, fog: Fog, cosine: Array) -> Array:
+        if fog.bare and self._sun(number) is None:
+            return np.full(len(cosine), 4 * np.pi)
         law = fog.phase[medium]
         if isinstance(law, float):
             return henyey_greenstein(law)(cosine)
         if law is not None:
-            return law(cosine)
+            return law(np.clip(cosine, -1, 1))
         # The scene's own phase function is evaluated once, at the scattering angles of the paths:
         # it does not change, not even where a light moves a little.
         key = number, medium
@@ -332,25 +476,33 @@ class FogModel:
         return self._phases[key]
 
 
-def _between_ends(length: Array, fog: Fog, slant: Array) -> Array:
-    """Return a copy of lengths from the camera in each medium, (n, media), in which the medium
-    without bounds begins and ends as the fog says.
+def _way(fog: Fog, slant: Array, x: Array, *, ends_at_surface: bool) -> tuple[Array, Array]:
+    """Return where in the fog the way from the camera to places at distances x begins and ends,
+    distances along the rays, (n,) each [m].
 
-    `slant`: lengths of rays over their depth along the camera's axis, (n,).
+    `slant`: lengths of rays over their depth along the camera's axis, (n,). A plane at the depth z
+    is at the distance z times `slant`.
     """
-    # Only the medium without bounds begins and ends. Lengths are measured along the ray: a plane at
-    # the depth z is at the distance z times `slant`.
-    ends, length = (1.0 if fog.spherical else slant), length.copy()
-    length[:, AROUND] = np.maximum(
-        np.minimum(length[:, AROUND], fog.far * ends) - fog.near * ends, 0.0
-    )
-    return length
+    end = x
+    if ends_at_surface and "ends" in fog.planar:
+        end = x / slant
+    elif ends_at_surface and "lookup" in fog.planar:
+        end = x * slant
+    along = np.ones_like(slant) if fog.spherical else slant
+    if np.isfinite(fog.far):
+        end = np.minimum(end, fog.far * along)
+    return np.minimum(fog.near * along, end), end
 
 
-def _falls(r: Array, fog: Fog) -> Array:
+def _falls(r: Array, fog: Fog, layer: int) -> Array:
     """Return how the light of a source that has a place falls with the distance from it, (n,)."""
-    falls = r**-2 if fog.distance_power == 2 else r**-fog.distance_power
-    return falls if fog.window is None else falls * fog.window(r)
+    # Squares of shorter distances are no numbers of use: a law that ends at the light has none.
+    r = np.maximum(r, 1e-100)
+    falls = r**-2
+    for factor in (fog.law[layer], fog.window):
+        if factor is not None:
+            falls = falls * factor(r)
+    return np.asarray(falls)
 
 
 def _alike(fog: Fog) -> list[list[int]]:

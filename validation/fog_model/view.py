@@ -40,11 +40,22 @@ from airlight.validation.fog_model.places import (
 
 Light = ReferenceLight | DirectionalLight
 Value = TypeVar("Value")
-#: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around
-#: it; 'depth': the depth of the surface taken for the distance along the ray.
-Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where the nodes of rays begin and end."""
+
+    near: float = 0.0  #: before it there are none [m]
+    far: float = np.inf  #: beyond it there are none [m]
+    spherical: bool = False  #: whether both are distances from the camera, not planes before it
+    #: 'ends': at the depth of the surface, taken for a distance; 'lookup': where the depth is the
+    #: distance of the surface; '' at the surface
+    end: str = ""
+    faded: float = np.inf  #: depth beyond which there are none [m]
+    corners: tuple[float, ...] = ()  #: distances from lamps at which nodes are parted [m]
 
 
 @dataclass(frozen=True)
@@ -60,8 +71,10 @@ class Scenery:
     #: by how much the first point and spot lights are moved [m]
     moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     cone: float = 1.0  #: factor on the angles of spots
-    #: how spots fall off: 'hard', 'smooth' from the axis on, one of `EDGES`, or '' as in the scene
+    #: how spots fall off: 'hard', 'smooth' from the axis on, one of `EDGES`, 'rim', or '' as in the
+    #: scene
     edge: str = ""
+    rim: float = 1.0  #: power of a rim, 1 - ((1 - cos)/(1 - cos of the cut-off))^power
     radius: float = 0.0  #: radius of the spheres that take the place of point lights [m]
     #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
     blend: float = 0.0
@@ -116,22 +129,37 @@ class View:
     _cached: dict[Hashable, object] = field(default_factory=dict, repr=False)
 
     def ends(self, ends: Ends) -> tuple[Array, Array]:
-        """Return the distances along the rays between which a fog is (rays,) each [m]."""
+        """Return the distances along the rays between which they have nodes (rays,) each [m]."""
         # Planes cut a ray at their depth over the cosine to the camera's axis.
-        near, far, word = ends
         cosine = self.reference.direction @ self.axis
-        if word == "depth":
-            return np.zeros_like(self.distance), self.distance * cosine
-        slant = 1.0 if word == "spheres" else 1 / cosine
-        near_ends, far_ends = (
-            np.broadcast_to(plane * slant, self.distance.shape) for plane in (near, far)
-        )
-        return near_ends, far_ends
+        along = np.ones_like(cosine) if ends.spherical else 1 / cosine
+        last = np.minimum(ends.far * along, ends.faded / cosine)
+        if ends.end:
+            last = np.minimum(last, self.last(ends))
+        return ends.near * along, last
 
-    def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> LitRays:
+    def last(self, ends: Ends | None) -> Array:
+        """Return the distances at which rays end for their fog, (rays,) [m]."""
+        if ends is None or not ends.end:
+            return self.distance
+        cosine = self.reference.direction @ self.axis
+        return self.distance * cosine if ends.end == "ends" else self.distance / cosine
+
+    def reach(
+        self,
+        light: Light,
+        *,
+        shadows: bool,
+        area: ReferenceAreaLight | None,
+        ends: Ends | None = None,
+    ) -> LitRays:
         """Return which parts of the rays a light reaches; the shape of an area light
         does not shadow its samples.
+
+        `ends`: of the fog, which may go on behind surfaces.
         """
+        beyond = ends is not None and ends.end == "lookup"
+        distance = self.last(ends) if beyond else self.distance
 
         def lit_parts() -> LitRays:
             # The shapes that can stand in the light: none without shadows; for the samples of an
@@ -147,27 +175,22 @@ class View:
                 )
             # Where exact intervals cost too much, shadow rays test the cone of the light.
             if self.steps and shadows and not isinstance(light, DirectionalLight):
-                whole = lit_rays(
-                    replace(reference, occluders=empty), light, self.distance, checks=0
-                )
+                whole = lit_rays(replace(reference, occluders=empty), light, distance, checks=0)
                 return self._tested(whole, light, reference.occluders)
             # Obstacles near the light paths of an area light are searched once for all its samples.
             near_shapes = None
             if area is not None and not isinstance(light, DirectionalLight):
                 ball = Ball(area.centre, area.radius)
                 near_shapes = self._once(
-                    ("near", area.name, shadows),
-                    lambda: obstacles(reference, ball, self.distance, shapes),
+                    ("near", area.name, shadows, beyond),
+                    lambda: obstacles(reference, ball, distance, shapes),
                 )
             # Intervals by geometry stay as they are: random checks would only say how far to trust
             # them.
-            return lit_rays(
-                reference, light, self.distance, shapes=shapes, known=near_shapes, checks=0
-            )
+            return lit_rays(reference, light, distance, shapes=shapes, known=near_shapes, checks=0)
 
-        return self._once(
-            ("reach", _place_of(light), shadows, None if area is None else area.name), lit_parts
-        )
+        key = "reach", _place_of(light), shadows, None if area is None else area.name, beyond
+        return self._once(key, lit_parts)
 
     def _tested(self, reach: LitRays, light: ReferenceLight, occluders: "mi.Scene") -> LitRays:
         """Return the lit parts of rays by shadow rays from the middles of
@@ -326,11 +349,14 @@ def scattering_paths(
     how many stand for an area light.
     """
     reference = replace(view.reference, lights=scenery.lights(view.reference))
-    between = None if ends is None else view.ends(ends)
-    # A directional light comes through a medium without bounds only where its
-    # density falls with height.
-    far = bool(reference.media) or isinstance(reference.medium, HeightMedium)
-    edge = EDGES.get("smoothstep" if scenery.blend else scenery.edge)
+    between, corners = (None, ()) if ends is None else (view.ends(ends), ends.corners)
+    # A directional light comes through a medium without bounds only where its density falls with
+    # height, or where the scene's own equation does not attenuate it.
+    far = (
+        bool(reference.media)
+        or isinstance(reference.medium, HeightMedium)
+        or reference.model.light_scale == 0
+    )
     paths = []
     # A source is one light of the scene; `source.lights` are the light points that stand for it.
     for number, source in enumerate(light_sources(reference, samples, scenery.radius)):
@@ -342,17 +368,17 @@ def scattering_paths(
             light = _whole_within(given, scenery.blend) if scenery.blend else given
             # Which parts of rays a light reaches, their nodes, and another edge of a spot on these.
             if 0 in layers and (far or not isinstance(light, DirectionalLight)):
-                reach = view.reach(light, shadows=shadows, area=source.area)
+                reach = view.reach(light, shadows=shadows, area=source.area, ends=ends)
                 if isinstance(light, DirectionalLight):
                     lit_nodes = parallel_nodes(reference, light, reach, between)
                 else:
-                    lit_nodes = point_nodes(reference, light, reach, between)
-                nodes.append(_edged(lit_nodes, light, source, edge))
+                    lit_nodes = point_nodes(reference, light, reach, between, corners)
+                nodes.append(_edged(lit_nodes, light, source, scenery))
             if 1 in layers and reference.occluders.shapes():
                 lit = surface_points(
                     reference, light, view.distance, *view.reflected(light, shadows=shadows)
                 )
-                points.append(_edged(lit, light, source, edge))
+                points.append(_edged(lit, light, source, scenery))
         paths.append(
             LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(points))
         )
@@ -425,13 +451,15 @@ def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float)
     return Source(name, 4 * light.intensity / plan.most, samples, light.position)
 
 
-def _edged(
-    places: Places, light: Light, source: Source, edge: Callable[[Array], Array] | None
-) -> Places:
+def _edged(places: Places, light: Light, source: Source, scenery: Scenery) -> Places:
     """Return places with another edge of a spot, and scaled so that the samples of a sphere
     send as much light as the sphere.
     """
-    factor = _over_own_edge(edge, places.towards, light) if edge else 1.0
+    factor: Array | float = 1.0
+    if scenery.edge == "rim":
+        factor = _rim(scenery.rim, places.towards, light)
+    elif edge := EDGES.get("smoothstep" if scenery.blend else scenery.edge):
+        factor = _over_own_edge(edge, places.towards, light)
     if source.centre is not None and isinstance(light, ReferenceLight):
         # All samples together send `level` times the light of the sphere: it is divided out. Where
         # no sample sends, it is 0.
@@ -490,6 +518,15 @@ def _whole_within(light: Light, blend: float) -> Light:
     return replace(
         light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0)))
     )
+
+
+def _rim(power: float, towards: Array, light: Light) -> Array:
+    """Return a rim over the scene's own edge of a spot, (n,)."""
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+        return np.ones(len(towards))
+    cosine = np.clip(towards @ light.axis, -1.0, 1.0)
+    part = np.clip((1 - cosine) / (1 - np.cos(light.cutoff)), 0.0, 1.0)
+    return np.asarray((1 - part**power) * _over_own_edge(np.ones_like, towards, light))
 
 
 def _over_own_edge(edge: Callable[[Array], Array], towards: Array, light: Light) -> Array:

@@ -345,7 +345,7 @@ def test_a_place_is_found_where_pixels_are_lit_or_dark():
 
     (position,) = (each for each in FAULTS if each.name == "light-position")
     place_of = Fault("place", "", lambda predictor, guess, p: p, position.parameters)
-    search = _Search(SimpleNamespace(fog=None, errors=errors), (place_of,))
+    search = _Search(SimpleNamespace(unchanged=None, errors=errors), (place_of,))
     begun = np.zeros(3)
     np.testing.assert_array_equal(search.by_steps(begun, 0.01, False), begun)
     np.testing.assert_allclose(search.along_axes(begun, 0.01), true, atol=0.01)

@@ -184,19 +184,23 @@ def test_height_fog_by_hand():
 def test_light_by_distance_is_what_the_words_say():
     r = np.array([0.5, 1.0, 2.0, 5.0])
 
+    def law(*words: str, values: tuple[float, ...] = ()) -> np.ndarray:
+        fog, surface = changed(fault(*words), *values).fog.law
+        assert fog is surface
+        return fog(r)
+
     def window(*words: str, values: tuple[float, ...]) -> np.ndarray:
         found = changed(fault(*words), *values).fog.window
         assert found is not None
         return found(r)
 
-    np.testing.assert_allclose(
-        window("(r^2 + e)", "softened", values=(1.0,)), [0.2, 0.5, 0.8, 25 / 26]
-    )
+    softened = [0.2, 0.5, 0.8, 25 / 26]
+    np.testing.assert_allclose(law("(r^2 + e)", "softened", values=(1.0,)), softened)
     disk = 2 / (r**2 + 4 + r * np.sqrt(r**2 + 4))
-    np.testing.assert_allclose(window("that of a disk", values=(2.0,)) / r**2, disk)
-    ended = np.array([0.2, 0.5, 0.8, 0.0]) * (1 - np.minimum(r / 4, 1) ** 4) ** 2
-    np.testing.assert_allclose(window("and ends by", values=(1.0, 4.0)), ended)
+    np.testing.assert_allclose(law("that of a disk", values=(2.0,)) / r**2, disk)
     s = np.minimum(r / 4, 1)
+    np.testing.assert_allclose(law("and ends by", values=(1.0, 4.0)), softened)
+    np.testing.assert_allclose(window("and ends by", values=(1.0, 4.0)), (1 - s**4) ** 2)
     for words, expected in {
         "(1 - (r/R)^4)^2 with R = {0": (1 - s**4) ** 2,
         "by 1 - (r/R)^4": 1 - s**4,
@@ -205,8 +209,8 @@ def test_light_by_distance_is_what_the_words_say():
         "they end at": (s < 1).astype(float),
     }.items():
         np.testing.assert_allclose(window("lights have a range", words, values=(4.0,)), expected)
-    assert changed(fault("not over its square")).fog.distance_power == 1
-    assert changed(fault("does not fall with the distance")).fog.distance_power == 0
+    np.testing.assert_allclose(law("not over its square") / r**2, 1 / r)
+    np.testing.assert_allclose(law("does not fall with the distance") / r**2, 1)
 
 
 def test_spots_and_places_are_those_of_the_scenery():

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from airlight.analytic.height_fog import HeightFog
+from airlight.analytic.phase import HenyeyGreenstein, Isotropic, Rayleigh
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import read_reference
 from airlight.validation.engine import faults, stages
 from airlight.validation.engine.decide import Candidates
@@ -22,6 +24,7 @@ from airlight.validation.engine.starts import STARTS
 from airlight.validation.engine.targets import GUESSES
 from airlight.validation.engine.traits import traits
 from airlight.validation.engine.transforms import (
+    LAWS,
     LAYERS,
     LOBES,
     MIXES,
@@ -35,6 +38,10 @@ from airlight.validation.fog_model.radiance import Fog
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 
+def of_physics(scene):
+    return SimpleNamespace(reference=scene, observation=SimpleNamespace(equation=PHYSICAL))
+
+
 def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
     monkeypatch.setattr(faults, "traits", lambda predictor: defaultdict(lambda: True))
     sun = {"type": "directional", "direction": [0.3, 0.2, -1.0], "irradiance": 2.0}
@@ -45,8 +52,7 @@ def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
 
     def words_of(reference):
         return [
-            fault.words.format(1.5)
-            for fault in faults_of(SimpleNamespace(reference=reference))[len(FAULTS) :]
+            fault.words.format(1.5) for fault in faults_of(of_physics(reference))[len(FAULTS) :]
         ]
 
     words = words_of(scene)
@@ -74,7 +80,7 @@ def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
 def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
     monkeypatch.setattr(faults, "traits", lambda predictor: defaultdict(lambda: False))
     scene = read_reference(mi.load_dict(tiny_scene()))
-    found = faults_of(SimpleNamespace(reference=scene))
+    found = faults_of(of_physics(scene))
     assert found == tuple(fault for fault in FAULTS if not fault.needs)
     assert 0 < len(found) < len(FAULTS)
 
@@ -82,7 +88,19 @@ def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
 def test_every_formula_has_a_fault_and_a_key_that_nothing_reads_is_an_error():
     """A misspelt key of the table would leave a fault without its needs in silence."""
     text = Path(faults.__file__).with_name("faults.toml").read_text(encoding="utf-8")
-    for table in (OPTICS, LOBES, PHASES, LAYERS, WINDOWS, MIXES, VALUES, TURNS, GUESSES, STARTS):
+    for table in (
+        OPTICS,
+        LOBES,
+        PHASES,
+        LAYERS,
+        LAWS,
+        WINDOWS,
+        MIXES,
+        VALUES,
+        TURNS,
+        GUESSES,
+        STARTS,
+    ):
         assert [name for name in table if f'"{name}"' not in text] == []
     row = {"name": "albedo", "words": "the albedo was applied twice", "optics": "albedo twice"}
     assert faults._fault("medium", row).kind == "medium"
@@ -108,14 +126,17 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         lights=lights,
         shapes=("ball",),
         media=(),
+        suns=(),
+        model=PHYSICAL,
         holds="total",
         values=values,
         shape=(3, 4),
         **fog,
     ):
-        phase = SimpleNamespace(is_constant=True)
+        phase = Isotropic()
         reference = SimpleNamespace(
             lights=lights,
+            directional=suns,
             media=media,
             medium=SimpleNamespace(phase=phase),
             occluders=SimpleNamespace(shapes=lambda: shapes),
@@ -125,8 +146,9 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         predictor = SimpleNamespace(
             reference=reference,
             fog=Fog(**(plain | ones | {"moved": ((0.0,) * 3,)} | fog)),
-            observation=SimpleNamespace(holds=holds, values=values),
+            observation=SimpleNamespace(holds=holds, values=values, equation=model),
             shape=shape,
+            unchanged=None,
             shown=lambda guess: values,
             predicted=lambda guess: values - 0.1,
         )
@@ -144,6 +166,7 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         "all light",
     }
     usual |= {"both", "absorption", "lobes", "g", "oblong", "colours", "more light"}
+    usual |= {"physics", "known g"}
     assert found() == usual
     assert found(holds="airlight") == usual - {"all light", "both"}
     assert found(holds="surface") == usual - {"all light", "both", "fog", "lobes", "g"}
@@ -155,9 +178,10 @@ def test_traits_of_a_scene_and_its_image_by_hand():
     assert found(lights=lights[:1]) == usual - {"spots", "soft spots"}
     assert found(lights=lights[1:]) == usual - {"point lights"}
     assert found(lights=lights[2:]) == usual - {"point lights", "soft spots"}
-    assert found(media=(SimpleNamespace(phase=SimpleNamespace(is_constant=False)),)) == usual - {
-        "no bounds"
-    }
+    assert found(media=(SimpleNamespace(phase=HenyeyGreenstein(0.3)),)) == usual - {"no bounds"}
+    assert found(media=(SimpleNamespace(phase=Rayleigh()),)) == usual - {"no bounds", "known g"}
+    assert found(suns=(None,)) == usual | {"suns"}
+    assert found(model=Model(light_path="off")) == usual - {"physics", "more light"}
     assert found(shape=(6, 2)) == usual
     assert found(shape=(4, 4)) == usual - {"oblong"} | {"square"}
     assert found(values=values[:, :1] * np.ones(3)) == usual - {"colours"}

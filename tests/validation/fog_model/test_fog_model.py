@@ -90,7 +90,7 @@ def test_laws_can_be_changed_one_by_one(variant):
             {"planar": frozenset({"nodes"})},
             summed(sigma_t * (nodes.x * (direction @ axis) + nodes.r)),
         ),
-        ({"distance_power": 1.0}, summed(sigma_t * (nodes.x + nodes.r), 1.0)),
+        ({"law": (lambda r: r, None)}, summed(sigma_t * (nodes.x + nodes.r), 1.0)),
         (
             {"window": lambda r: np.exp(-r)},
             summed(sigma_t * (nodes.x + nodes.r), factor=np.exp(-nodes.r)),
@@ -101,7 +101,7 @@ def test_laws_can_be_changed_one_by_one(variant):
         assert model.layers(replace(fog, **law))[0][:, 0] == pytest.approx(wanted, rel=1e-9)
 
 
-@pytest.mark.parametrize("law", [{"window": lambda r: np.exp(-r)}, {"distance_power": 1.0}])
+@pytest.mark.parametrize("law", [{"window": lambda r: np.exp(-r)}, {"law": (lambda r: r,) * 2}])
 def test_the_light_of_a_sun_falls_with_no_distance(variant, tmp_path, law):
     """A range of the lamps beside it leaves it as it is."""
     path = tmp_path / "fog.xml"
@@ -119,11 +119,11 @@ def test_the_light_of_a_sun_falls_with_no_distance(variant, tmp_path, law):
 def test_a_channel_without_extinction_attenuates_no_unbounded_ray():
     """It was no number in all channels of such a medium: infinity times 0."""
     fog = Fog(((0.1, 0.0, 0.2),), ((1.0,) * 3,), (None,), (1.0,), (1.0,), (1.0,), ((0.0,) * 3,))
-    rays = SimpleNamespace(direction=np.array([[0.0, 0.0, 1.0]] * 2), origin=np.zeros(3))
+    rays = SimpleNamespace(direction=np.array([[0.0, 0.0, 1.0]] * 2), origin=np.zeros(3), media=())
     view = SimpleNamespace(
         reference=rays,
         axis=rays.direction[0],
-        length=np.array([[np.inf], [5.0]]),
+        distance=np.array([np.inf, 5.0]),
         ray_pixel=np.arange(2),
     )
     expected = [[0.0, 1.0, 0.0], [np.exp(-0.5), 1.0, np.exp(-1.0)]]

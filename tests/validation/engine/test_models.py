@@ -1,0 +1,365 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: an image of an engine's own equation is called that, and what is wrong beside it is named
+on top of it; no image of a fault alone is called an engine's equation.
+
+The images are marched in NumPy (`tests.helpers.model_march`), which shares neither the lit intervals
+nor the sums of the hypotheses.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.model import PHYSICAL, Model
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.engine import stages
+from airlight.validation.engine.decide import Candidates
+from airlight.validation.engine.diagnose import diagnose_file, diagnose_image
+from airlight.validation.engine.equations import (
+    asked_words,
+    equation_sentence,
+    faults_of_terms,
+    model_sentence,
+    terms_that_matter,
+)
+from airlight.validation.engine.fault import Fault
+from airlight.validation.engine.faults import FAULTS
+from airlight.validation.engine.observation import judged_layer, observation_of
+from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
+from airlight.validation.engine.search import Explanation
+from airlight.validation.fog_model.equation import fog_of_model
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.models import PRESETS, model_of
+from tests.helpers.model_images import model_image
+
+EQUATIONS = [fault for fault in FAULTS if fault.equation]
+
+
+def of_medium(reference, **changed):
+    return replace(reference, medium=replace(reference.medium, **changed))
+
+
+#: Images with one thing wrong, by its name; functions of a scene and of steps.
+WRONG = {
+    "right": lambda own, steps: model_image(own, steps).sum(axis=0),
+    "factor": lambda own, steps: 1.7 * model_image(own, steps).sum(axis=0),
+    "extinction": lambda own, steps: model_image(
+        of_medium(own, sigma_t=1.4 * own.medium.sigma_t), steps
+    ).sum(axis=0),
+    "no-shadow": lambda own, steps: model_image(own, steps, shadows=False).sum(axis=0),
+}
+
+
+class Setting:
+    """A scene at a size, and what all diagnoses of its images share."""
+
+    def __init__(self, scene, size):
+        self.loaded = load_scene(scene, size)
+        self.size = size
+        self.light = SceneLight(read_reference(self.loaded.scene))
+        self.physical = quadrature_image(self.light.reference, checks=1)
+
+    def diagnosed(self, words, wrong="right", *, given=False, steps=256, noise=0.01):
+        """Return the diagnosis of an image of an equation, with something wrong beside it; `given`:
+        whether the equation is asked for.
+        """
+        model = model_of(words)
+        own = read_reference(self.loaded.scene, model)
+        values = WRONG[wrong](own, steps)
+        scatter = np.random.default_rng(7).standard_normal((*values.shape[:2], 1))
+        reference = quadrature_image(own, checks=1) if given else self.physical
+        return diagnose_image(
+            Image({"total": values * (1 + noise * scatter)}),
+            replace(self.loaded, model=model) if given else self.loaded,
+            layer="total",
+            pixel="centre",
+            light=SceneLight(own) if given else self.light,
+            reference_of=lambda pixel: reference,
+        )
+
+
+@pytest.fixture(scope="module")
+def settings(variant):
+    known = {}
+
+    def setting(scene, size=(48, 36)):
+        if scene not in known:
+            known[scene] = Setting(scene, size)
+        return known[scene]
+
+    return setting
+
+
+@pytest.mark.parametrize(
+    ("words", "numbers"),
+    [
+        ("playcanvas:range=8,extinction=0.6", (8.0, 0.6)),
+        pytest.param("o3de", (0.45, 0.45, 0.6), marks=pytest.mark.slow),
+    ],
+)
+def test_an_equation_is_named_with_its_numbers(variant, words, numbers):
+    diagnosis = Setting("sphere-spot", (32, 24)).diagnosed(words)
+    assert diagnosis.first == words.partition(":")[0], [row.words for row in diagnosis.ranked]
+    assert diagnosis.ranked[0].parameters == pytest.approx(numbers, rel=0.02)
+    assert diagnosis.explained
+    assert not diagnosis.model
+
+
+def test_a_fault_is_named_on_top_of_an_equation(variant):
+    setting = Setting("sphere-spot", (32, 24))
+    said = setting.diagnosed("playcanvas:range=8", "factor", given=True)
+    assert said.first == "factor"
+    assert said.ranked[0].parameters == pytest.approx((1.7,), rel=0.01)
+    assert "in the equation of playcanvas" in said.lines[0]
+    right = setting.diagnosed("playcanvas:range=8", given=True, steps=1024, noise=0.002)
+    assert right.first == "right"
+
+
+def test_a_file_is_diagnosed_in_the_equation_that_is_asked_for(variant, tmp_path):
+    model, scene = model_of("unreal:froxel=0.4"), load_scene("sphere-spot", (24, 18)).scene
+    image = quadrature_image(read_reference(scene, model), checks=1)
+    path = tmp_path / "image.exr"
+    write_exr(path, Image({"airlight": image.airlight}, attributes={"airlight:pixel": "centre"}))
+    (said,) = diagnose_file(path, "sphere-spot", model=model)
+    assert (said.first, said.model) == ("right", model.name)
+
+
+def test_surfaces_have_the_equation_that_the_fog_tells(variant, tmp_path):
+    """Alone they do not tell whose equation it is: many engines have the same on surfaces."""
+    model, scene = model_of("playcanvas:range=7"), load_scene("sphere-spot", (24, 18)).scene
+    image = quadrature_image(read_reference(scene, model), checks=1)
+    layers = {"airlight": image.airlight, "surface": image.surface}
+    path = tmp_path / "image.exr"
+    write_exr(path, Image(layers, attributes={"airlight:pixel": "centre"}))
+    fog, surface = diagnose_file(path, "sphere-spot")
+    assert (fog.first, fog.solves) == ("playcanvas", "playcanvas:range=7,extinction=1")
+    assert "--model playcanvas:range=7,extinction=1" in "\n".join(fog.lines)
+    assert (surface.first, surface.model) == ("right", model.name)
+
+
+#: Scenes with lamps and suns, and the equations that differ from physics in them. On open-fog no ray
+#: ends, and all fogs of one colour are alike.
+LAMPS = (
+    "playcanvas:range=13,extinction=0.6",
+    "three",
+    "godot:range=11",
+    "bevy:range=30,bounding_radius=9",
+    "eevee:cutoff_distance=11,shadow_soft_size=0.3",
+    "hdrp",
+    "unreal:froxel=0.4",
+    "flax:cell=0.5",
+)
+COLOURS = ("filament:color=0.2,0.3,0.4", "o3de")
+NAMED = [
+    *(("open-fog", words) for words in LAMPS),
+    *(("sphere-spot", words) for words in (*LAMPS, *COLOURS)),
+    *(("street", words) for words in (*LAMPS, *COLOURS)),
+    *(("meadow", words) for words in ("babylon", "playcanvas:extinction=0.6", "godot", *COLOURS)),
+    *(("meadow", words) for words in ("hdrp", "unreal:froxel=1", "flax:cell=1")),
+    ("valley", "babylon"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scene", "words"), NAMED)
+def test_each_equation_is_named_first(settings, scene, words):
+    diagnosis = settings(scene).diagnosed(words, noise=0.005)
+    assert diagnosis.first == words.partition(":")[0], [row.words for row in diagnosis.ranked]
+    assert not diagnosis.ranked[0].together
+    # Noise, and the steps of the march at the edges of shadows, which neighbours share.
+    assert diagnosis.left < 0.05 * diagnosis.residual
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["open-fog", "sphere-spot", "meadow"])
+def test_an_equation_that_is_physics_is_right(settings, scene):
+    assert settings(scene).diagnosed("diligent").first == "right"
+
+
+@pytest.mark.slow
+def test_an_equation_of_one_term_is_that_fault(settings):
+    """Babylon with its extinction differs from physics by the light path alone."""
+    assert settings("meadow").diagnosed("babylon:enableExtinction=1").first == "light-path"
+
+
+#: Of three.js, where nothing is attenuated, another extinction is another brightness of the fog.
+ALIKE = {("three", "extinction"): "fog-factor"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", ["factor", "extinction", "no-shadow"])
+@pytest.mark.parametrize("words", [*LAMPS, *COLOURS])
+def test_one_fault_beside_an_equation_that_is_asked_for_is_named(settings, words, wrong):
+    diagnosis = settings("sphere-spot").diagnosed(words, wrong, given=True)
+    assert diagnosis.first == ALIKE.get((words, wrong), wrong)
+    assert diagnosis.explained
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", ["factor", "extinction", "no-shadow"])
+def test_one_fault_beside_an_equation_is_named_with_it(settings, wrong):
+    diagnosis = settings("sphere-spot").diagnosed("playcanvas:range=8,extinction=0.6", wrong)
+    assert set(diagnosis.ranked[0].together) == {"playcanvas", wrong}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("light-path=off,law=clamped:1.9", {"light-path", "distance-law"}),
+        ("light-path=off,law=power:1", {"light-path", "distance-law"}),
+        ("light-path=off,range=cut:2.9", {"light-path", "light-range"}),
+    ],
+)
+def test_law_and_light_path_are_a_pair(settings, words, names):
+    """Both are near the light; an equation of no engine has them alone."""
+    diagnosis = settings("sphere-spot").diagnosed(words)
+    assert set(diagnosis.ranked[0].together) == names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("light-path=length:5", "light-path"),
+        ("law=clamped:1.9", "distance-law"),
+        ("source=constant:0.1,0.2,0.3", "filament"),
+        ("lit=0.5", "lit-density"),
+    ],
+)
+def test_single_terms_have_names_of_their_own(settings, words, name):
+    assert settings("sphere-spot").diagnosed(words, steps=512).first == name
+
+
+# The parts, by hand.
+
+
+def test_every_engine_has_a_hypothesis_but_physics():
+    assert {fault.name for fault in EQUATIONS} == set(PRESETS) - {"diligent"}
+    assert all(fault.kind == "model" and fault.rank < 0 for fault in EQUATIONS)
+    assert all("physics" in fault.needs for fault in EQUATIONS)
+
+
+@pytest.mark.parametrize("fault", EQUATIONS, ids=lambda fault: fault.equation)
+def test_each_hypothesis_says_its_terms(fault):
+    values = tuple(1.5 + number for number in range(len(fault.parameters)))
+    said = fault.sentence(values)
+    preset = PRESETS[fault.name]
+    assert said.startswith(f"this is the equation of {preset.title} {preset.version}: ")
+    assert "{" not in said
+    # What a user types to look for faults on top of it.
+    assert model_of(asked_words(fault.equation, values)).name == preset.name
+
+
+def test_terms_in_words():
+    model = Model(
+        light_path="length:4",
+        camera_path="0.5",
+        law="clamped:0.1",
+        range="cut:7",
+        depth="axis",
+        source="constant:0.1,0.2,0.3",
+        cap="0.5",
+        surface_light_path="on",
+        surface_law="power:1",
+    )
+    assert model_sentence(model) == (
+        "the fog counts 4 m for the way from the light, the way to the camera counts 0.5 times, "
+        "light falls as 1/r^2, and no more within 0.1 m, lamps end at 7 m, depth along the axis of "
+        "the camera stands for distance, the fog has the colour (0.1, 0.2, 0.3) W/(m^2 sr), "
+        "whatever the lights, it covers 0.5 at most, the way from the light to surfaces is "
+        "attenuated, on surfaces light falls as 1/r^1"
+    )
+    assert model_sentence(replace(model, cap="1")).count("covers") == 0
+    assert model_sentence(PHYSICAL) == "it is the physical one"
+    words, values = "playcanvas:range={0},extinction={1}", (7.99996, 1.00001)
+    assert asked_words(words, values) == "playcanvas:range=8,extinction=1"
+    # Found numbers are told to four digits, and what is 1 to these is no term.
+    assert "R = 8 m" in equation_sentence(words)(values)
+    assert "camera counts" not in equation_sentence(words)(values)
+
+
+@pytest.fixture(scope="module")
+def predictor(variant):
+    loaded = load_scene("sphere-spot", (24, 18))
+    image = Image({"total": np.ones((18, 24, 3))})
+    observation, _ = observation_of(image, judged_layer(image, "", holds="total"), loaded.scene)
+    return Predictor(observation, SceneLight(observation.reference))
+
+
+def test_a_term_matters_if_it_changes_the_image_alone(predictor):
+    def terms(words, *values):
+        return terms_that_matter(predictor, words, values, 0.01)
+
+    # The scene has a hard spot, a lamp five metres from the surfaces, and no sun.
+    assert terms("unreal:froxel={0},AttenuationRadius={1}", 1e-3, 1e6) == ("light-path",)
+    assert terms("unreal:froxel={0},AttenuationRadius={1}", 1.0, 9.0) == (
+        "light-path",
+        "law",
+        "range",
+    )
+    assert terms("flax:cell=0.001,Radius=1e6,suns=1,surface.law=power:2") == ("light-path", "fade")
+
+
+def test_an_equation_whose_terms_do_not_matter_is_not_tried(predictor, monkeypatch):
+    fault = Fault("unreal", "words", None, equation="unreal:froxel=0.001,AttenuationRadius=1e6")
+    plain = replace(fault, name="plain", equation="")
+    guess, errors = predictor.unchanged, np.full((1, 3), 0.1)
+    found = [Explanation((each,), ((),), guess, errors, errors > 0, 0.1) for each in (fault, plain)]
+    by_name = {each.names[0]: each for each in found}
+    monkeypatch.setattr(stages, "explain", lambda predictor, faults, fine: by_name[faults[0].name])
+    monkeypatch.setattr(stages, "_refined", lambda attempt, explanations: explanations)
+    right = replace(found[0], faults=(), values=(), error=1.0)
+    attempt = stages.Attempt(predictor, (fault, plain), Candidates("centre", None, right))
+    assert [each.names for each in attempt.after("quick", None).candidates.tried] == [("plain",)]
+    # One that leaves most of the error is never named: its terms cost nothing.
+    by_name["unreal"] = replace(found[0], error=0.9)
+    assert len(attempt.after("quick", None).candidates.tried) == 2
+
+
+def test_of_what_leaves_the_same_an_equation_is_named_before_and_lit_density_after_a_fault():
+    blocks = SimpleNamespace(is_noise=lambda explanation: True, area=lambda errors, lit: 1.0)
+    errors, lit = np.full((64, 3), 1e-3), np.ones((64, 3), bool)
+
+    def explained(rank, error=1e-3):
+        fault = Fault(f"rank {rank}", "words", None, rank=rank)
+        return Explanation((fault,), ((),), Guess(None), errors, lit, error)
+
+    right = Explanation((), (), Guess(None), 100 * errors, lit, 0.1)
+    tried = tuple(explained(rank) for rank in (1, 0, -1))
+    for count, first in ((1, "rank 1"), (2, "rank 0"), (3, "rank -1")):
+        assert Candidates("centre", blocks, right, tried[:count]).chosen.names == (first,)
+
+
+def test_media_stay_those_of_the_scene_in_an_equation_with_another_phase_function(variant):
+    """What solves the physical equation has the scene's own phase function and albedo."""
+    loaded = load_scene("sphere-spot", (24, 18))
+    image = Image({"total": np.ones((18, 24, 3))})
+    physical = fog_of_model(read_reference(loaded.scene), PHYSICAL)
+    for words in ("three", "hdrp"):
+        model = model_of(words)
+        observation, _ = observation_of(
+            image, judged_layer(image, "", holds="total"), loaded.scene, model=model
+        )
+        asked = Predictor(observation, SceneLight(observation.reference))
+        assert asked.fog == fog_of_model(read_reference(loaded.scene, model), model)
+        (back,) = (each for each in faults_of_terms(model) if each.name == "physical")
+        assert back.change(asked, asked.unchanged, ()).fog == physical
+
+
+def test_terms_of_an_equation_that_is_asked_for_may_be_physical(predictor):
+    model = Model(light_path="off", law="softened:1:16", source="constant:1,1,1", cap="0.5")
+    faults = {fault.name: fault for fault in faults_of_terms(model)}
+    assert list(faults) == ["physical", "light-path", "law", "source"]
+    assert "law=softened:1:16" in faults["law"].words
+    base = Guess(None)
+    assert faults["physical"].change(predictor, base, ()).fog == predictor.unchanged.fog
+    fog = faults["light-path"].change(predictor, base, ()).fog
+    assert (fog.light_segment, fog.most) == ((1.0, 1.0), 0.5)
+    assert faults["source"].change(predictor, base, ()).fog.constant is None
+    # Of a single term, that it is physical is that all is.
+    assert [fault.name for fault in faults_of_terms(Model(light_path="off"))] == ["physical"]
