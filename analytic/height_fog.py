@@ -421,7 +421,7 @@ def height_fog_segments(
 
 @dataclass(frozen=True)
 class _Paths:
-    """What of the paths attenuates: see `height_fog_segments`."""
+    """The parts of the paths that attenuate: see `height_fog_segments`."""
 
     shadow_scale: float
     camera: Array  # of each part

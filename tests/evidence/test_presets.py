@@ -11,7 +11,7 @@ from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.models import PRESETS, model_of
 from tests.helpers.model_march import marched
 
-#: What must be given, and ends that are felt in scenes of this size.
+#: Parameters that must be given, and ends that are felt in scenes of this size.
 GIVEN = {
     "playcanvas": ":extinction=0.5,range=9,maxDistance=12,ambientIntensity=0.1",
     "three": ":distance=12",

@@ -81,7 +81,7 @@ def _begin(starts: str, numbers: Sequence[Number], change: Change) -> Begin | No
     if starts == "all":
         together = tuple(product(*(number.starts for number in numbers)))
         return lambda predictor, guess: together
-    # What the image shows is the first numbers; each of them goes with all starts of the others.
+    # The image shows the first numbers; each of them goes with all starts of the others.
     start = STARTS[starts]
 
     def begin(predictor: Predictor, guess: Guess) -> list[Values]:

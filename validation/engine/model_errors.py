@@ -38,7 +38,7 @@ class PartError:
 
 @dataclass(frozen=True)
 class TermAlone:
-    """What one term does to the physical image without the others."""
+    """The effect of one term on the physical image without the others."""
 
     term: str
     value: str
@@ -89,7 +89,7 @@ class ModelErrors:
 
     @property
     def words(self) -> str:
-        """What the correlation of both parts means; empty where it is small or not known."""
+        """The meaning of the correlation of both parts; empty where it is small or not known."""
         if self.correlation is None or abs(self.correlation) <= _TELLING or not self.total:
             return ""
         assert self.against_physics is not None

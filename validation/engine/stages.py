@@ -82,7 +82,7 @@ def _is_one_term(attempt: Attempt, found: Explanation) -> bool:
     """Return whether one term at most makes the image of an engine's equation: a term is a fault
     with a name of its own.
     """
-    # What leaves most of the error is not named anyway.
+    # An explanation that leaves most of the error is not named anyway.
     if found.error > MOST_LEFT * attempt.candidates.right.error:
         return False
     words = found.faults[0].equation

@@ -106,7 +106,7 @@ def _many_ranges(predictor: Predictor, guess: Guess, change: Change) -> Sequence
 def _usual_distance(predictor: Predictor) -> float:
     """Return the usual distance from a light of what it lights [m]."""
     # By ray, the mean distance of its nodes, which count as 1/r^2: unbounded rays have nodes far
-    # from all light. Of lit surface points where no ray has fog.
+    # from all light. Lit surface points do where no ray has fog.
     observation, means = predictor.observation, [np.empty(0)]
     for each in predictor.light.model(observation, SCENERY, 0).lights:
         nodes, weight = each.nodes, each.nodes.value[:, 0]

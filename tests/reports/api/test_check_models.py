@@ -18,7 +18,7 @@ BROKEN = {
     "bevy:bounding_radius=5,range=none": {"units", "pan", "reciprocity"},
     # Nothing is attenuated on either way, which camera and spot may exchange.
     "three": {"intensity", "sum", "albedo"},
-    # What falls off at a range of ten metres does so in every scene.
+    # A range of ten metres is the same in every scene.
     "hdrp:range=10": {"units", "reciprocity"},
 }
 

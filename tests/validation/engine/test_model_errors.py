@@ -65,7 +65,7 @@ def test_means_add_and_squares_do_with_the_correlation(images):
     squares = [np.mean(part**2) for part in (algorithm, equation)]
     mixed = 2 * found.correlation * np.sqrt(squares[0] * squares[1])
     assert both.rmse == pytest.approx(np.sqrt(sum(squares) + mixed) / mean, rel=1e-12)
-    # What the algorithm does is told of the model's own brightness.
+    # The error of the algorithm is told of the model's own brightness.
     assert found.image.mean == pytest.approx(-0.1, rel=1e-12)
     assert found.image.blocks == 0.5
 

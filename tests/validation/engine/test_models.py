@@ -186,7 +186,7 @@ def test_an_equation_of_one_term_is_that_fault(settings):
     assert settings("meadow").diagnosed("babylon:enableExtinction=1").first == "light-path"
 
 
-#: Of three.js, where nothing is attenuated, another extinction is another brightness of the fog.
+#: In three.js, where nothing is attenuated, another extinction is another brightness of the fog.
 ALIKE = {("three", "extinction"): "fog-factor"}
 
 
@@ -251,7 +251,7 @@ def test_each_hypothesis_says_its_terms(fault):
     preset = PRESETS[fault.name]
     assert said.startswith(f"this is the equation of {preset.title} {preset.version}: ")
     assert "{" not in said
-    # What a user types to look for faults on top of it.
+    # The words that a user types to look for faults on top of it.
     assert model_of(asked_words(fault.equation, values)).name == preset.name
 
 
@@ -336,7 +336,7 @@ def test_of_what_leaves_the_same_an_equation_is_named_before_and_lit_density_aft
 
 
 def test_media_stay_those_of_the_scene_in_an_equation_with_another_phase_function(variant):
-    """What solves the physical equation has the scene's own phase function and albedo."""
+    """A model of the physical equation has the scene's own phase function and albedo."""
     loaded = load_scene("sphere-spot", (24, 18))
     image = Image({"total": np.ones((18, 24, 3))})
     physical = fog_of_model(read_reference(loaded.scene), PHYSICAL)
@@ -361,5 +361,5 @@ def test_terms_of_an_equation_that_is_asked_for_may_be_physical(predictor):
     fog = faults["light-path"].change(predictor, base, ()).fog
     assert (fog.light_segment, fog.most) == ((1.0, 1.0), 0.5)
     assert faults["source"].change(predictor, base, ()).fog.constant is None
-    # Of a single term, that it is physical is that all is.
+    # A single term is physical if all are.
     assert [fault.name for fault in faults_of_terms(Model(light_path="off"))] == ["physical"]
