@@ -109,8 +109,8 @@ FAULTS = {
     ),
     "the sun's path without its cosine": Wrap(
         "airlight.analytic.height_fog:height_fog_sun",
-        lambda function, fog, *others, sun, phase: function(
-            _flat(fog, sun), *others, sun=sun, phase=phase
+        lambda function, fog, *others, sun, **named: function(
+            _flat(fog, sun), *others, sun=sun, **named
         ),
     ),
 }
