@@ -369,15 +369,14 @@ def with_sources(
         opacity = -np.expm1(-route.camera * _depth(reference, route.start, route.end))
         more += np.array(model.constant) * np.minimum(opacity, model.most)
         more += _lobes(reference, route)
-    # Closed forms: 64 roundings of their depths, which are 745 at most where light is left.
-    airlight, error = airlight + more, error + 64 * np.finfo(float).eps * more
     if model.lit_scale is not None:
         k = model.lit_scale
         least = np.maximum(airlight - error, 0.0)
         with np.errstate(invalid="ignore"):  # a light on the ray lights its density without end
             error = np.where(np.isinf(airlight), 0.0, k * np.exp(-k * least) * error)
         airlight = -np.expm1(-k * airlight)
-    return airlight, error
+    # Closed forms: 64 roundings of their depths, which are 745 at most where light is left.
+    return airlight + more, error + 64 * np.finfo(float).eps * more
 
 
 def _scattered(reference: ReferenceScene, route: Route) -> Array:

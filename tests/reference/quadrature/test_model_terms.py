@@ -52,6 +52,8 @@ TERMS = (
         "range": "quartic:8",
         "ends": "spheres:0:60",
     },
+    # Lamps are dense, ambient light is not.
+    {"lit": "0.5", "light_path": "off", "ambient": "0.1,0.2,0.3", "range": "quartic:8"},
     {"lamps": "3", "suns": "2", "depth": "axis", "ends": "planes:1:20", "law": "sphere:1"},
 )
 

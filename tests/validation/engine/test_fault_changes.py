@@ -107,6 +107,21 @@ def test_ways_that_are_not_attenuated(words, segments):
     assert changed(fault(*words)).fog == replace(FOG, **segments)
 
 
+def test_terms_of_engines_alone():
+    constant = changed(fault("however long it is"), 3.0).fog
+    assert constant == replace(FOG, light_segment=(0.0, 0.0), light_length=3.0)
+    assert changed(fault("lamps have no phase function")).fog == replace(FOG, bare=True)
+    assert changed(fault("the fog alone took")).fog.planar == {"nodes", "steps"}
+    # Three times the light without its albedo is what is dense, in the image of all lights.
+    lit = changed(fault("the density is lit"), 3.0).fog
+    assert lit == replace(FOG, albedo=((1.0, 1.0, 1.0),) * 2, lit=3.0)
+    by_light = np.array([[0.1], [0.2], [0.05]]).reshape(3, 1, 1) * np.ones((2, 3, 1, 3))
+    fog, surface = lit.combined(by_light)
+    light = 2.0 * 0.1 + 3.0 * 0.2
+    np.testing.assert_allclose(fog, 1 - math.exp(-3 * light) + 0.05)
+    np.testing.assert_allclose(surface, light + 0.05)
+
+
 def test_another_unit_of_length_dims_lights_at_places_alone():
     predictor = SimpleNamespace(reference=SimpleNamespace(lights=(None,)))
     fog = changed(fault("another unit of length"), 10.0, predictor=predictor).fog
@@ -200,6 +215,7 @@ def test_light_by_distance_is_what_the_words_say():
     np.testing.assert_allclose(law("that of a disk", values=(2.0,)) / r**2, disk)
     s = np.minimum(r / 4, 1)
     np.testing.assert_allclose(law("and ends by", values=(1.0, 4.0)), softened)
+    np.testing.assert_allclose(law("and no more within", values=(2.0,)), [1 / 16, 1 / 4, 1, 1])
     np.testing.assert_allclose(window("and ends by", values=(1.0, 4.0)), (1 - s**4) ** 2)
     for words, expected in {
         "(1 - (r/R)^4)^2 with R = {0": (1 - s**4) ** 2,
@@ -334,6 +350,7 @@ def test_layers_by_the_opacity_of_the_fog_by_hand():
     assert layers("was not premultiplied") == [pytest.approx([2.0 / 0.75, 8.0, 0.0]), same]
     assert layers("transmittance of the whole ray") == [[0.5, 2.0, 0.0], same]
     assert layers("on the way to the camera twice") == [[2.0, 4.0, 0.0], thinned]
+    assert layers("at most: its opacity", 0.5) == [pytest.approx([2 * 0.5 / 0.75, 4.0, 0.0]), same]
     assert layers("mixed by the fog's opacity") == [[1.5, 2.0, 0.0], thinned]
     assert layers("ambient light", 1.0, 2.0, 3.0) == [[2.75, 5.0, 0.0], same]
 

@@ -147,7 +147,7 @@ def test_surfaces_have_the_equation_that_the_fog_tells(variant, tmp_path):
 #: ends, and all fogs of one colour are alike.
 LAMPS = (
     "playcanvas:range=13,extinction=0.6",
-    "three",
+    "three:distance=40",
     "godot:range=11",
     "bevy:range=30,bounding_radius=9",
     "eevee:cutoff_distance=11,shadow_soft_size=0.3",
@@ -189,7 +189,7 @@ def test_an_equation_of_one_term_is_that_fault(settings):
 
 
 #: In three.js, where nothing is attenuated, another extinction is another brightness of the fog.
-ALIKE = {("three", "extinction"): "fog-factor"}
+ALIKE = {("three:distance=40", "extinction"): "fog-factor"}
 
 
 @pytest.mark.slow
