@@ -24,9 +24,9 @@ medium of height alone: over an interval (a, b)
     K = int sigma_t p exp(-E) dx = p(cos) exp(-E(a)) tau(a,b) phi(q),     q = (1 - dz/mu) tau(a,b),
 
 and for q < 0, from the other end, p(cos) exp(-E(b)) tau(a,b) phi(-q). With a fraction a of the
-depth from the camera and b of that to the sun, dE/dx = sigma_t (a - b dz/mu), and so is q. This is the result of
-plane-parallel single scattering (Chandrasekhar 1960). An unbounded interval that goes down or level
-has an infinite tau(a,b), for which tau phi(q) is 1/(1 - dz/mu).
+depth from the camera and b of that to the sun, dE/dx = sigma_t (a - b dz/mu), and so is q. This is
+the result of plane-parallel single scattering (Chandrasekhar 1960). An unbounded interval that goes
+down or level has an infinite tau(a,b), for which tau phi(q) is 1/(1 - dz/mu).
 
 **Lights at places.** In w = asinh((x - foot)/h), r = h cosh w,
 

@@ -290,16 +290,15 @@ class _Integrand:
             depth *= by_row(paths.of_camera(ray))
         # tau_shadow, of which a model may take a fraction; the path to the light of a place is in
         # parts of its length.
-        if rays.w and paths.light:
-            path = target - place
-            end = dr.minimum(
-                walk.leave(place, path), dr.opaque(mi.Float64, self.terms.shadow_scale)
-            )
-            way_out = on_device(mi.Float64, r.ravel()) * walk.depth(place, path, mi.Float64(0), end)
-            depth += way_out if paths.light == 1 else way_out * dr.opaque(mi.Float64, paths.light)
-        elif paths.light:
-            way_out = walk.depth(place, target, mi.Float64(0), walk.leave(place, target))
-            depth += way_out if paths.light == 1 else way_out * dr.opaque(mi.Float64, paths.light)
+        if paths.light:
+            if rays.w:
+                path, scale = target - place, dr.opaque(mi.Float64, self.terms.shadow_scale)
+                end = dr.minimum(walk.leave(place, path), scale)
+                out = walk.depth(place, path, mi.Float64(0), end)
+                out *= on_device(mi.Float64, r.ravel())
+            else:
+                out = walk.depth(place, target, mi.Float64(0), walk.leave(place, target))
+            depth += out if paths.light == 1 else out * dr.opaque(mi.Float64, paths.light)
         if paths.length:
             depth += dr.opaque(mi.Float64, paths.length) * density
         value = density * dr.exp(-depth)

@@ -53,11 +53,36 @@ def lit_stretches(light: ReferenceLight, rays: Rays, lit: LitIntervals) -> Stret
     middle = 0.5 * (inner0 + inner1)
     misses = inner1 < inner0
     ends = np.where(misses, middle, inner0), np.where(misses, middle, inner1)
-    cuts = np.clip(np.stack([rays.distance(end, ray) for end in ends]), low, high)
-    low, high = np.concatenate([low, *cuts]), np.concatenate([*cuts, high])
     # Each interval falls into three parts: before, in and behind the beam; most have one.
+    return cut_stretches((ray, low, high), *(rays.distance(end, ray) for end in ends))
+
+
+def cut_stretches(stretches: Stretches, *places: Array) -> Stretches:
+    """Return stretches cut at increasing distances along their rays, (stretches,) each [m]."""
+    ray, low, high = stretches
+    cuts = [np.clip(place, low, high) for place in places]
+    low, high = np.concatenate([low, *cuts]), np.concatenate([*cuts, high])
     keep = high > low
-    return np.tile(ray, 3)[keep], low[keep], high[keep]
+    return np.tile(ray, len(cuts) + 1)[keep], low[keep], high[keep]
+
+
+def cut_at(rays: Rays, stretches: Stretches, radius: float) -> Stretches:
+    """Return stretches cut where their rays are at a distance from the light [m]."""
+    ray, half = stretches[0], half_chord(radius, rays.height)
+    return cut_stretches(stretches, (rays.foot - half)[ray], (rays.foot + half)[ray])
+
+
+def clipped(
+    stretches: Stretches, low: Array | float = -np.inf, high: Array | float = np.inf
+) -> Stretches:
+    """Return the parts of stretches that have a length between two distances, numbers or by ray
+    [m].
+    """
+    ray, x0, x1 = stretches
+    x0 = np.maximum(x0, low[ray] if isinstance(low, np.ndarray) else low)
+    x1 = np.minimum(x1, high[ray] if isinstance(high, np.ndarray) else high)
+    keep = x1 > x0
+    return ray[keep], x0[keep], x1[keep]
 
 
 @dataclass(frozen=True)

@@ -46,12 +46,19 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.fields import optical_depth
 from airlight.reference.quadrature.homogeneous import by_medium
 from airlight.reference.quadrature.integrate import WHOLE, Paths, Profile, profile_of
-from airlight.reference.quadrature.intervals import Stretches, camera_segments
+from airlight.reference.quadrature.intervals import (
+    Stretches,
+    camera_segments,
+    clipped,
+    cut_at,
+    cut_stretches,
+)
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.model import Law, Model, Range
 from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
-from airlight.reference.visibility.planes import Rays
+from airlight.reference.visibility.distances import half_chord
+from airlight.reference.visibility.planes import Rays, spot_edge
 
 Array = NDArray[np.float64]
 Weight = Callable[[Array], Array]
@@ -83,13 +90,8 @@ class Route:
 
     def clipped(self, stretches: Stretches) -> Stretches:
         """Return the parts of stretches in the fog."""
-        if not self.cut:
-            return stretches
-        ray, low, high = stretches
         end = np.minimum(self.end, self.faded)
-        low, high = np.maximum(low, self.start[ray]), np.minimum(high, end[ray])
-        keep = high > low
-        return ray[keep], low[keep], high[keep]
+        return clipped(stretches, self.start, end) if self.cut else stretches
 
 
 def route_of(reference: ReferenceScene, distance: Array) -> Route:
@@ -167,9 +169,11 @@ def lamp_terms(
     for radius in cuts:
         stretches = cut_at(rays, stretches, radius)
     if model.range_of is not None:
-        stretches = within(rays, stretches, model.range_of.end)
-    for place in model.fade_of or ():
-        stretches = _cut(stretches, place / (reference.direction @ reference.axis))
+        half = half_chord(model.range_of.end, rays.height)
+        stretches = clipped(stretches, rays.foot - half, rays.foot + half)
+    if model.fade_of is not None:
+        cosine = (reference.direction @ reference.axis)[stretches[0]]
+        stretches = cut_stretches(stretches, *(place / cosine for place in model.fade_of))
     # A light on the ray: the least height of the derivation.
     if law.is_finite:
         rays = replace(rays, height=np.maximum(rays.height, 1e-9 * law.length))
@@ -263,10 +267,7 @@ def edge(kind: str, power: float, cosine: Array, light: ReferenceLight) -> Array
     """Return intensity over that on the axis by the cosine of the angle to it [1]."""
     beam, cutoff = np.cos(light.beam), np.cos(light.cutoff)
     if kind == "angle":
-        angle = np.arccos(cosine)
-        width = light.cutoff - light.beam
-        inside = (angle <= light.cutoff).astype(np.float64)
-        return np.clip((light.cutoff - angle) / width, 0, 1) if width > 0 else inside
+        return spot_edge(cosine, light)
     if kind == "rim":
         # 1 - c = 2 sin^2(angle/2), which keeps its digits near the axis.
         rim = np.maximum(1 - cosine, 0.0) / (2 * np.sin(0.5 * light.cutoff) ** 2)
@@ -293,42 +294,6 @@ def fade_along(reference: ReferenceScene) -> Profile | None:
     cosine = reference.direction @ reference.axis
     # It is 0 behind its end, and above 1 before its beginning.
     return lambda x, ray: np.maximum((end - cosine[ray, None] * x) / (end - full), 0.0)
-
-
-# --- cuts -----------------------------------------------------------------------------------------
-
-
-def within(rays: Rays, stretches: Stretches, radius: float) -> Stretches:
-    """Return the parts of stretches within a distance from the light [m]."""
-    ray, low, high = stretches
-    # half_chord of a ball about the light; a ray beside it keeps nothing.
-    half = _half_chord(rays, radius)[ray]
-    low = np.maximum(low, rays.foot[ray] - half)
-    high = np.minimum(high, rays.foot[ray] + half)
-    keep = high > low
-    return ray[keep], low[keep], high[keep]
-
-
-def cut_at(rays: Rays, stretches: Stretches, radius: float) -> Stretches:
-    """Return stretches cut where rays are at a distance from the light [m]."""
-    half = _half_chord(rays, radius)
-    for sign in (-1, 1):
-        stretches = _cut(stretches, rays.foot + sign * half)
-    return stretches
-
-
-def _half_chord(rays: Rays, radius: float) -> Array:
-    ratio = np.minimum(rays.height / radius, 1.0)
-    return radius * np.sqrt((1 - ratio) * (1 + ratio))
-
-
-def _cut(stretches: Stretches, place: Array) -> Stretches:
-    """Return stretches cut at a distance along each ray, (rays,) [m]."""
-    ray, low, high = stretches
-    at = np.clip(place[ray], low, high)
-    low, high = np.concatenate([low, at]), np.concatenate([at, high])
-    keep = high > low
-    return np.tile(ray, 2)[keep], low[keep], high[keep]
 
 
 # --- factors of rays, and sources without lights ---------------------------------------------------

@@ -136,11 +136,19 @@ def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
     if not light.is_soft or light.axis is None:
         return np.ones_like(theta)
     axial, across = (rays.direction @ light.axis)[:, None], (rays.normal @ light.axis)[:, None]
-    # The cosine at a sample of an area light; else Mitsuba's spot, which falls off linearly in the
-    # angle from `beam` to `cutoff`.
+    # The cosine at a sample of an area light; else Mitsuba's spot.
     if light.cosine:
         return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
-    angle = np.arccos(np.clip(axial * np.sin(theta) + across * np.cos(theta), -1.0, 1.0))
+    return spot_edge(axial * np.sin(theta) + across * np.cos(theta), light)
+
+
+def spot_edge(cosine: Array, light: ReferenceLight) -> Array:
+    """Return the profile of Mitsuba's spot, linear in the angle from `beam` to `cutoff`, by the
+    cosine of the angle to the axis [1].
+    """
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    if not light.is_soft:
+        return (angle <= light.cutoff).astype(np.float64)
     return np.clip((light.cutoff - angle) / (light.cutoff - light.beam), 0.0, 1.0)
 
 

@@ -35,7 +35,9 @@ from airlight.reference.quadrature.intervals import (
     Pieces,
     Stretches,
     camera_segments,
+    clipped,
     cut,
+    cut_at,
     lit_stretches,
     whole,
 )
@@ -44,7 +46,7 @@ from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.distances import crossings
-from airlight.reference.visibility.planes import Rays, falloff, rays_at
+from airlight.reference.visibility.planes import falloff, rays_at
 from airlight.validation.arrays import Array, Bools, Index
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
@@ -122,9 +124,9 @@ def point_nodes(
     """
     # Lit stretches are cut where the medium changes, so that a piece lies in one medium.
     rays = reach.rays
-    stretches = _within(lit_stretches(light, rays, reach.lit), ends)
+    stretches = clipped(lit_stretches(light, rays, reach.lit), *(ends or ()))
     for distance in corners:
-        stretches = _parted(rays, stretches, distance)
+        stretches = cut_at(rays, stretches, distance)
     if reference.media:
         pieces = smooth_pieces(
             reference, rays, camera_segments(reference, reach.distance), stretches
@@ -184,7 +186,7 @@ def parallel_nodes(
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
-    stretches = _within(sun_stretches(reference, reach), ends)
+    stretches = clipped(sun_stretches(reference, reach), *(ends or ()))
     if isinstance(reference.medium, HeightMedium):
         pieces, depth = _before_sun(reference, light, stretches)
     else:
@@ -298,26 +300,6 @@ def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: A
     around = np.where(np.isfinite(reach), reach, 0.0) - sum(inside)
     # For an unbounded line the rest is negative, and 0 by the same maximum.
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
-
-
-def _within(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches:
-    """Return the parts of lit stretches between the ends of their rays."""
-    ray, x0, x1 = stretches
-    if ends is not None:
-        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
-    inside = x1 > x0
-    return ray[inside], x0[inside], x1[inside]
-
-
-def _parted(rays: Rays, stretches: Stretches, distance: float) -> Stretches:
-    """Return lit stretches, parted where rays are at a distance from the light."""
-    half = np.sqrt(np.maximum(distance**2 - rays.height**2, 0.0))
-    for x in (rays.foot - half, rays.foot + half):
-        ray, x0, x1 = stretches
-        middle = np.clip(x[ray], x0, x1)
-        parts = np.tile(ray, 2), np.concatenate([x0, middle]), np.concatenate([middle, x1])
-        stretches = _within(parts, None)
-    return stretches
 
 
 def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) -> Pieces:

@@ -192,7 +192,7 @@ def model_of(words: str) -> Model:
             "or light-path=off,law=softened:1:16"
         )
     # A name stands first, before a colon, a comma or the end: terms begin with NAME=.
-    name, after, rest = re.fullmatch(r"([^=:,]*)([=:,]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
+    name, after, rest = re.findall(r"^([^=:,]*)([=:,]?)(.*)$", text, re.DOTALL)[0]
     if after == "=":
         return Model.of(_pairs(text))
     known = (PHYSICAL_NAME, *PRESETS)

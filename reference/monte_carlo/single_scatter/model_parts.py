@@ -15,7 +15,6 @@ import mitsuba as mi
 
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
     Segment,
-    medium_at,
     transmittance,
     unblocked,
 )
@@ -65,7 +64,10 @@ class ModelPart(Part):
         """Return the transmittance from the light along paths to points."""
 
     def depth_to(self, x: "mi.Float64") -> "mi.Spectrum":
-        """Return the optical depth along the rays from the beginning of the fog to x [m]."""
+        """Return the optical depth along the rays from the beginning of the fog to x [m].
+
+        Grids have none in closed form; terms that need it are refused there.
+        """
         raise NotImplementedError
 
     def cut(self) -> Self:
@@ -161,19 +163,12 @@ class ModelStretch(ModelPart, Stretch):
         """Return the transmittance from the light."""
         if self.terms.light is None:
             return dr.select(self.seen(path, active), mi.Spectrum(1), 0), sampler
-        # The walk begins in vacuum beyond all shapes, in the medium that the path names, or in the
-        # one that is looked for now.
-        at_light = path.medium
-        if path.end is not None or not self.around.bounded:
-            at_light = dr.zeros(mi.MediumPtr)
-        elif at_light is None:
-            at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
         segment = transmittance(
             self.around,
             path.begin,
             path.away,
             path.length,
-            media=Segment(at_light, self.sigma_t),
+            media=Segment(self.medium_at_light(path, ray, active), self.sigma_t),
             active=active,
             fraction=mi.Float(self.terms.light),
         )

@@ -150,18 +150,21 @@ class Stretch(Part):
         active: "mi.Bool",
     ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
-        # The walk begins in the medium at the light: vacuum beyond all shapes, the medium that the
-        # path names, or the one that is looked for now.
-        at_light = path.medium
-        if path.end is not None or not self.around.bounded:
-            at_light = dr.zeros(mi.MediumPtr)
-        elif at_light is None:
-            at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
-        media = Segment(at_light, self.sigma_t)
+        media = Segment(self.medium_at_light(path, ray, active), self.sigma_t)
         segment = transmittance(
             self.around, path.begin, path.away, path.length, media=media, active=active
         )
         return segment * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
+
+    def medium_at_light(self, path: Path, ray: Ray, active: "mi.Bool") -> "mi.MediumPtr":
+        """Return the media in which paths begin: vacuum beyond all shapes, the one that the path
+        names, or the one that is looked for now.
+        """
+        if path.end is not None or not self.around.bounded:
+            return dr.zeros(mi.MediumPtr)
+        if path.medium is not None:
+            return path.medium
+        return medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
 
 
 def double_ray(origin: "mi.Point3d", direction: "mi.Vector3d") -> Ray:
