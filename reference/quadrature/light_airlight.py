@@ -78,18 +78,23 @@ def light_airlight(
         end = np.maximum(route.end, distance)
         illumination = lit_rays(reference, light, end, checks=checks, shapes=shapes)
     rays, lit, angle = illumination.rays, illumination.lit, np.full(len(distance), np.pi)
-    if isinstance(light, DirectionalLight):
-        strength = light.irradiance
-        radiance, error = _sun_sums(reference, light, illumination, route)
-    else:
-        strength = light.intensity
-        radiance, error = lit_sums(reference, light, rays, lit, route, shadow_scale)
-        # The angle at the camera between ray and light counts where the foot of the light is before
-        # the surface.
+    # The angle at the camera between ray and light counts where the foot of the light is before
+    # the surface.
+    if not isinstance(light, DirectionalLight):
         in_front = (rays.foot > 0) & (rays.foot < distance)
         angle = np.where(in_front, np.arctan2(rays.height, rays.foot), angle)
-    error = error + worth_of_doubt(reference, rays, lit) * strength
-    factor = strength_of(reference, light) * ray_factor(reference, route)
+    # A light that the equation leaves out has no integral, which may be infinite.
+    strength = strength_of(reference, light)
+    if not strength:
+        none = np.zeros((len(distance), 3))
+        return LightAirlight(none, none, angle, lit, reached)
+    if isinstance(light, DirectionalLight):
+        radiance, error = _sun_sums(reference, light, illumination, route)
+        error = error + worth_of_doubt(reference, rays, lit) * light.irradiance
+    else:
+        radiance, error = lit_sums(reference, light, rays, lit, route, shadow_scale)
+        error = error + worth_of_doubt(reference, rays, lit) * light.intensity
+    factor = strength * ray_factor(reference, route)
     return LightAirlight(factor * radiance, factor * error, angle, lit, reached)
 
 

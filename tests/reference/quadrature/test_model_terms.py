@@ -256,3 +256,11 @@ def test_density_grids_agree_with_samples(variant, terms):
     error = means.std(ddof=1) / np.sqrt(len(means))
     assert abs(image.airlight.mean() - means.mean()) < 4 * error
     assert error < 0.01 * means.mean()  # half a fraction of a path would be 10 %
+
+
+@pytest.mark.parametrize("terms", [{"lamps": "0"}, {"source": "constant:1,2,3"}])
+def test_a_lamp_on_the_ray_that_the_equation_leaves_out_is_no_matter(variant, lamp_ahead, terms):
+    """0 times an infinite airlight is no number."""
+    image = reference_image(lamp_ahead, model=Model(**terms))
+    assert np.isfinite(image.airlight).all()
+    assert np.isfinite(image.airlight_error).all()
