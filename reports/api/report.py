@@ -23,6 +23,7 @@ from airlight.reports.api.inputs import (
     Scenes,
     Size,
     Values,
+    Words,
     chosen_model,
     exclude,
     note,
@@ -38,6 +39,7 @@ from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
     from airlight.reference.scene.model import Model
+    from airlight.reports.api.engines import EnginesReport
     from airlight.reports.data import records
     from airlight.reports.diff.compare import Difference
     from airlight.validation.engine.images import EngineImage
@@ -143,16 +145,25 @@ def report(
     settings: Values = (),
     images: File | None = None,
     model: ModelLike | None = None,
+    engines: Words | None = None,
+    diagnose: bool = False,
+    adapters: File | None = None,
+    limit: float = 300.0,
     output: File | None = None,
     from_: File | None = None,
     figures: Literal["single", "double"] | None = None,
     fresh: bool = False,
     cluster: str | None = None,
     progress: Progress = None,
-) -> Report:
+) -> "Report | EnginesReport":
     """Measure methods in scenes and write the report, one page.
 
     The page is report.html, next to report.json and each image as EXR and PNG.
+
+    With `--engines` it is a report on engines that others wrote: each renders each scene, as
+    `airlight capture` does, and its image is judged by physics and by the equation that its
+    settings mean. The page is engines.html, next to engines.json. An engine that cannot have a
+    scene has a reason in place of numbers; the exit status is 1 if an adapter failed.
 
     Results that this machine measured before, with the same code and scenes, come from the cache;
     the times of a scene are of one run of all its methods, and are measured again if any of these
@@ -178,13 +189,24 @@ def report(
         Airlight kernel of the methods; may be given several times.
     settings
         NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
+        With engines ENGINE.NAME=VALUE, a setting of that engine by its own name.
     images
         Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to
-        compare with the reference.
+        compare with the reference. With engines a folder with captures, SCENE.ENGINE.exr, which
+        are judged in place of new ones.
     model
         For images: judge them by the equation of an engine, such as playcanvas:range=8, see
         `airlight list models`; by default by that which a capture names. Methods are judged by the
         physical equation.
+    engines
+        all, or names of adapters of `airlight capture`, such as playcanvas,three. Six scenes of 160x120 pixels by
+        default.
+    diagnose
+        With engines: also look for faults in each image, which takes a minute each.
+    adapters
+        With engines: the folder of their adapters, as of `airlight capture`.
+    limit
+        With engines: the longest time that one image may take [s].
     output
         Folder for the report; airlight-report by default.
     from_
@@ -214,6 +236,33 @@ def report(
     >>> report.claims[0]  # doctest: +SKIP
     'The reference is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
+    if engines is not None:
+        of_methods: dict[str, Any] = {
+            "quick": quick,
+            "full": full,
+            "method": method,
+            "kernel": kernel,
+        }
+        of_methods |= {"model": model, "from": from_, "figures": figures, "fresh": fresh}
+        exclude("engines", "no method is measured", {**of_methods, "cluster": cluster})
+        if images is not None:
+            of_engines: dict[str, Any] = {"size": size, "set": settings, "adapters": adapters}
+            exclude("images", "the engines are not run", of_engines)
+        from airlight.reports.api.engines import report_on_engines
+
+        return report_on_engines(
+            engines,
+            several(scenes),
+            size=size,
+            settings=settings,
+            images=images,
+            adapters=adapters,
+            limit=limit,
+            diagnose=diagnose,
+            output=Path(FOLDER if output is None else output),
+            progress=progress,
+        )
+    exclude("report", "they belong to --engines", {"diagnose": diagnose, "adapters": adapters})
     # An old report is drawn again: nothing is measured, and options of measurement are mistakes.
     # With --figures, scenes and methods choose what the strip shows.
     if from_ is not None:
@@ -503,6 +552,7 @@ def diff(
 ) -> "ReportDifference":
     """Compare two reports: what got slower or less accurate.
 
+    Two reports on engines are compared as well: which numbers moved, and which verdicts turned.
     The result also has what got better, what is new and what is gone.
 
     Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding.
@@ -522,7 +572,15 @@ def diff(
     """
     from airlight.reports.data.records import read_report
     from airlight.reports.diff.compare import compare_reports
+    from airlight.reports.engines.record import engines_file
 
+    # Reports on engines have no times.
+    on_engines = engines_file(Path(old)), engines_file(Path(new))
+    if on_engines[0] and on_engines[1]:
+        from airlight.reports.api.engines import difference_of_engines
+
+        moved = difference_of_engines(on_engines[0], on_engines[1])
+        return ReportDifference(old=str(old), new=str(new), difference=moved)
     # An infinite tolerance leaves times out.
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))

@@ -14,7 +14,7 @@ from typing import Any
 
 from airlight.errors import InputError
 from airlight.reports.data.records import Report, Scene
-from airlight.reports.diff.times import Finding, TimeComparison, compare_times
+from airlight.reports.diff.times import NO_TIMES, Finding, TimeComparison, compare_times
 from airlight.reports.report.claims import confirmed
 from airlight.reports.tables.agreement import verdict
 from airlight.reports.tables.costs import TIMES, WORK, same_records
@@ -87,11 +87,18 @@ def compare_reports(
             "size; "
             "give two reports of the same scenes with the same effort"
         )
+    return difference_of(findings, compared, times)
+
+
+def difference_of(
+    findings: list[Finding], compared: int, times: TimeComparison = NO_TIMES
+) -> Difference:
+    """Return the difference that some findings make, the worse ones first."""
     # The sort is stable: within a verdict the order of the reports stays.
     rank = {"worse": 0, "better": 1, "note": 2}
-    findings.sort(key=lambda finding: rank[finding.verdict])
+    ordered = tuple(sorted(findings, key=lambda finding: rank[finding.verdict]))
     worse = sum(finding.verdict == "worse" for finding in findings)
-    return Difference(worse, tuple(findings), compared, times)
+    return Difference(worse, ordered, compared, times)
 
 
 # Errors, scene by scene and method by method

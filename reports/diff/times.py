@@ -50,6 +50,10 @@ class TimeComparison:
     drift: float  #: median ratio of all frames
 
 
+#: Nothing was timed.
+NO_TIMES = TimeComparison(0, True, (), 1.0, 1.0, 1.0)
+
+
 def compare_times(
     old: Report, new: Report, *, tolerance: float | None
 ) -> tuple[TimeComparison, list[Finding]]:

@@ -23,6 +23,10 @@ _WRONG, _MISSING = 2, 3  # exit statuses of an adapter, which are ours
 _PACKAGES = {"node": ["nodejs", "npm"]}
 
 
+class CannotError(InputError):
+    """The engine cannot have the scene or the setting: its adapter refused."""
+
+
 @dataclass(frozen=True)
 class Told:
     """The line that an adapter prints."""
@@ -45,16 +49,7 @@ def adapter_command(engine: str, adapters: Any = None) -> list[str]:
     Raises InputError for an engine without an adapter, and MissingError where there are none, or
     what runs the adapter is missing.
     """
-    clone = Path(__file__).resolve().parents[2] / "docs" / "adapters"
-    folder = clone if adapters is None else Path(adapters)
-    if not folder.is_dir():
-        if adapters is not None:
-            raise InputError(f"adapters: {folder} is no folder; expected one with adapters")
-        raise MissingError(
-            "the adapters of engines lie in docs/adapters of a clone of airlight, and not in an "
-            "installed package; name their folder by --adapters"
-        )
-    found = {path.stem: path for path in sorted(folder.iterdir()) if _runner(path)}
+    folder, found = _adapters(adapters)
     if engine not in found:
         raise InputError(
             f"engine: got {engine!r}, expected one with an adapter in {folder}: "
@@ -69,6 +64,28 @@ def adapter_command(engine: str, adapters: Any = None) -> list[str]:
             f"{install_line(packages)}"
         )
     return [runner, *more, str(found[engine].resolve())]
+
+
+def adapter_names(adapters: Any = None) -> list[str]:
+    """Return the names of the adapters in a folder, or in the clone, as of `adapter_command`."""
+    folder, found = _adapters(adapters)
+    if not found:
+        raise InputError(f"adapters: {folder} has none; see docs/adapters/README.md")
+    return list(found)
+
+
+def _adapters(adapters: Any) -> tuple[Path, dict[str, Path]]:
+    """Return a folder and the adapters in it by their names."""
+    clone = Path(__file__).resolve().parents[2] / "docs" / "adapters"
+    folder = clone if adapters is None else Path(adapters)
+    if not folder.is_dir():
+        if adapters is not None:
+            raise InputError(f"adapters: {folder} is no folder; expected one with adapters")
+        raise MissingError(
+            "the adapters of engines lie in docs/adapters of a clone of airlight, and not in an "
+            "installed package; name their folder by --adapters"
+        )
+    return folder, {path.stem: path for path in sorted(folder.iterdir()) if _runner(path)}
 
 
 def _runner(path: Path) -> list[str]:
@@ -86,8 +103,8 @@ def run_adapter(engine: str, command: Sequence[str], *, limit: float, folder: Pa
     """Run an adapter for at most `limit` [s], and return what it says; temporary files of browsers
     lie in `folder`, and go with it.
 
-    Raises InputError for what the engine cannot have, and where the adapter fails or is too slow,
-    and MissingError where it misses a program.
+    Raises CannotError for what the engine cannot have, InputError where the adapter fails or is too
+    slow, and MissingError where it misses a program.
     """
     import msgspec
 
@@ -108,7 +125,7 @@ def run_adapter(engine: str, command: Sequence[str], *, limit: float, folder: Pa
     if ended.status:
         words = _last(ended.errors) or "it said nothing"
         if ended.status == _WRONG:
-            raise InputError(words)
+            raise CannotError(words)
         if ended.status == _MISSING:
             raise MissingError(words)
         raise InputError(f"{engine}: its adapter failed with the status {ended.status}: {words}")

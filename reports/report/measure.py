@@ -7,14 +7,10 @@ report appear when it is whole.
 """
 
 import gc
-import os
-import shutil
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +19,7 @@ from airlight.errors import InputError
 from airlight.realtime.child_process import EndedError
 from airlight.realtime.methods.shader.source import is_shader
 from airlight.reference.scene.model import Model
-from airlight.reference.storage.files import NO_SPACE, alone, ensure_folder
+from airlight.reference.storage.files import ensure_folder
 from airlight.reference.storage.store import Kept, date, fresh_results
 from airlight.reports.data.records import (
     SCHEMA,
@@ -42,6 +38,7 @@ from airlight.reports.page.render import render_page
 from airlight.reports.report.claims import claims, growth_claims, own_fault, unstudied
 from airlight.reports.report.others import other_parts, paper_rows
 from airlight.reports.report.scene import folder_of, write_scene
+from airlight.reports.report.staged import staged
 from airlight.validation.columns import record_of
 from airlight.validation.scenes.names import scene_stem
 from airlight.validation.scenes.registry import FOG_SCENES
@@ -120,7 +117,7 @@ def write_report(
         noted(notes)
     # Not before the scenes are known to be right: a mistake leaves no empty folder.
     target = ensure_folder(folder)
-    with fresh_results(since), staged(target) as hidden:
+    with fresh_results(since), staged(target, images_before) as hidden:
         # The bar gives each part the time that it is expected to take; a cached part takes none,
         # and the page a second for each scene.
         others = other_parts(study)
@@ -199,6 +196,11 @@ def write_report(
     return report
 
 
+def images_before(folder: Path) -> Iterator[str]:
+    """Yield the names of the images of the report in a folder."""
+    return named_files(load_report(folder)[0])
+
+
 def _begins(progress: Progress, seconds: Mapping[str, float]) -> Callable[[str], None]:
     """Return what tells that a part of a scene begins, by its name;
     `seconds`: what each part takes.
@@ -259,58 +261,3 @@ def _refuse_twins(scenes: Sequence[str]) -> None:
             raise InputError(
                 f"scenes: two scenes are called {name}; give each once, or rename one of the files"
             )
-
-
-# A folder out of sight until it is whole ----------------------------------------------------------
-
-_PREFIX = ".airlight-report-"
-
-
-@contextmanager
-def staged(target: Path) -> Iterator[Path]:
-    """Give a hidden folder in `target` whose files move there when the block
-    ends without an exception.
-
-    Files of the same name are replaced one by one, the page and its data last; images that only the
-    report before named go, all else stays. Any exception, a KeyboardInterrupt too, leaves the
-    target as it was; that of a full disk names the target. Raises InputError if another process is
-    writing a report there.
-    """
-    # A killed run leaves its hidden folder behind; it is removed after a day, as a younger one may
-    # belong to a run that is still at work.
-    for left in target.glob(f"{_PREFIX}*"):
-        with suppress(FileNotFoundError):  # another report has ended since
-            if time.time() - left.stat().st_mtime > 86400:
-                shutil.rmtree(left, ignore_errors=True)
-    hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
-    try:
-        with alone(target):
-            yield hidden
-            _move(hidden, target)
-    except OSError as error:
-        if error.errno in NO_SPACE:  # what was being written is a name that nobody knows
-            raise OSError(error.errno, error.strerror, str(target)) from error
-        raise
-    finally:
-        shutil.rmtree(hidden, ignore_errors=True)
-
-
-def _move(hidden: Path, target: Path) -> None:
-    """Move the files of a hidden folder into the target, and remove the images that only
-    the report before named.
-    """
-    # The names of the old report, before its data are replaced.
-    files, before = [path for path in hidden.rglob("*") if path.is_file()], set[Path]()
-    with suppress(InputError):  # there was none, or of another version
-        report, folder = load_report(target)
-        before = {folder / name for name in named_files(report)}
-    # Images first, page and data last: a reader who opens the page meanwhile finds every image that
-    # it names.
-    for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
-        place = target / path.relative_to(hidden)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(path, place)
-        before.discard(place)
-    # Images of the old report that the new one has not.
-    for path in before:
-        path.unlink(missing_ok=True)

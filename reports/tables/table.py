@@ -221,6 +221,8 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
     shown = 100 * value if percent or column.percent else value
     if isinstance(value, int) and shown is value:
         text = str(value)
+    elif column.percent and abs(shown) >= 1000:
+        text = f"{shown:.0f}"  # an exponent is no percentage that one reads
     elif column.places is not None:
         text = f"{shown:.{column.places}f}"
     elif column.whole:

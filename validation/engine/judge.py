@@ -242,11 +242,24 @@ def with_model(
     """
     if loaded.model.is_physical:
         return compared
+    return replace(compared, model=errors_of(compared, judged, loaded, mask, progress))
+
+
+def errors_of(
+    compared: EngineComparison,
+    judged: JudgedLayer,
+    loaded: LoadedScene,
+    mask: Bools | None = None,
+    progress: Progress | None = None,
+) -> ModelErrors:
+    """Return the errors of the scene's equation, which may be the physical one, and of an image
+    against both.
+    """
     shown = judged.values.astype(np.float64)
     if mask is not None:
         shown = np.where(np.asarray(mask)[:, :, None], shown, np.nan)
     tell, side = _telling(progress), compared.verdict.block
-    errors = model_errors(
+    return model_errors(
         shown,
         loaded.model,
         lambda model: expected_layer(
@@ -254,7 +267,6 @@ def with_model(
         ),
         lambda correct, other: _block_errors(correct, other, side)[0],
     )
-    return replace(compared, model=errors)
 
 
 def _within_total(compared: EngineComparison, margin: float) -> EngineComparison:

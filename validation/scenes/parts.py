@@ -90,11 +90,13 @@ def height_fog(
     *,
     albedo: Sequence[float],
     phase: Plugin,
+    clamped: bool = False,
 ) -> Plugin:
     """Return height fog with the id 'fog': one or two layers of extinction [1/m],
     base and scale height [m].
 
-    `floor` and `cap` are the heights where it ends [m].
+    `floor` and `cap` are the heights where it ends [m]; `clamped` layers are constant below their
+    bases.
     """
     numbers = {
         f"{name}_{i}": value
@@ -106,7 +108,7 @@ def height_fog(
     return {
         "type": "heterogeneous",
         "id": "fog",
-        "sigma_t": {"type": "heightfog", "to_world": box} | numbers,
+        "sigma_t": {"type": "heightfog", "to_world": box, "clamped": clamped} | numbers,
         "has_spectral_extinction": False,  # see `validation.scenes.files.media.grey_densities`
         "albedo": {"type": "rgb", "value": list(albedo)},
         "phase": phase,

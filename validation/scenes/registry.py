@@ -13,7 +13,7 @@ Each scene is a table with these keys; lengths are in metres, angles in degrees,
 * `animation`: what moves in it, see `Animation`; `clouds`: whether light is
   scattered many times in it;
 * `fog`: the medium around all, with `sigma_t` (one number or RGB) [1/m], `albedo`, and `phase` in
-  words of `analytic.phase.phase_from_words`; or with `layers`; or with `smoke`, whose densities
+  words of `analytic.phase.phase_from_words`; or with `layers`, which may be `clamped`; or with `smoke`, whose densities
   `sigma_t` multiplies;
 * `camera`: `origin`, `target` and the horizontal `fov`;
 * `lights`: each with `name`, `type`, `colour` (intensity, irradiance or radiance) and what
@@ -261,7 +261,12 @@ def _medium(table: Table, shape: str = "") -> Plugin:
     if "layers" in table:
         register_height_fog()
         return height_fog(
-            table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase
+            table["layers"],
+            table["floor"],
+            table["cap"],
+            albedo=table["albedo"],
+            phase=phase,
+            clamped=table.get("clamped", False),
         )
     medium = fog(table["sigma_t"], table["albedo"], phase)
     if "smoke" in table:

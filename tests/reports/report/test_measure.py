@@ -3,14 +3,10 @@
 again, and efforts add parts.
 """
 
-import errno
 import importlib
 import json
-import os
-import time
 from dataclasses import asdict, replace
 from functools import wraps
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,7 +16,7 @@ from airlight.errors import InputError
 from airlight.realtime.child_process import EndedError
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.reports.data.records import named_files, read_report, report_text
-from airlight.reports.report.measure import staged, write_report
+from airlight.reports.report.measure import write_report
 from airlight.reports.report.others import other_parts
 from airlight.reports.report.scene import file_stems, folder_of, reference_record
 from airlight.validation.kernels.records import Stability
@@ -29,7 +25,6 @@ from airlight.validation.study.configuration import Configuration, configuration
 from airlight.validation.study.run import PROBE
 from airlight.validation.study.study import STUDIES, Checks, Measure, Study, standard_study
 from airlight.validation.timing import Scaling
-from tests.helpers.page import small_report, write_report_files
 from tests.helpers.reports import growth_record, record_of, stable
 from tests.helpers.scenes import LAMP, scene_xml
 
@@ -317,7 +312,7 @@ def test_a_fault_of_a_function_that_runs_here_ends_the_report_and_nothing_is_wri
 ):
     with pytest.raises(InputError, match=rf"test_measure\.py, line \d+: {words}"):
         again(written, tmp_path, configurations=(configuration(method),))
-    assert content_names(tmp_path) == []
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 @pytest.mark.claim("own-method-process")
@@ -487,101 +482,6 @@ def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
     assert "growth" in {claim.kind for claim in data.claims}
     assert data.parts["scaling"] > 0
     assert "As the work grows" in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
-def content_names(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-
-
-def content(folder):
-    return {
-        str(path.relative_to(folder)): path.read_text()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
-def test_files_appear_when_the_block_ends(tmp_path):
-    (tmp_path / "report.html").write_text("old")
-    (tmp_path / "mine.txt").write_text("mine")
-    with staged(tmp_path) as hidden:
-        (hidden / "fog").mkdir()
-        (hidden / "fog" / "a.exr").write_text("image")
-        (hidden / "report.html").write_text("new")
-        assert (tmp_path / "report.html").read_text() == "old"
-    assert content(tmp_path) == {"report.html": "new", "mine.txt": "mine", "fog/a.exr": "image"}
-    assert hidden.exists() is False
-
-
-@pytest.mark.claim("files-whole-or-not-at-all")
-def test_two_reports_never_mix_in_one_folder(tmp_path):
-    """The second of two at once is refused; a later one drops the images of the first,
-    and keeps a user's file.
-    """
-    folder = write_report_files(tmp_path / "r")
-    (folder / "mine.txt").write_text("mine")
-    images = set(named_files(small_report()))
-    there = set(content_names(folder))
-    assert images < there
-    with staged(folder) as hidden:
-        with (
-            pytest.raises(InputError, match=r"another run is writing into .*another folder"),
-            staged(folder),
-        ):
-            pass
-        (hidden / "report.json").write_text("{}")
-        kept = min(images)
-        (hidden / kept).parent.mkdir(parents=True, exist_ok=True)
-        (hidden / kept).write_text("new")
-    assert set(content_names(folder)) == {*there - images, "report.json", "mine.txt", kept}
-    assert (folder / kept).read_text() == "new"
-
-
-@pytest.mark.claim("files-whole-or-not-at-all")
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError])
-def test_an_exception_leaves_everything_as_it_was(tmp_path, stop):
-    (tmp_path / "report.html").write_text("old")
-
-    def work():
-        with staged(tmp_path) as hidden:
-            (hidden / "report.html").write_text("half")
-            raise stop
-
-    with pytest.raises(stop):
-        work()
-    assert content(tmp_path) == {"report.html": "old"}
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
-
-
-@pytest.mark.claim("files-whole-or-not-at-all")
-def test_a_full_disk_names_the_folder_that_the_user_knows_and_other_faults_are_as_they_are(
-    tmp_path,
-):
-    for number, name in ((errno.ENOSPC, str(tmp_path)), (errno.EACCES, "hidden.exr")):
-        with pytest.raises(OSError, match=os.strerror(number)) as raised, staged(tmp_path):
-            raise OSError(number, os.strerror(number), "hidden.exr")
-        assert raised.value.filename == name
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_remains_that_another_report_removes_first_are_no_fault(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        Path, "glob", lambda folder, words: iter([folder / ".airlight-report-gone"])
-    )
-    with staged(tmp_path) as hidden:
-        (hidden / "report.json").write_text("{}")
-    assert (tmp_path / "report.json").exists()
-
-
-def test_the_remains_of_a_killed_run_go_after_a_day(tmp_path):
-    for name, hours in (("old", 25), ("young", 23)):
-        remains = tmp_path / f".airlight-report-{name}"
-        remains.mkdir()
-        (remains / "a.exr").write_text("half")
-        os.utime(remains, times=(time.time() - 3600 * hours,) * 2)
-    with staged(tmp_path):
-        pass
-    assert content_names(tmp_path) == [".airlight-report-young/a.exr"]
 
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Two reports on engines compared: which numbers moved, and which verdicts turned."""
+
+from collections.abc import Iterator
+
+from airlight.errors import InputError
+from airlight.reports.diff.compare import Change, Difference, difference_of
+from airlight.reports.diff.times import Finding
+from airlight.reports.engines.record import Cell, Engines, LayerErrors
+
+#: Errors that are equal but for rounding: images in half floats move blocks by 2e-5 of their mean,
+#: and kernels of another machine the reference by less.
+_RELATIVE, _ABSOLUTE = 0.01, 5e-5
+
+
+def compare_engines(old: Engines, new: Engines) -> Difference:
+    """Return what moved between two reports; those without a common number are refused."""
+    before, after = (
+        {(cell.scene, cell.engine): cell for cell in report.cells} for report in (old, new)
+    )
+    findings, compared = [], 0
+    for scene, engine in before:
+        if (scene, engine) not in after:
+            # A report may be on some of the engines and scenes.
+            findings.append(Finding("note", scene, engine, "not in the new report"))
+            continue
+        found, count = _cell(before[scene, engine], after[scene, engine])
+        findings += found
+        compared += count
+    for scene, engine in after:
+        if (scene, engine) not in before:
+            findings.append(Finding("note", scene, engine, "new"))
+    if not compared:
+        raise InputError(
+            "reports: no number can be compared: no engine was judged in one scene of both; give "
+            "two reports on the same engines and scenes"
+        )
+    return difference_of(findings, compared)
+
+
+def _cell(old: Cell, new: Cell) -> tuple[list[Finding], int]:
+    """Compare an engine in a scene."""
+    scene, engine = old.scene, old.engine
+    findings = []
+    if old.status != new.status:
+        said = f"{new.status}, and was {old.status}" + (f": {new.reason}" if new.reason else "")
+        return [Finding("better" if new.layers else "worse", scene, engine, said)], 0
+    if old.title != new.title:
+        findings.append(Finding("note", scene, engine, f"{new.title} in place of {old.title}"))
+    if old.headline and new.headline and old.headline != new.headline:
+        findings.append(Finding("note", scene, engine, f"the diagnosis says: {new.headline}"))
+    compared = 0
+    for layer in old.layers:
+        other = new.layer(layer.layer)
+        if other is None:
+            findings.append(Finding("worse", scene, engine, f"{layer.layer} gone"))
+            continue
+        compared += len(layer.blocks)
+        findings += [
+            Finding(verdict, scene, engine, what, was, now)
+            for verdict, what, was, now in _layer(layer, other)
+        ]
+    return findings, compared
+
+
+def _layer(old: LayerErrors, new: LayerErrors) -> Iterator[Change]:
+    """Yield verdict, number, and both values of all that moved in a layer."""
+    if old.right != new.right:
+        said = f"{old.layer} {'right' if new.right else 'no longer right'} by its equation"
+        yield "better" if new.right else "worse", said, None, None
+    for name, was in old.blocks.items():
+        now = new.blocks[name]
+        if was is None or now is None:
+            if was is not now:
+                yield "worse", f"{old.layer} {name}", was, now
+        elif abs(now - was) > _ABSOLUTE + _RELATIVE * was:
+            # Another equation is neither worse nor better.
+            verdict = "note" if name == "equation" else "worse" if now > was else "better"
+            yield verdict, f"{old.layer} {name}", was, now
