@@ -11,7 +11,8 @@ Read in this order:
 - `reference.py`: `reference`
 - `compare.py`: `compare`, with `--diagnose` and `--fit`
 - `check.py`: `check`, relations between frames
-- `report.py`: `report`, `diff`, `paper`
+- `report.py`: `report`; `engines.py`: that on engines of others
+- `diff.py`: `diff` of two reports; `paper.py`: `paper`
 - `sweep.py`: `sweep`
 - `explore.py`: `describe`, `view`
 - `capture.py`: `capture`, a scene in an engine of others

@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.report`, `airlight.diff` and `airlight.paper`: the error report, two of them
-compared, claims of papers.
-"""
+"""`airlight.report`: the error report."""
 
-import math
 import os
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from airlight.errors import InputError, nearest
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     File,
     Kernels,
@@ -41,9 +38,7 @@ if TYPE_CHECKING:
     from airlight.reference.scene.model import Model
     from airlight.reports.api.engines import EnginesReport
     from airlight.reports.data import records
-    from airlight.reports.diff.compare import Difference
     from airlight.validation.engine.images import EngineImage
-    from airlight.validation.papers.claims import Claim
     from airlight.validation.study.study import Study
 
 FOLDER = "airlight-report"  #: where a report is written by default
@@ -542,186 +537,3 @@ def _done(report: "records.Report") -> str:
     kept = kept_words(report)
     more = f"; {kept}; --fresh measures again" if kept else ""
     return f"{report.computed} results in {report.seconds:.0f} s{more}"
-
-
-def diff(
-    old: File,
-    new: File,
-    *,
-    time_tolerance: float = 0.25,
-) -> "ReportDifference":
-    """Compare two reports: what got slower or less accurate.
-
-    Two reports on engines are compared as well: which numbers moved, and which verdicts turned.
-    The result also has what got better, what is new and what is gone.
-
-    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding.
-    Times have more noise: the quartiles of both reports say how busy the machine was, and a change
-    must appear in all stages that share it. Times of two machines are compared relative to the
-    median of all. The exit status is 1 if anything is worse, gone, newly refused or no longer
-    finite, or if the reference is no longer confirmed.
-
-    Parameters
-    ----------
-    old
-        The earlier report.json, or its folder.
-    new
-        The later report.json, or its folder.
-    time_tolerance
-        Relative change of a time that counts as noise on a quiet machine; inf compares no times.
-    """
-    from airlight.reports.data.records import read_report
-    from airlight.reports.diff.compare import compare_reports
-    from airlight.reports.engines.record import engines_file
-
-    # Reports on engines have no times.
-    on_engines = engines_file(Path(old)), engines_file(Path(new))
-    if on_engines[0] and on_engines[1]:
-        from airlight.reports.api.engines import difference_of_engines
-
-        moved = difference_of_engines(on_engines[0], on_engines[1])
-        return ReportDifference(old=str(old), new=str(new), difference=moved)
-    # An infinite tolerance leaves times out.
-    tolerance = None if time_tolerance == math.inf else time_tolerance
-    reports = read_report(Path(old)), read_report(Path(new))
-    found = compare_reports(*reports, time_tolerance=tolerance)
-    return ReportDifference(old=str(old), new=str(new), difference=found)
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ReportDifference(Result):
-    """The differences of two reports."""
-
-    old: str  #: file or folder
-    new: str
-    difference: "Difference"  #: every finding
-
-    @property
-    def title(self) -> str:
-        """The two reports."""
-        return f"{self.new} against {self.old}"
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """The findings, the worse ones first."""
-        from airlight.reports.diff.compare import difference_tables
-
-        return difference_tables(self.difference)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """How much was compared."""
-        from airlight.reports.diff.compare import difference_lines
-
-        return difference_lines(self.difference)
-
-    @property
-    def failures(self) -> Sequence[str]:
-        """The findings that are worse."""
-        return [each.words for each in self.difference.findings if each.verdict == "worse"]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return every finding."""
-        from airlight.validation.columns import plain
-
-        return plain(self.difference)
-
-
-@one_error
-def paper(
-    name: str | None = None,
-    *,
-    figures: File | None = None,
-    quick: bool = False,
-    progress: Progress = None,
-) -> "PaperVerdicts":
-    """Give a verdict on every claim of the papers.
-
-    Equations, figures, tables and sentences stand next to what was measured. A verdict is
-    reproduced, not reproduced, differs (it depends on the machine or on a scene of ours) or
-    impossible. This command measures what a verdict needs, or takes it from the cache; all verdicts
-    take about an hour.
-
-    Parameters
-    ----------
-    name
-        biri, billeter, ali or bouthors: also the numbers of the paper that have no verdict, such as
-        frame rates of graphics cards. By default the verdicts of all papers.
-    figures
-        Also draw the pictures of the papers in our scenes into this folder, as PDF
-        and PNG with their data.
-    quick
-        Only the claims that need no image, and small figures.
-    progress
-        Called with (fraction done, what); True shows a bar.
-
-    Raises
-    ------
-    InputError
-        For an unknown paper.
-    """
-    from airlight.reference.storage.store import date
-    from airlight.reports.machine.environment import activate, describe_environment
-    from airlight.reports.report.others import measure_claims
-    from airlight.validation.papers.claims import claims, papers
-
-    # The names are known without Mitsuba.
-    if name is not None and name not in papers():
-        raise InputError(
-            f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers())
-        )
-    chosen = [claim for claim in claims() if name in (None, claim.paper)]
-    activate()
-    # Measurements come from the cache where code and scenes are the same. With `quick` only rows
-    # that need no image are measured.
-    with telling(progress, "paper") as tell:
-        rows = measure_claims(chosen, quick=quick, progress=tell)
-    written: tuple[str, ...] = ()
-    if figures is not None:
-        from airlight.reports.figures.papers import write_figures
-
-        with telling(progress, "figures") as tell:
-            written = write_figures(Path(figures), name, quick=quick, progress=tell)
-    return PaperVerdicts(
-        measured=date(),
-        environment=describe_environment(),
-        papers=tuple(rows),
-        # Rows that `quick` did not measure are counted, never passed over in silence.
-        left_out=len(chosen) - len(rows),
-        files=written,
-        numbers=name is not None,
-    )
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class PaperVerdicts(Result):
-    """The claims of papers with their verdicts."""
-
-    measured: str  #: date
-    environment: Mapping[str, Any]
-    papers: "tuple[Claim, ...]"
-    left_out: int  #: claims that were not measured
-    files: tuple[str, ...] = field(default=(), repr=False)  #: figures that were written
-    #: whether tables also have the numbers of a paper that have no verdict
-    numbers: bool = field(default=False, repr=False)
-
-    @property
-    def title(self) -> str:
-        """How many claims have each verdict."""
-        from airlight.reports.tables.papers import count_words
-
-        # Numbers without a verdict belong to no count.
-        return count_words([row for row in self.papers if row.verdict is not None])
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """A table of verdicts for each paper, and its numbers."""
-        from airlight.reports.tables.papers import paper_tables
-
-        return paper_tables(self.papers, plain=self.numbers)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The counts, and the figures that were written."""
-        more = [f"{self.left_out} more rows need images: leave out --quick."]
-        return [f"{self.title}.", *(more if self.left_out else []), *self.files]

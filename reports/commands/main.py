@@ -29,12 +29,14 @@ from airlight.reference.storage.build import build
 from airlight.reports.api.capture import capture
 from airlight.reports.api.check import check
 from airlight.reports.api.compare import compare
+from airlight.reports.api.diff import diff
 from airlight.reports.api.explore import describe, view
 from airlight.reports.api.export import export
 from airlight.reports.api.inputs import Files, output_files
+from airlight.reports.api.paper import paper
 from airlight.reports.api.reference import reference
 from airlight.reports.api.render import render
-from airlight.reports.api.report import diff, paper, report
+from airlight.reports.api.report import report
 from airlight.reports.api.sweep import sweep
 from airlight.reports.commands.list import list as list_
 from airlight.reports.commands.test import run_tests

@@ -22,15 +22,15 @@ from .reference.storage.exr import write_exr as write_exr
 from .reports.api.capture import capture as capture
 from .reports.api.check import check as check
 from .reports.api.compare import compare as compare
+from .reports.api.diff import diff as diff
 from .reports.api.explore import describe as describe
 from .reports.api.explore import view as view
 from .reports.api.export import export as export
+from .reports.api.paper import paper as paper
 from .reports.api.rays import rays as rays
 from .reports.api.reference import reference as reference
 from .reports.api.render import load_scene as load_scene
 from .reports.api.render import render as render
-from .reports.api.report import diff as diff
-from .reports.api.report import paper as paper
 from .reports.api.report import report as report
 from .reports.api.sweep import sweep as sweep
 from .reports.commands.list import list as list

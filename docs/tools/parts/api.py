@@ -45,6 +45,7 @@ _RESULTS = (
     "validation.check.judge.Kept",
     "reports.api.explore.Description",
     "reports.api.report.Report",
+    "reports.api.engines.EnginesReport",
     "reports.studies.registry.Study",
     "reports.studies.methods.MethodsStudy",
     "reports.studies.kernels.Integrals",
