@@ -30,6 +30,8 @@ const settings = ({ far }) => ({
   shadowBias: 0.15, // it belongs to the range: less gives acne, more takes shadows from the fog
   nearClip: 0.02,
   frames: 2,
+  // 1 gives intensities below 1 as they are, as a user types them: the engine decodes them as colours
+  plainIntensity: 0,
 });
 
 function refusalOf({ described, lights, medium, hulls }) {
@@ -50,8 +52,8 @@ function refusalOf({ described, lights, medium, hulls }) {
 }
 
 /** Return the equation as terms of `airlight compare --model`; undefined where no term says it. */
-function model(scene, { range, maxDistance, extinction, shadows }) {
-  if (!shadows) return undefined;
+function model(scene, { range, maxDistance, extinction, shadows, plainIntensity }) {
+  if (!shadows || plainIntensity) return undefined;
   const path = extinction === 1 ? '' : `camera-path=${extinction},`;
   const lamps = `law=softened:1,range=quartic:${range},spot=cosine-smooth`;
   return `light-path=off,${path}${lamps},ends=spheres:0:${maxDistance}`;
@@ -105,7 +107,7 @@ async function render({ camera, lights, meshes, medium }, options, edits, canvas
   let sun = null;
   for (const light of lights) {
     const wanted = light.color.map(x => (light.kind === SUN ? x : x / 16)),
-      intensity = Math.max(1, ...wanted);
+      intensity = Math.max(options.plainIntensity ? 0 : 1, ...wanted);
     const entity = new pc.Entity();
     entity.addComponent('light', {
       type: { point: 'omni', spot: 'spot', [SUN]: SUN }[light.kind],

@@ -73,6 +73,14 @@ export function refusal({ described, lights, medium, hulls }) {
   if (odd) return `the adapter brings diffuse surfaces of one colour, and '${odd.name}' is ${how}`;
 }
 
+/** Return whether a point is within a convex mesh. */
+export function inside({ positions, normals }, point) {
+  for (let i = 0; i < positions.length; i += 9)
+    if ([0, 1, 2].reduce((sum, k) => sum + normals[i + k] * (point[k] - positions[i + k]), 0) > 0)
+      return false;
+  return true;
+}
+
 /** The user's mistake: a scene or a setting that the engine cannot have. */
 export class Refused extends Error {
   refused = true;

@@ -12,6 +12,7 @@ changed. Kept captures are half floats, without their sum: `.ci/run` judges them
 import argparse
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,9 @@ from PIL import Image as Picture
 
 import airlight
 from airlight.reference.storage.exr import read_exr
-from airlight.reference.storage.files import temporary_folder
+from airlight.reference.storage.files import temporary_folder, write_text
 from airlight.reports.api.engines import EnginesReport
-from airlight.reports.engines.record import FILE
+from airlight.reports.engines.record import FILE, engines_text
 
 DOCS = Path(__file__).resolve().parents[1]
 KEPT = DOCS / "data" / "captures"
@@ -64,8 +65,17 @@ def keep(made: Path, halves: Path) -> None:
     # A capture of an engine that is gone must not stay.
     shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(parents=True)
-    for path in (*halves.glob("*.exr"), halves / "judged" / FILE):
+    for path in halves.glob("*.exr"):
         shutil.copy(path, KEPT)
+    # Pictures are not kept, and the command is that which renders all.
+    cells = tuple(
+        replace(cell, files={"image": cell.files["image"]} if cell.files else {})
+        for cell in judged.data.cells
+    )
+    scenes = tuple(replace(scene, files={}) for scene in judged.data.scenes)
+    command = "airlight report --engines all"
+    kept = replace(judged.data, command=command, scenes=scenes, cells=cells)
+    write_text(KEPT / FILE, engines_text(kept))
     with Picture.open(halves / "judged" / "strip.png") as strip:
         small = strip.convert("RGB").resize((WIDE, round(WIDE * strip.height / strip.width)))
         small.save(STRIP, quality=88, optimize=True)

@@ -110,8 +110,9 @@ def capture(
 
     The engine is not ours: an adapter sets it up by what `airlight describe` says. The file has the
     layers `airlight` and `surface`. The result names the equation that the settings mean, and the
-    command that judges the image by it. The adapters of a clone are playcanvas and three, which run
-    in Chromium, and eevee; see docs/adapters/README.md.
+    command that judges the image by it. The adapters of a clone are playcanvas, three and
+    babylon, which run in Chromium, eevee and cycles of Blender, and bevy; see
+    docs/adapters/README.md.
 
     The exit status is 2 for what an engine cannot have, and 3 where a program is missing.
 

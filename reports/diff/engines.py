@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from airlight.errors import InputError
 from airlight.reports.diff.compare import Change, Difference, difference_of
 from airlight.reports.diff.times import Finding
-from airlight.reports.engines.record import Cell, Engines, LayerErrors
+from airlight.reports.engines.record import MISSING, Cell, Engines, LayerErrors
 
 #: Errors that are equal but for rounding: images in half floats move blocks by 2e-5 of their mean,
 #: and kernels of another machine the reference by less.
@@ -44,7 +44,10 @@ def _cell(old: Cell, new: Cell) -> tuple[list[Finding], int]:
     findings = []
     if old.status != new.status:
         said = f"{new.status}, and was {old.status}" + (f": {new.reason}" if new.reason else "")
-        return [Finding("better" if new.layers else "worse", scene, engine, said)], 0
+        # An engine that is not on a machine says nothing of its images.
+        absent = MISSING in (old.status, new.status)
+        verdict = "note" if absent else "better" if new.layers else "worse"
+        return [Finding(verdict, scene, engine, said)], 0
     if old.title != new.title:
         findings.append(Finding("note", scene, engine, f"{new.title} in place of {old.title}"))
     if old.headline and new.headline and old.headline != new.headline:

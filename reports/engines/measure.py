@@ -193,6 +193,7 @@ def _judged(
                 noise=verdict.block_noise if np.isfinite(verdict.block_noise) else None,
                 right=verdict.right,
                 verdict=verdict.words,
+                place=compared.place.words if compared.place else "",
             )
         )
     captured = captured_of(image)

@@ -29,6 +29,7 @@ def render_engines(data: Engines, folder: Path) -> str:
         "numbers_table": drawn(numbers_table),
         "facts_table": drawn(facts),
     }
+    environment.filters["error"] = percent_words
     return environment.get_template("engines.html.j2").render(
         data=data,
         claims=engine_sentences(data),
@@ -43,23 +44,32 @@ def _scene(data: Engines, scene: EngineScene, folder: Path) -> dict[str, Any]:
     return {
         "record": scene,
         "picture": _inline(folder, scene.files, "picture"),
-        "columns": [_column(cell, folder) for cell in data.of_scene(scene.name)],
+        "columns": [
+            _column(data, cell, folder)
+            for cell in data.of_scene(scene.name)
+            if cell.status == JUDGED
+        ],
+        "without": [
+            f"{data.title_of(cell.engine)}: {STATUS_WORDS[cell.status]}. {cell.reason}"
+            for cell in data.of_scene(scene.name)
+            if cell.status != JUDGED
+        ],
     }
 
 
-def _column(cell: Cell, folder: Path) -> dict[str, Any]:
+def _column(data: Engines, cell: Cell, folder: Path) -> dict[str, Any]:
     """Return the values of the template of a column."""
     airlight = cell.layer("airlight")
     errors = airlight.errors if airlight else None
     return {
         "cell": cell,
-        "reason": f"{STATUS_WORDS[cell.status]}: {cell.reason}" if cell.status != JUDGED else "",
+        "title": data.title_of(cell.engine),
         "pictures": {kind: _inline(folder, cell.files, kind) for kind in _PICTURES},
         # The settings in full stand behind a click.
         "settings": ", ".join(f"{key}={value}" for key, value in cell.captured.settings.items())
         if cell.captured
         else "",
-        "equation": (errors.terms or "that of physics") if errors else "",
+        "equation": errors.terms.replace(",", ", ") if errors else "",
         "alone": [each for each in errors.terms_alone if each.mean and abs(each.mean) > 1e-4]
         if errors
         else [],
@@ -90,10 +100,10 @@ def strip_bytes(data: Engines, folder: Path) -> bytes:
     scene = next(each for each in data.scenes if each.name == name)
     cells = [cell for cell in data.of_scene(name) if cell.status == JUDGED]
     # The upper row has images, the lower one errors against physics and what is left of them.
-    titles = [f"{cell.title}, {_words(cell, 'total')}" for cell in cells]
-    upper = [(f"{name}, the reference", _read(folder, scene.files["picture"]))]
+    titles = [f"{cell.captured.engine}\n{_words(cell, 'total')}" for cell in cells if cell.captured]
+    upper = [(f"the reference\n{name}", _read(folder, scene.files["picture"]))]
     upper += [(title, _read(folder, cell.files["picture"])) for title, cell in zip(titles, cells)]
-    lower = [("against its own equation:", _blank(upper[0][1]))]
+    lower = [("against its\nown equation:", _blank(upper[0][1]))]
     lower += [(_words(cell, "algorithm"), _read(folder, cell.files["algorithm"])) for cell in cells]
     figure = picture_grid([*upper, *lower], "double", across=len(upper))
     return file_bytes(figure, ".png", dpi=200)

@@ -45,6 +45,7 @@ class LayerErrors:
     noise: float | None  #: error of block means that the scatter of single pixels alone makes [1]
     right: bool  #: whether the image is right by its own equation
     verdict: str  #: the same in words
+    place: str = ""  #: where most of the error against it lies, in words
 
     @property
     def parts(self) -> dict[str, PartError | None]:
@@ -108,6 +109,11 @@ class Engines:
     engines: tuple[str, ...]  #: names of adapters, in their order
     scenes: tuple[EngineScene, ...]
     cells: tuple[Cell, ...]
+
+    def title_of(self, engine: str) -> str:
+        """Return an engine with its version; its adapter's name where it has no image."""
+        titles = [cell.title for cell in self.cells if cell.engine == engine and cell.captured]
+        return titles[0] if titles else engine
 
     def of_scene(self, scene: str) -> list[Cell]:
         """Return the cells of a scene, in the order of the engines."""

@@ -26,7 +26,7 @@ def engines_table(data: Engines) -> Table:
     )
 
     def row(cell: Cell, layer: LayerErrors | None) -> Row:
-        values: dict[str, Value] = {"scene": cell.scene, "engine": cell.title}
+        values: dict[str, Value] = {"scene": cell.scene, "engine": data.title_of(cell.engine)}
         if layer is None:
             return Row(values, reason=f"{STATUS_WORDS[cell.status]}: {cell.reason}")
         judged: dict[str, Value] = {"layer": layer.layer, "right": Verdict(layer.right)}
@@ -75,11 +75,12 @@ def _sentence(data: Engines, engine: str) -> Iterator[str]:
     if not layers:
         return
     # Two ranges and two counts.
-    equation = _range([layer.blocks["equation"] for layer in layers])
+    found = [layer.blocks["equation"] for layer in layers]
+    equation = "that of physics" if not any(found) else f"{_range(found)} off physics"
     algorithm = _range([layer.blocks["algorithm"] for layer in layers])
     scenes = f"{len(layers)} scene{'' if len(layers) == 1 else 's'}"
     right = sum(layer.right for layer in layers)
-    words = f"{judged[0].title} in {scenes}: its equation is {equation} off physics"
+    words = f"{judged[0].title} in {scenes}: its equation is {equation}"
     words += (
         f", its images are {algorithm} off its equation, and {right} of {len(layers)} right by it"
     )

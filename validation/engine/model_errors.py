@@ -99,6 +99,8 @@ class ModelErrors:
         part = f"correlation {self.correlation:+.2f}: the algorithm "
         if both < equation:
             return part + f"hides {100 * (1 - both / equation):.2g} % of the error of its equation"
+        if both > 2 * equation:
+            return part + f"makes the error {both / equation:.2g} times that of its equation"
         return part + f"adds {100 * (both / equation - 1):.2g} % to the error of its equation"
 
 
