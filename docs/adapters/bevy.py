@@ -380,7 +380,7 @@ def draw(scene: Scene, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Bevy:
-    """What the modules of `pybevy` have, by its own names."""
+    """The modules of `pybevy`, by its own names."""
 
     _NAMES = "prelude light camera wgpu render image mesh pbr window winit decorators"
 

@@ -89,15 +89,10 @@ def strip_bytes(data: Engines, folder: Path) -> bytes:
     """Return a PNG file with the reference and the engines side by side, and their errors below, in
     the scene of which most layers were judged; empty where none was.
     """
-    counts = {
-        scene.name: sum(len(cell.layers) for cell in data.of_scene(scene.name))
-        for scene in data.scenes
-        if scene.files
-    }
-    name = max(counts, key=counts.__getitem__, default="")
-    if not counts.get(name):
+    name = data.shown_best
+    scene = next((each for each in data.scenes if each.name == name and each.files), None)
+    if scene is None:
         return b""
-    scene = next(each for each in data.scenes if each.name == name)
     cells = [cell for cell in data.of_scene(name) if cell.status == JUDGED]
     # The upper row has images, the lower one errors against physics and what is left of them.
     titles = [f"{cell.captured.engine}\n{_words(cell, 'total')}" for cell in cells if cell.captured]

@@ -20,7 +20,7 @@ CANNOT: Final = "cannot"  #: the engine refuses the scene
 MISSING: Final = "missing"  #: a program is not on the machine, or an image not in the folder
 FAILED: Final = "failed"
 Status = Literal["judged", "cannot", "missing", "failed"]
-#: What precedes the reason of a cell without an image.
+#: Words before the reason of a cell without an image.
 STATUS_WORDS = {CANNOT: "cannot have it", MISSING: "not run", FAILED: "failed"}
 
 
@@ -109,6 +109,16 @@ class Engines:
     engines: tuple[str, ...]  #: names of adapters, in their order
     scenes: tuple[EngineScene, ...]
     cells: tuple[Cell, ...]
+
+    @property
+    def shown_best(self) -> str:
+        """The scene of which most layers were judged; empty where none was."""
+        counts = {
+            scene.name: sum(len(cell.layers) for cell in self.of_scene(scene.name))
+            for scene in self.scenes
+        }
+        name = max(counts, key=counts.__getitem__, default="")
+        return name if counts.get(name) else ""
 
     def title_of(self, engine: str) -> str:
         """Return an engine with its version; its adapter's name where it has no image."""
