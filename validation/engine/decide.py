@@ -24,10 +24,11 @@ independent pixels, sqrt(2/blocks). One image in thirty of normal noise alone is
 mean over blocks of chi-squares.
 
 **Choice.** The explanation with the most evidence is chosen, or the simplest one of all that are as
-good. A pair of faults is chosen if the second is as sure as the first, in an image that has the
-first one. The fault is named if its evidence and the fraction of the error that it leaves are
-within the limits of `calibration.json`: the diagnosis then names a fault in at most 5 % of the
-right images with errors of engines.
+good. Where something else is wrong anyway, numbers take away some of that too: a number that takes
+away less than a tenth of what is left is none. A pair of faults is chosen if the second is as sure
+as the first, in an image that has the first one. The fault is named if its evidence and the
+fraction of the error that it leaves are within the limits of `calibration.json`: the diagnosis then
+names a fault in at most 5 % of the right images with errors of engines.
 """
 
 import json
@@ -51,6 +52,9 @@ MODEL_ERROR = {"centre": 3e-4, "area": 3e-3}
 #: Fraction of the error of an image: less is no second fault, and no other image. The diagnosis
 #: of the calibration reads it, which chose the limits with it.
 LITTLE = 0.05
+
+_ALIKE = 5.0  #: explanations whose evidence differs by this are as good as one another
+_HARDLY = 0.1  #: fraction of what is left that a number takes away by chance, see the module
 
 _LIMITS = json.loads(Path(__file__).with_name("calibration.json").read_text(encoding="utf-8"))
 #: Least evidence with which a fault is named, and the largest fraction of the error that it may
@@ -179,10 +183,12 @@ class Candidates:
         best = self._best([self.right, *singles])
         if not pairs:
             return best
-        # The second fault must be as sure as the first, in an image that has the first one.
+        # The second fault must be as sure as the first, in an image that has the first one: it
+        # leaves a fraction of what the single fault leaves, or does with as few numbers.
         pair = self._best(pairs)
         is_sure = self.evidence(pair) > self.evidence(best) + LEAST_EVIDENCE
-        return pair if is_sure and pair.error < MOST_LEFT * best.error else best
+        is_simple = bool(best.faults) and pair.parameters <= best.parameters
+        return pair if is_sure and (is_simple or pair.error < MOST_LEFT * best.error) else best
 
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:
         """Return the explanation with the most evidence, or the simplest of all that are as good.
@@ -191,18 +197,25 @@ class Candidates:
         little: fog with a scale height of 10 km is an extinction, and so is fog with a scale height
         of 90 m that fits a rest of 0.1 %.
         """
-        # Explanations whose evidence differs by five are as good as one another.
         weighed = [(self.evidence(each), each) for each in explanations]
         weighed.sort(key=lambda each: -each[0])
         most, best = weighed[0]
         alike = [
-            each for weight, each in weighed if weight >= most - 5.0 or self._is_as_good(each, best)
+            each
+            for weight, each in weighed
+            if weight >= most - _ALIKE
+            or self._is_as_good(each, best)
+            or self._is_hardly_worse(each, best)
         ]
 
-        def cost(each: Explanation) -> tuple[int, int, int]:
-            return each.parameters, len(each.faults), sum(fault.rank for fault in each.faults)
+        def size(each: Explanation) -> tuple[int, int]:
+            return each.parameters, len(each.faults)
 
-        return min(alike, key=cost)
+        # The simplest ones by their evidence. Of those that leave the same the rank decides.
+        least = min(map(size, alike))
+        simplest = [each for each in alike if size(each) == least]
+        same = [each for each in simplest if self.is_same_image(each, simplest[0])]
+        return min(same, key=lambda each: sum(fault.rank for fault in each.faults))
 
     def _is_as_good(self, one: Explanation, best: Explanation) -> bool:
         """Return whether an explanation is nearly the image of the best one, and
@@ -215,6 +228,23 @@ class Candidates:
         noise_too = self.blocks.is_noise(one) or not self.blocks.is_noise(best)
         hardly_more = noise_too and one.error <= (1 + LITTLE) * best.error
         return apart <= LITTLE * self.right.error and (leaves_little or hardly_more)
+
+    def _is_hardly_worse(self, one: Explanation, best: Explanation) -> bool:
+        """Return whether an explanation of fewer numbers leaves hardly more than the best one,
+        where that leaves something which no fault here makes.
+        """
+        fewer = best.parameters - one.parameters
+        if not one.faults or fewer <= 0 or self.is_enough(best):
+            return False
+        return one.error <= min((1 + _HARDLY) ** fewer * best.error, MOST_LEFT * self.right.error)
+
+    def is_same_image(self, one: Explanation, other: Explanation) -> bool:
+        """Return whether two explanations are the same image within noise, or within the error of
+        the fog model.
+        """
+        apart = float(np.abs(one.errors - other.errors).mean())
+        difference = abs(self.evidence(one) - self.evidence(other))
+        return difference <= _ALIKE or apart <= MODEL_ERROR[self.pixel]
 
     def is_named(self, explanation: Explanation) -> bool:
         """Return whether an explanation is within the limits of the calibration."""

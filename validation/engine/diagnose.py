@@ -9,20 +9,27 @@ make, and the data choose.
 3. `decide.py` chooses an explanation, and says whether it is named.
 """
 
+import math
 import os
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from airlight.errors import InputError
+from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.model import Model
 from airlight.reference.storage.exr import NOTE, Image, read_exr
 from airlight.validation.arrays import Progress
-from airlight.validation.engine.decide import Candidates
-from airlight.validation.engine.equations import asked_words
+from airlight.validation.engine.decide import LITTLE, Candidates
+from airlight.validation.engine.equations import asked_words, engine_title
 from airlight.validation.engine.error_place import place_words
+from airlight.validation.engine.hints import find_hints
+from airlight.validation.engine.judge import RIGHT as RIGHT_ERROR
 from airlight.validation.engine.judge import (
     EngineComparison,
     ReferenceOf,
     all_but_few,
+    judge,
     judge_image,
     references,
 )
@@ -34,6 +41,7 @@ from airlight.validation.engine.observation import (
     observation_of,
     pixel_kinds,
     scene_of_size,
+    with_rest,
 )
 from airlight.validation.engine.prediction import Predictor, SceneLight
 from airlight.validation.engine.search import Explanation
@@ -83,6 +91,8 @@ class Diagnosis:
     model: str = ""  #: the equation that the image should solve; empty for the physical one
     #: the equation of an engine that it solves instead, as a user types it; empty for none
     solves: str = ""
+    #: other equations of engines that make the same image within noise, as a user types them
+    alike: tuple[str, ...] = ()
 
     @property
     def lines(self) -> list[str]:
@@ -106,7 +116,7 @@ class Diagnosis:
         if self.first == BLACK:
             return [f"The image is black: {self.verdict}."]
         if self.first == UNEXPLAINED:
-            return [f"Nothing here explains it{place} ({self.verdict})."]
+            return [f"Nothing here explains it{place} ({self.verdict}).", *self._nearest()]
         # A pair of faults is two rows, each of which names both.
         together = [row for row in self.ranked if row.together]
         pair = (
@@ -120,8 +130,29 @@ class Diagnosis:
             f"Without that, values are {_percent(self.left)} off in the mean, which is "
             f"{self.rest or more}.",
         ]
+        if self.alike:
+            titles = " and ".join(
+                f"{engine_title(words)} (--model {words})" for words in self.alike
+            )
+            lines.append(f"The same image within noise is that of {titles}.")
         if self.solves:
             lines.append(f"To look for faults on top of this equation: --model {self.solves}")
+        return lines
+
+    def _nearest(self) -> list[str]:
+        """Return what an image without an explanation may be: the fault that comes nearest, and
+        what no fault here is.
+        """
+        if self.few:
+            return []
+        best = [row for row in self.ranked if row.together] or list(self.ranked[:1])
+        lines = ["It may be the algorithm: few steps, froxels, a shadow map or a low resolution."]
+        if best[0].name != RIGHT and self.left < (1 - LITTLE) * self.residual:
+            lines.append(
+                f"The nearest to it, {' and '.join(row.name for row in best)}, leaves "
+                f"{_percent(self.left)} of {_percent(self.residual)}: "
+                f"{'; and '.join(row.words for row in best)}."
+            )
         return lines
 
 
@@ -137,7 +168,8 @@ def diagnose_file(
     model: Model | None = None,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
-    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both.
+    """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both, or where it
+    has airlight and all light, and no light is seen itself.
 
     A layer that is black, as it should be, says nothing beside another one.
 
@@ -157,6 +189,9 @@ def diagnose_file(
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
     loaded = scene_of_size(scene, several[0].size, path, changes, model)
+    if not any(is_area(each) or each.is_environment() for each in loaded.scene.emitters()):
+        image = with_rest(image)
+        several = layers_of(image, str(path), layer, holds)
     reference_of = references(loaded)
     diagnoses: list[Diagnosis] = []
     for each in several:
@@ -297,10 +332,12 @@ def _concluded(
         first = UNEXPLAINED
     solved = next((i for i, fault in enumerate(chosen.faults) if fault.equation), None)
     solves = ""
+    alike: tuple[str, ...] = ()
     if solved is not None and first != UNEXPLAINED:
         solves = asked_words(chosen.faults[solved].equation, chosen.values[solved])
+        alike = _alike(candidates, chosen)
     # The record has eight rows. Where the error lies is said only if it is not explained.
-    rest = candidates.remainder(chosen)
+    rest = candidates.remainder(chosen) or _right_rest(attempt.predictor, chosen)
     explained = bool(rest) and first != UNEXPLAINED
     return replace(
         diagnosis,
@@ -312,7 +349,49 @@ def _concluded(
         place="" if explained else place_words(attempt.predictor, chosen),
         few="" if explained else few,
         solves=solves,
+        alike=alike,
     )
+
+
+def _right_rest(predictor: Predictor, chosen: Explanation) -> str:
+    """Return what an explanation leaves, in words, where a comparison would call an image right
+    that is as far off; nothing where it would not, or where no fault is chosen.
+    """
+    if not chosen.faults:
+        return ""
+    # The pixels that are looked at; all others count in no block.
+    height, width = predictor.shape
+    predicted, shown = (np.full((height * width, 3), np.nan) for _ in range(2))
+    predicted[predictor.pixels] = predictor.predicted(chosen.guess)
+    shown[predictor.pixels] = predictor.shown(chosen.guess)
+    correct, image = (values.reshape(height, width, 3) for values in (predicted, shown))
+    hints = find_hints(correct, image)
+    verdict = judge(correct, image, hints, ())
+    error = verdict.block_error
+    if error > RIGHT_ERROR:
+        # Means over some pixels of a block have more scatter than those over all of it.
+        part = len(predictor.pixels) / (height * width)
+        error = math.sqrt(max(error**2 - (1 - part) * verdict.block_noise**2, 0.0))
+    is_alike = not hints.words and abs(hints.factor - 1) <= RIGHT_ERROR
+    if not (is_alike and error <= RIGHT_ERROR):
+        return ""
+    size = f"{verdict.block} x {verdict.block} pixels"
+    return f"nothing to a comparison: means over {size} are within {100 * error:.2g} %"
+
+
+def _alike(candidates: Candidates, chosen: Explanation) -> tuple[str, ...]:
+    """Return the equations of other engines that make the same image as a chosen one, as a user
+    types them, the best of each engine.
+    """
+    if len(chosen.faults) > 1:
+        return ()
+    others: dict[str, str] = {}
+    for each in sorted(candidates.tried, key=lambda each: -candidates.evidence(each)):
+        fault = each.faults[0]
+        is_other = len(each.faults) == 1 and fault.equation and fault.name != chosen.names[0]
+        if is_other and candidates.is_same_image(each, chosen):
+            others.setdefault(fault.name, asked_words(fault.equation, each.values[0]))
+    return tuple(others.values())
 
 
 def _ranked(candidates: Candidates, chosen: Explanation) -> list[Ranked]:

@@ -49,9 +49,14 @@ def asked_words(words: str, values: Values) -> str:
 
 
 def equation_title(words: str) -> str:
-    """Return whose equation words name."""
+    """Return whose equation words name, in words on an image."""
+    return f"this is the equation of {engine_title(words)}"
+
+
+def engine_title(words: str) -> str:
+    """Return the engine whose equation words name, with its version."""
     preset = PRESETS[words.partition(":")[0]]
-    return f"this is the equation of {preset.title} {preset.version}"
+    return f"{preset.title} {preset.version}"
 
 
 def _model(words: str, values: Values) -> Model:

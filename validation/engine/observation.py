@@ -41,6 +41,7 @@ Result = TypeVar("Result")  #: the result of an attempt at an image
 
 AIRLIGHT, SURFACE = "airlight", "surface"
 KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
+REST = f"{TOTAL} - {AIRLIGHT}"  #: a layer of surfaces, where a file has only the others
 
 # The last part of a layer's name, in small letters; Blender calls its passes
 # VolumeDir and Volume Direct.
@@ -294,14 +295,33 @@ def observation_of(
     )
 
 
+def with_rest(image: Image) -> Image:
+    """Return an image that has airlight and all light, but no surfaces, with the difference of both
+    as the layer `REST`; any other image, and one whose airlight is all light, as it is.
+    """
+    if not {AIRLIGHT, TOTAL} <= image.layers.keys() or SURFACE in image.layers:
+        return image
+    total, airlight = (np.asarray(image.layers[name], float) for name in (TOTAL, AIRLIGHT))
+    if total.shape != airlight.shape:
+        return image
+    # Halves have eleven bits: what is less than the last of them is no surface.
+    rest = np.where(np.abs(total - airlight) > 2.0**-10 * np.abs(total), total - airlight, 0.0)
+    return replace(image, layers={**image.layers, REST: rest}) if rest.any() else image
+
+
 def layers_of(
     image: Image, path: str, name: str | None, holds: str | None
 ) -> tuple[JudgedLayer, ...]:
     """Return the layers to explain: the named layer, or airlight and surface where an image
     has both.
     """
-    if name is None and holds is None and {AIRLIGHT, SURFACE} <= image.layers.keys():
-        return tuple(judged_layer(image, path, name=each) for each in (AIRLIGHT, SURFACE))
+    if name is None and holds is None and AIRLIGHT in image.layers:
+        surface = next((each for each in (SURFACE, REST) if each in image.layers), None)
+        if surface is not None:
+            return (
+                judged_layer(image, path, name=AIRLIGHT),
+                judged_layer(image, path, name=surface, holds=SURFACE),
+            )
     return (judged_layer(image, path, name=name, holds=holds),)
 
 

@@ -112,7 +112,8 @@ class SceneLight:
 
     def view(self, observation: Observation, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
-        key = "view", scenery.offset, scenery.zoom, _sight(observation)
+        camera = scenery.offset, scenery.zoom, scenery.eye, scenery.turned
+        key = "view", camera, _sight(observation)
         return self._paths.once(
             key, lambda: observation.view(scenery), lambda view: 40 * view.distance.size
         )

@@ -27,6 +27,9 @@ from airlight.validation.engine.prediction import Guess, Predictor
 _LITTLE = 0.9
 _SMALL = 0.02
 
+#: Least scale of the errors of a search for some per cent: it does not tell errors below it apart.
+COARSE = 1e-2
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -209,7 +212,7 @@ class _Search:
         errors = self.errors(values)[
             self.predictor.lit(guess_of(self.predictor, self.faults, values))
         ]
-        return max(usual_size(errors), 1e-4 if fine else 1e-2)
+        return max(usual_size(errors), 1e-4 if fine else COARSE)
 
     def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
         """Return the best place of one parameter; `near`: a search on few pixels has found it

@@ -18,7 +18,13 @@ from airlight.validation.engine.fault import Fault
 from airlight.validation.engine.faults import KINDS, faults_of
 from airlight.validation.engine.judge import RIGHT
 from airlight.validation.engine.prediction import Predictor
-from airlight.validation.engine.search import Explanation, best_of_starts, best_shape, explain
+from airlight.validation.engine.search import (
+    COARSE,
+    Explanation,
+    best_of_starts,
+    best_shape,
+    explain,
+)
 
 QUICK, PAIRS = "quick", "pairs"
 STAGES = (QUICK, PAIRS, "paths", "extent")
@@ -94,8 +100,8 @@ def _refined(attempt: Attempt, explanations: Sequence[Explanation]) -> list[Expl
     candidates = attempt.candidates
     errors = [each.error for each in (*candidates.tried, *explanations)]
     # After a coarse search the best five faults are refined. More digits do not bring an error
-    # down from three times the least error, or three times the error of the model.
-    worst = 3.0 * max(min(errors, default=1.0), MODEL_ERROR[candidates.pixel])
+    # down from three times the least error, unless the coarse search does not see it.
+    worst = max(3.0 * max(min(errors, default=1.0), MODEL_ERROR[candidates.pixel]), COARSE)
     finer: dict[int, Explanation] = {}
     for each in sorted(explanations, key=lambda each: each.error)[:5]:
         if each.parameters and each.error < worst:

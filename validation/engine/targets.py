@@ -243,6 +243,16 @@ HELD: Mapping[tuple[str, str], Held] = {
 }
 
 
+def _camera_moved(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    x, y, z = (short(value) for value in p)
+    return replace(guess, scenery=replace(guess.scenery, eye=(x, y, z)))
+
+
+def _camera_turned(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+    right, up, clockwise = (short(value) for value in p)
+    return replace(guess, scenery=replace(guess.scenery, turned=(right, up, clockwise)))
+
+
 def _shifted(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return an image that lies some pixels too far right, and down."""
     # A pixel that shows what lies to the right of it shows an image that moved to the left.
@@ -299,6 +309,24 @@ def _changed_values(change: Callable[..., Array]) -> Change:
     )
 
 
+def _tinted(words: str) -> Change:
+    """Return a change of colours: words are a layer, or 'image' for both, and its channels."""
+    layer, channels = words.split()
+    places = ["RGB".index(channel) for channel in channels]
+
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        factors = np.ones(3)
+        factors[places] = p
+        fog, surfaces = (
+            factors if layer in ("image", each) else np.ones(3) for each in ("airlight", "surface")
+        )
+        return _changed_layers(
+            guess, lambda airlight, surface: (airlight * fog, surface * surfaces)
+        )
+
+    return changed
+
+
 def _with_primaries(name: str) -> Change:
     matrix = PRIMARIES[name]
     return _changed_values(lambda radiance: radiance @ matrix.T)
@@ -328,6 +356,8 @@ GUESSES: Mapping[str, Change] = {
     "falling density": _falling,
     "even density": _even,
     "first light moved": _moved,
+    "camera moved": _camera_moved,
+    "camera turned": _camera_turned,
     "shifted": _shifted,
     "field of view of the other axis": _other_axis,
     "higher orders of the fog": _higher_orders(of_surfaces=False),
@@ -348,6 +378,7 @@ BY_NAME: Mapping[str, Callable[[str], Change]] = {
     "window": lambda name: _window(WINDOWS[name]),
     "factor": scaled,
     "mix": lambda name: _mixed(MIXES[name]),
+    "tint": _tinted,
     "values": lambda name: _changed_values(VALUES[name]),
     "primaries": _with_primaries,
     "channels": lambda order: _changed_values(reordered(order)),

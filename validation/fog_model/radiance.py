@@ -89,6 +89,7 @@ class Fog:
     near: float = 0.0
     far: float = np.inf  #: it ends at this plane, or at this distance [m]
     spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
+    reach: float = 1.0  #: fraction of the distance of surfaces at which rays end [1]
     #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in
     #: what attenuates them, 'steps' in the length of ray that a node stands for, 'ends' where rays
     #: end; 'lookup': rays end where their depth is the distance of the surface.
@@ -126,7 +127,7 @@ class Fog:
         """Between which distances rays have nodes; None where that is all of every ray."""
         end = next((word for word in ("ends", "lookup") if word in self.planar), "")
         faded = np.inf if self.fade is None else self.fade[1]
-        ends = Ends(self.near, self.far, self.spherical, end, faded, self.corners)
+        ends = Ends(self.near, self.far, self.spherical, end, faded, self.corners, self.reach)
         return None if ends == Ends() else ends
 
     @property
@@ -483,11 +484,11 @@ def _way(fog: Fog, slant: Array, x: Array, *, ends_at_surface: bool) -> tuple[Ar
     `slant`: lengths of rays over their depth along the camera's axis, (n,). A plane at the depth z
     is at the distance z times `slant`.
     """
-    end = x
+    end = x * fog.reach if ends_at_surface else x
     if ends_at_surface and "ends" in fog.planar:
-        end = x / slant
+        end = end / slant
     elif ends_at_surface and "lookup" in fog.planar:
-        end = x * slant
+        end = end * slant
     along = np.ones_like(slant) if fog.spherical else slant
     if np.isfinite(fog.far):
         end = np.minimum(end, fog.far * along)

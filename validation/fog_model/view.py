@@ -12,6 +12,7 @@ from typing import TypeVar, cast
 
 import mitsuba as mi
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from airlight.reference.quadrature.light_airlight import LitRays, lit_rays
 from airlight.reference.quadrature.replicates import PointPlan, square_points
@@ -56,6 +57,7 @@ class Ends:
     end: str = ""
     faded: float = np.inf  #: depth beyond which there are none [m]
     corners: tuple[float, ...] = ()  #: distances from lamps at which nodes are parted [m]
+    part: float = 1.0  #: of the distance of surfaces at which rays end [1]
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,9 @@ class Scenery:
     unshadowed: tuple[int, ...] = ()  #: numbers of lights of which nothing casts a shadow
     offset: tuple[float, float] = (0.0, 0.0)  #: shift of all rays, to the right and down [pixels]
     zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
+    eye: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: by how much the camera is moved [m]
+    #: by how much it is turned: to the right, up, and clockwise about its axis [degrees]
+    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
     #: by how much the first point and spot lights are moved [m]
     moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     cone: float = 1.0  #: factor on the angles of spots
@@ -134,16 +139,19 @@ class View:
         cosine = self.reference.direction @ self.axis
         along = np.ones_like(cosine) if ends.spherical else 1 / cosine
         last = np.minimum(ends.far * along, ends.faded / cosine)
-        if ends.end:
+        if ends.end or ends.part != 1:
             last = np.minimum(last, self.last(ends))
         return ends.near * along, last
 
     def last(self, ends: Ends | None) -> Array:
         """Return the distances at which rays end for their fog, (rays,) [m]."""
-        if ends is None or not ends.end:
+        if ends is None:
             return self.distance
+        last = ends.part * self.distance
+        if not ends.end:
+            return last
         cosine = self.reference.direction @ self.axis
-        return self.distance * cosine if ends.end == "ends" else self.distance / cosine
+        return last * cosine if ends.end == "ends" else last / cosine
 
     def reach(
         self,
@@ -301,17 +309,34 @@ def view_of(
     # them take the place of the scene's.
     positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
     positions = middle + scenery.zoom * (positions - middle) + np.asarray(scenery.offset)
+    sensor = reference.scene.sensors()[0]
+    turn = _turn(camera_matrix(sensor)[:3, :3], scenery.turned)
     rays = replace(
-        reference, direction=film_directions(reference.scene.sensors()[0], positions, size)
+        reference,
+        origin=reference.origin + np.array(scenery.eye),
+        direction=film_directions(sensor, positions, size) @ turn.T,
     )
     shapes, hits = read_shapes(reference.occluders), surface_hits(rays)
     distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
     # `lengths` gives an unbounded line the length 0 in the medium without bounds.
-    length = lengths(rays, reference.origin, rays.direction, distance)
+    length = lengths(rays, rays.origin, rays.direction, distance)
     length[~np.isfinite(distance), 0] = np.inf
     owner = np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2)
-    axis = camera_matrix(reference.scene.sensors()[0])[:3, 2]
+    axis = turn @ camera_matrix(sensor)[:3, 2]
     return View(rays, pixels, owner, axis, distance, hits.interaction, shapes, length, steps)
+
+
+def _turn(frame: Array, turned: tuple[float, float, float]) -> Array:
+    """Return the turn of a camera with this frame, its columns left, up and ahead, (3, 3): to the
+    right and up at once, then clockwise about its axis [degrees].
+    """
+    if not any(turned):
+        return np.eye(3)
+    left, up, ahead = frame.T
+    # The axis of a turn to the right points down, that of one upwards to the right.
+    right, upwards, clockwise = np.deg2rad(turned)
+    aim = Rotation.from_rotvec(-right * up - upwards * left)
+    return np.asarray((aim * Rotation.from_rotvec(clockwise * ahead)).as_matrix())
 
 
 def _positions(centres: Array, rays_per_side: int) -> Array:

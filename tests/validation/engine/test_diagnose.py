@@ -19,7 +19,12 @@ from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.engine.curves import to_srgb
 from airlight.validation.engine.decide import Blocks
-from airlight.validation.engine.diagnose import diagnose_image
+from airlight.validation.engine.diagnose import (
+    Diagnosis,
+    Ranked,
+    diagnose_file,
+    diagnose_image,
+)
 from airlight.validation.engine.fault import Fault
 from airlight.validation.engine.faults import FAULTS
 from airlight.validation.engine.observation import judged_layer, observation_of
@@ -349,3 +354,62 @@ def test_a_place_is_found_where_pixels_are_lit_or_dark():
     begun = np.zeros(3)
     np.testing.assert_array_equal(search.by_steps(begun, 0.01, False), begun)
     np.testing.assert_allclose(search.along_axes(begun, 0.01), true, atol=0.01)
+
+
+def test_what_nothing_explains_is_told_with_what_comes_nearest():
+    nearest = Diagnosis(
+        scene="scene",
+        path="path",
+        layer="total",
+        pixel="centre",
+        first="unexplained",
+        ranked=(Ranked("light-path", (), "the way is not attenuated", 0.05, 50.0, ()),),
+        residual=0.07,
+        left=0.05,
+        rest="",
+        explained=False,
+        place="beside the light",
+        few="",
+        verdict="not right",
+    )
+    told = "The nearest to it, light-path, leaves 5 % of 7 %: the way is not attenuated."
+    assert nearest.lines[1:] == [
+        "Nothing here explains it: the error lies beside the light (not right).",
+        "It may be the algorithm: few steps, froxels, a shadow map or a low resolution.",
+        told,
+    ]
+    # One that takes nothing away is not near, and of a mark on the image nobody asks.
+    assert told not in replace(nearest, left=0.0699).lines
+    assert replace(nearest, few="all is right but 3 pixels").lines[1:] == [
+        "Nothing here explains it: all is right but 3 pixels (not right)."
+    ]
+
+
+def test_a_rest_that_a_comparison_calls_right_is_nothing_to_it(reference):
+    """An error of a third of a per cent in broad stripes is neither noise nor little."""
+    stripes = 1 + 0.006 * np.sign(np.sin(np.arange(SIZE[0]) / 2.0))[None, :, None]
+    said = diagnosed(1.5 * total(reference) * stripes)
+    assert said.first == "factor"
+    assert said.rest.startswith("nothing to a comparison: means over 2 x 2 pixels are within 0.")
+    assert said.explained
+    assert not said.place
+    more = 1 + 0.04 * np.sign(np.sin(np.arange(SIZE[0]) / 2.0))[None, :, None]
+    assert not diagnosed(1.5 * total(reference) * more).rest
+
+
+@pytest.mark.parametrize(("scene", "layers"), [("sphere-spot", 2), ("penumbra-plane", 1)])
+def test_surfaces_are_judged_where_a_file_has_airlight_and_all_light(
+    variant, monkeypatch, scene, layers
+):
+    """A light with an extent is seen in all light, and is no surface."""
+    image = quadrature_image(read_reference(load_scene(scene, SIZE).scene), checks=1)
+    both = {"airlight": image.airlight, "total": image.airlight + 2 * image.surface}
+    file = Image(both, attributes={"airlight:pixel": "centre"})
+    monkeypatch.setattr("airlight.validation.engine.diagnose.read_exr", lambda path: file)
+    found = diagnose_file("engine.exr", scene)
+    assert [each.layer for each in found] == ["airlight", "total - airlight"][:layers]
+    assert found[0].first == "right"
+    assert found[1:] == () or (found[1].first, found[1].ranked[0].parameters) == (
+        "factor",
+        pytest.approx((2.0,), rel=1e-3),
+    )

@@ -100,11 +100,25 @@ def test_lobes_have_another_g_and_other_phase_functions_stay():
         (("from the light", "for surfaces, for the fog it is"), {"light_segment": (1.0, 0.0)}),
         (("way to the camera", "for the fog, for surfaces it is"), {"camera_segment": (0.0, 1.0)}),
         (("way to the camera", "for surfaces, for the fog it is"), {"camera_segment": (1.0, 0.0)}),
-        (("nothing is attenuated",), {"light_segment": (0.0, 0.0), "camera_segment": (0.0, 0.0)}),
+        (
+            ("nothing is attenuated", "is missing, w"),
+            {"light_segment": (0.0, 0.0), "camera_segment": (0.0, 0.0)},
+        ),
     ],
 )
 def test_ways_that_are_not_attenuated(words, segments):
     assert changed(fault(*words)).fog == replace(FOG, **segments)
+
+
+def test_fog_without_attenuation_may_end():
+    ended = {"far": 7.0, "camera_segment": (0.0, 0.0)}
+    for words, fields in {
+        ("the way to the camera is not", "farther than"): {"spherical": True},
+        ("the way to the camera is not", "beyond a plane"): {},
+        ("nothing is", "farther than"): {"spherical": True, "light_segment": (0.0, 0.0)},
+        ("nothing is", "beyond a plane"): {"light_segment": (0.0, 0.0)},
+    }.items():
+        assert changed(fault(*words), 7.0).fog == replace(FOG, **ended, **fields)
 
 
 def test_terms_of_engines_alone():
@@ -298,6 +312,30 @@ def test_values_and_the_camera_by_hand():
     assert (changed(fault("interchanged")).undo(image) == image.transpose(1, 0, 2)).all()
     assert (changed(fault("mirrored")).undo(image) == image[:, ::-1]).all()
     assert (changed(fault("turned by 180")).undo(image) == image[::-1, ::-1]).all()
+
+
+def test_channels_of_the_image_or_of_a_layer_have_factors():
+    airlight, surface = np.array([[1.0, 2.0, 4.0]]), np.array([[3.0, 5.0, 7.0]])
+
+    def layers(words: str, *numbers: float) -> list[list[float]]:
+        (change,) = changed(fault(words), *numbers).layers
+        return [image[0].tolist() for image in change(airlight, surface)]
+
+    assert layers("green is {0:.4g} times as bright as it should be, red", 0.5) == [
+        [1.0, 1.0, 4.0],
+        [3.0, 2.5, 7.0],
+    ]
+    assert layers("of the fog, blue is", 0.5) == [[1.0, 2.0, 2.0], [3.0, 5.0, 7.0]]
+    assert layers("a white balance", 2.0, 1.0, 0.5) == [[2.0, 2.0, 2.0], [6.0, 5.0, 3.5]]
+    assert layers("blue of the fog are", 2.0, 1.0, 0.5) == [[2.0, 2.0, 2.0], [3.0, 5.0, 7.0]]
+    assert layers("blue of surfaces are", 2.0, 1.0, 0.5) == [[1.0, 2.0, 4.0], [6.0, 5.0, 3.5]]
+
+
+def test_the_camera_moves_and_turns_by_what_the_words_say():
+    assert changed(fault("the camera is off by"), 0.1, -0.2, 0.3).scenery.eye == (0.1, -0.2, 0.3)
+    turned = changed(fault("the camera is turned by"), 1.0, -2.0, 3.0).scenery
+    assert turned.turned == (1.0, -2.0, 3.0)
+    assert changed(fault("rays end at {0:.3g} times"), 0.9).fog == replace(FOG, reach=0.9)
 
 
 def test_light_of_higher_orders_is_added_to_the_fog_or_to_all():

@@ -8,13 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airlight.reference.storage.exr import Image
 from airlight.validation.engine import observation
 from airlight.validation.engine.observation import (
     PixelKind,
     decide_pixel,
+    layers_of,
     needed_samples,
     relative_errors,
     stopped,
+    with_rest,
 )
 
 
@@ -72,3 +75,25 @@ def test_the_kind_of_a_pixel_is_the_one_that_leaves_less_and_is_said():
     )
     assert (kind, found) == (PixelKind("area"), "AREA")
     assert kind.words == "judged by means over the area"
+
+
+def test_surfaces_are_what_all_light_has_beyond_the_airlight():
+    fog, rest = np.full((2, 3, 3), 0.5), np.zeros((2, 3, 3))
+    rest[0] = 0.25
+    rest[1, 0] = 1e-4  # less than the last bit of a half
+    image = Image({"airlight": fog, "total": fog + rest})
+    found = with_rest(image)
+    np.testing.assert_allclose(found.layers["total - airlight"][0], 0.25)
+    assert not found.layers["total - airlight"][1].any()
+    layers = layers_of(found, "", None, None)
+    assert [(each.name, each.holds) for each in layers] == [
+        ("airlight", "airlight"),
+        ("total - airlight", "surface"),
+    ]
+    assert [each.name for each in layers_of(found, "", "total", None)] == ["total"]
+    # Where a file has surfaces they are its own; fog that is all light has none beside it.
+    for layers_there in ({"airlight": fog, "total": fog}, {"airlight": fog}, {"total": fog}):
+        assert with_rest(Image(layers_there)).layers == layers_there
+    own = Image({"airlight": fog, "total": fog + rest, "surface": rest})
+    assert "total - airlight" not in with_rest(own).layers
+    assert [each.name for each in layers_of(own, "", None, None)] == ["airlight", "surface"]
