@@ -3,7 +3,7 @@
 that the repository keeps.
 
     python docs/tools/engines.py                  # renders in every engine that is here
-    python docs/tools/engines.py --keep           # and keeps captures, numbers and the strip
+    python docs/tools/engines.py --keep --diagnose  # and keeps captures, numbers and the strip
 
 After an update of an engine, in `docs/adapters/package.json` or its adapter, the first says what it
 changed. Kept captures are half floats, without their sum: `.ci/run` judges them without an engine.
@@ -37,6 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Engines of others, and what they changed.")
     parser.add_argument("--engines", default="all", help="names of adapters, as of airlight report")
     parser.add_argument("--images", type=Path, help="a report with captures, in place of new ones")
+    parser.add_argument("--diagnose", action="store_true", help="look for faults in kept images")
     parser.add_argument("--keep", action="store_true", help="keep captures, numbers and the strip")
     asked = parser.parse_args()
     with temporary_folder() as folder:
@@ -45,13 +46,13 @@ def main() -> None:
         )
         print(made.text())
         if asked.keep:
-            keep(folder / "new", folder / "half")
+            keep(folder / "new", folder / "half", diagnose=asked.diagnose)
         elif (KEPT / FILE).is_file():
             print(airlight.diff(KEPT, folder / "new").text())
     sys.exit(made.status)
 
 
-def keep(made: Path, halves: Path) -> None:
+def keep(made: Path, halves: Path, *, diagnose: bool) -> None:
     """Write captures in half floats, judge these, and keep what the pages and CI need."""
     halves.mkdir()
     for path in sorted(made.glob("*.*.exr")):
@@ -60,7 +61,9 @@ def keep(made: Path, halves: Path) -> None:
     size = sum(path.stat().st_size for path in halves.glob("*.exr"))
     if size > MOST:
         sys.exit(f"the captures take {size} bytes, expected at most {MOST}")
-    judged = airlight.report(engines="all", images=halves, output=halves / "judged")
+    judged = airlight.report(
+        engines="all", images=halves, output=halves / "judged", diagnose=diagnose
+    )
     assert isinstance(judged, EnginesReport)
     # A capture of an engine that is gone must not stay.
     shutil.rmtree(KEPT, ignore_errors=True)
@@ -73,7 +76,7 @@ def keep(made: Path, halves: Path) -> None:
         for cell in judged.data.cells
     )
     scenes = tuple(replace(scene, files={}) for scene in judged.data.scenes)
-    command = "airlight report --engines all"
+    command = "airlight report --engines all" + (" --diagnose" if diagnose else "")
     kept = replace(judged.data, command=command, scenes=scenes, cells=cells)
     write_text(KEPT / FILE, engines_text(kept))
     with Picture.open(halves / "judged" / "strip.png") as strip:

@@ -211,7 +211,7 @@ class Candidates:
         def size(each: Explanation) -> tuple[int, int]:
             return each.parameters, len(each.faults)
 
-        # The simplest ones by their evidence. Of those that leave the same the rank decides.
+        # The simplest ones by their evidence. The rank decides between those that leave the same.
         least = min(map(size, alike))
         simplest = [each for each in alike if size(each) == least]
         same = [each for each in simplest if self.is_same_image(each, simplest[0])]

@@ -54,6 +54,17 @@ def engines_judged() -> str:
     )
 
 
+def engine_headlines() -> str:
+    """Return what the diagnosis said of each image against physics."""
+    data = _judged()
+    rows = [
+        [f"`{cell.scene}`", data.title_of(cell.engine), cell.headline.replace("|", "\\|")]
+        for cell in data.cells
+        if cell.headline
+    ]
+    return table(("scene", "engine", "the diagnosis"), rows, words=3)
+
+
 def engine_figures(engine: str) -> str:
     """Return the errors of one engine, and why it has no image of a scene."""
     data = _judged()
