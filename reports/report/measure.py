@@ -44,15 +44,16 @@ from airlight.validation.scenes.names import scene_stem
 from airlight.validation.scenes.registry import FOG_SCENES
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.run import PROBE, frame_of
-from airlight.validation.study.scene import SceneStudy, open_scene, study_scene
+from airlight.validation.study.scene import SceneStudy, open_scene
 from airlight.validation.study.study import STUDIES, Cell, Study, standard_study
+from airlight.validation.study.study_scene import expected_seconds, study_scene
 from airlight.validation.study.turns import Apart
 
 if TYPE_CHECKING:
     from airlight.reports.cluster.connect import Client
     from airlight.validation.engine.images import EngineImage
     from airlight.validation.estimates.monte_carlo import ElsewhereFor
-    from airlight.validation.study.scene import Judged
+    from airlight.validation.study.scene_rows import Judged
 
 
 def write_report(
@@ -109,7 +110,7 @@ def write_report(
             # when its turn comes.
             each = opened(name)
             notes += each.scene.features.notes
-            of_scenes.append((f"{each.name}: ", each.seconds()))
+            of_scenes.append((f"{each.name}: ", expected_seconds(each)))
             if cluster is not None:
                 from airlight.reports.cluster.references import image_of
 

@@ -21,7 +21,8 @@ from airlight.validation.estimates.images import layered_reference
 from airlight.validation.estimates.quadrature import known_to, relative_error
 from airlight.validation.scenes.names import scene_stem
 from airlight.validation.study.reference import of_image
-from airlight.validation.study.scene import Judged, SceneResult
+from airlight.validation.study.scene_rows import Judged
+from airlight.validation.study.study_scene import SceneResult
 
 #: Files of a report by what they are.
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}

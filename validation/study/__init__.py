@@ -16,7 +16,9 @@ Read in this order:
 - `reference.py`: the reference that the cells of an image share;
 - `stated_errors.py`: the errors that methods state for themselves;
 - `run.py`: a cell is rendered and compared, and becomes a row;
-- `scene.py`: the study of one scene: reference, checks, rows, images;
+- `scene.py`: one scene and what to study of it;
+- `scene_rows.py`: the rows of its configurations, `scene_images.py`: those of images from elsewhere;
+- `study_scene.py`: the study of one scene: reference, checks, rows, images;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet;
 - `cost.py`: what a command will take, and the question before it starts;

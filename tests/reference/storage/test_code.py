@@ -16,7 +16,7 @@ from airlight.reference.storage.code import code_digest, source_digest
 from airlight.reports.machine.driver_check import DriverInputs
 from airlight.validation.estimates.monte_carlo import VolpathInputs
 from airlight.validation.kernels.rays import RayInputs
-from airlight.validation.study.scene import CheckInputs
+from airlight.validation.study.study_scene import CheckInputs
 
 ROOT = str(Path(__file__).resolve().parents[3])
 

@@ -48,15 +48,10 @@ from airlight.validation.kernels.rays import RayInputs, table
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.keys import CellReference, RowInputs
 from airlight.validation.study.reference import SampledInputs
-from airlight.validation.study.scene import (
-    CellInputs,
-    CheckInputs,
-    FlipInputs,
-    ImageInputs,
-    MultipleInputs,
-    TimesInputs,
-)
+from airlight.validation.study.scene_images import ImageInputs
+from airlight.validation.study.scene_rows import CellInputs, FlipInputs, TimesInputs
 from airlight.validation.study.study import Cell, Checks, Measure, standard_study
+from airlight.validation.study.study_scene import CheckInputs, MultipleInputs
 from airlight.validation.timing import Timing
 from tests.helpers.scenes import tiny_scene
 

@@ -226,7 +226,7 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
     )
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction",
+        "airlight.validation.study.study_scene.multiple_scattering_fraction",
         lambda scene, **options: multiple,
     )
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
@@ -246,10 +246,10 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
     """In a cache of its own: what it finds again replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr(
-        "airlight.validation.study.scene.agreements", lambda scene, margins, **options: {}
+        "airlight.validation.study.study_scene.agreements", lambda scene, margins, **options: {}
     )
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction",
+        "airlight.validation.study.study_scene.multiple_scattering_fraction",
         lambda scene, **options: multiple,
     )
     path = tmp_path / "mine.xml"
@@ -417,10 +417,10 @@ def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check
     monkeypatch.setattr("airlight.reports.cluster.references.facts", lambda: None)
     cluster = SimpleNamespace(scheduler_info=lambda **how: {"workers": {"one": {}, "two": {}}})
     monkeypatch.setattr("airlight.reports.cluster.references.run_groups", run_groups)
-    monkeypatch.setattr("airlight.validation.study.scene.agreements", agreements)
+    monkeypatch.setattr("airlight.validation.study.study_scene.agreements", agreements)
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr(
-        "airlight.validation.study.scene.multiple_scattering_fraction",
+        "airlight.validation.study.study_scene.multiple_scattering_fraction",
         lambda scene, **options: multiple,
     )
     study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())

@@ -30,9 +30,10 @@ from airlight.validation.study.cost import Work, check_work, reference_work
 from airlight.validation.study.reference import cell_reference, load_cell
 from airlight.validation.study.row import row_values
 from airlight.validation.study.run import run
-from airlight.validation.study.scene import check_reference, configurations_for, open_scene
+from airlight.validation.study.scene import configurations_for, open_scene
 from airlight.validation.study.stated_errors import EXACT
 from airlight.validation.study.study import Cell, Checks, Measure, RandomScenes, Study
+from airlight.validation.study.study_scene import check_reference
 from tests.helpers.scenes import tiny_scene
 
 SIZE = (24, 18)

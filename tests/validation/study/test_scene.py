@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-import airlight.validation.study.scene as studies
+import airlight.validation.study.scene_rows as rows_module
 from airlight.validation.study.configuration import Configuration
 from airlight.validation.study.run import cell_row
-from airlight.validation.study.scene import TimesInputs, open_scene, scene_times
+from airlight.validation.study.scene import open_scene
+from airlight.validation.study.scene_rows import TimesInputs, cell_inputs, scene_times
 from airlight.validation.study.study import Cell, standard_study
 from airlight.validation.study.turns import CellTimes
 
@@ -23,7 +24,7 @@ def test_rows_hang_on_the_number_of_light_samples_of_their_reference(variant):
         open_scene("penumbra-plane", replace(usual, points=points), {}) for points in (4, 16, None)
     ]
     assert len({study.reference_inputs.key for study in studies}) == 3
-    assert len({study.inputs(study.configurations[0]).key for study in studies}) == 3
+    assert len({cell_inputs(study, study.configurations[0]).key for study in studies}) == 3
 
 
 @pytest.mark.claim("report-kept")
@@ -35,7 +36,7 @@ def test_times_are_kept_only_with_those_of_a_method_that_is_tried_again(monkeypa
         asked.append([row.status for row in rows])
         return [CellTimes(prepare_ms=1.0 if row.status == "done" else None) for row in rows]
 
-    monkeypatch.setattr(studies, "_scene_times", timed)
+    monkeypatch.setattr(rows_module, "_scene_times", timed)
     cell = Cell("open-fog", (8, 6), (), Configuration("own.py:fog"))
     inputs = TimesInputs((cell,), ((),), {})
     for status in ("refused", "done", "done"):
