@@ -20,7 +20,7 @@ extensions = [
     "mathml",
     "pages",
 ]
-exclude_patterns = ["_ext", "data", "tools"]
+exclude_patterns = ["_ext", "data", "paper", "tools"]
 source_suffix = {".md": "markdown", ".ipynb": "markdown"}
 highlight_language = "none"  # what is indented is a formula
 myst_enable_extensions = ["dollarmath"]

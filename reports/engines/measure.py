@@ -241,4 +241,7 @@ def captured_of(image: Image) -> Captured:
 def _headline(file: Path, source: str) -> str:
     """Return what the diagnosis says of an image, without being told the engine's equation."""
     found = diagnose_file(file, source, model=PHYSICAL)
-    return " ".join(words for each in found for words in each.lines[1:2])
+    said = {each.layer: " ".join(each.lines[1:2]) for each in found}
+    if len(said) == 1:
+        return next(iter(said.values()))
+    return " ".join(f"The {layer}: {words}" for layer, words in said.items())

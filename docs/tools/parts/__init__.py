@@ -8,5 +8,6 @@ Read in this order:
 - `api`: the functions and classes of `import airlight`, by topic
 - `measured`: tables of the report and of the records in `docs/data`
 - `shown`: files of the project, and pictures of the gallery
+- `paper`: the figures of the paper, and its record in numbers
 - `tested`: the claims with their tests, and the last run of all tests
 """
