@@ -2,6 +2,7 @@
 """Fixtures shared by all tests."""
 
 import gc
+import math
 import os
 import re
 import signal
@@ -69,6 +70,14 @@ def variant() -> str:
     gc.collect()
     gc.freeze()
     return chosen
+
+
+@pytest.fixture(autouse=True)
+def _no_lines_of_progress(monkeypatch):
+    """Print no lines of progress: how many there are depends on how busy the machine is."""
+    from airlight.reports.machine import progress
+
+    monkeypatch.setattr(progress, "_PATIENCE", math.inf)
 
 
 @pytest.fixture(autouse=True)

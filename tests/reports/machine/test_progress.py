@@ -12,6 +12,7 @@ from airlight.reports.machine.progress import progress_bar
 def clock(monkeypatch):
     """A clock of our own; `clock.now` is what it shows [s]."""
     clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(airlight.reports.machine.progress, "_PATIENCE", 2.0)
     monkeypatch.setattr(
         airlight.reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now)
     )
