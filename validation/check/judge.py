@@ -7,10 +7,15 @@ pixels how far sampling parts them, and that is no error. The worst 2 % are left
 in other pixels of a changed frame. The root mean square of all others is the error of the relation.
 It fails beyond
 
-    3 x floor + rounding,
+    3 x noise + rounding,
 
-with the *floor* the error of the same frame twice, and *rounding* that of the format for each
-frame. Where noise, and sampling in half of the blocks, exceed 5 %, nothing can be told: a fault of a
+with *rounding* that of the format for each frame. The *noise* is the error of the same frame twice,
+the floor. Where these two differ the renderer draws random numbers, and a changed frame may have
+more noise than they: Cycles draws a lamp for each sample where there are two. The scatter of single
+pixels within the blocks of the difference then counts too, as a root sum of squares. It counts for
+nothing where both frames are the same: one wrong pixel is no noise of a renderer without any.
+
+Where noise, and sampling in half of the blocks, exceed 5 %, nothing can be told: a fault of a
 twentieth would be missed.
 """
 
@@ -136,7 +141,8 @@ def _answer(
     asked: Asked, sides: Sides, floor: float, rounding: float, margin: float | None
 ) -> Kept:
     blocks = block_errors(sides)
-    limit = _FLOORS * floor + rounding
+    noise = math.hypot(floor, blocks.scatter) if floor > 0 else floor
+    limit = _FLOORS * noise + rounding
     limit = limit if margin is None else max(limit, margin)
     # Without light there is nothing to compare, and no noise is known.
     if not math.isfinite(blocks.error) or (not math.isfinite(floor) and asked.name != "again"):
@@ -147,7 +153,7 @@ def _answer(
     elif blocks.error > limit:
         verdict = FAILS
     else:
-        verdict = UNKNOWN if _FLOORS * floor + blocks.sampling > TELLING else HOLDS
+        verdict = UNKNOWN if _FLOORS * noise + blocks.sampling > TELLING else HOLDS
     points_to = RELATIONS[asked.name].points_to if verdict == FAILS else ""
     ratio = blocks.ratio if math.isfinite(blocks.ratio) else None
     worst = f"{blocks.worst[0]}, {blocks.worst[1]}" if blocks.error else ""
@@ -160,6 +166,7 @@ class BlockErrors:
 
     error: float  #: root mean square beyond sampling, relative; NaN where nothing is lit
     sampling: float  #: median of what sampling explains, relative
+    scatter: float  #: root mean square that independent noise of single pixels makes, relative
     ratio: float  #: sum of the one over that of the other
     worst: tuple[int, int]  #: column and row of the middle of the worst block [pixels]
 
@@ -173,19 +180,30 @@ def block_errors(sides: Sides) -> BlockErrors:
     known = np.isfinite(got) & np.isfinite(wanted)
     scale = float(np.abs(wanted[known]).mean()) if known.any() else 0.0
     if scale == 0 and not np.abs(got[known]).any():
-        return BlockErrors(math.nan, 0.0, math.nan, (0, 0))
+        return BlockErrors(math.nan, 0.0, 0.0, math.nan, (0, 0))
     # Nothing is wanted, and something is there: its own brightness is the scale.
     scale = scale or float(np.abs(got[known]).mean())
     brightness = np.maximum(np.abs(wanted), _LEAST * scale)
     beyond = np.maximum(np.abs(got - wanted) - spread, 0.0) / brightness
     blocks = np.where(known, beyond, -1.0).max(axis=2)
     row, column_ = np.unravel_index(int(blocks.argmax()), blocks.shape)
-    kept = np.sort(blocks[blocks >= 0])
-    kept = kept[: len(kept) - int(_WORST * len(kept))]
+    # A mean of n independent values has the variance (mean(d^2) - mean(d)^2)/(n - 1). What sampling
+    # explains of a pixel is no noise.
+    difference = sides.got - sides.wanted
+    difference = np.sign(difference) * np.maximum(np.abs(difference) - sampling, 0.0)
+    variance = block_means(difference**2, size) - block_means(difference, size) ** 2
+    scatter = np.sqrt(np.maximum(variance, 0.0) / max(size**2 - 1, 1)) / brightness
+    scatter = np.where(known, scatter, 0.0).max(axis=2)
+    # Without the worst blocks.
+    order = np.argsort(blocks, axis=None)
+    order = order[blocks.ravel()[order] >= 0]
+    order = order[: len(order) - int(_WORST * len(order))]
+    kept, scattered = blocks.ravel()[order], scatter.ravel()[order]
     total = float(wanted[known].sum())
     return BlockErrors(
         float(np.sqrt(np.mean(kept**2))),
         float(np.median(spread[known] / brightness[known])),
+        float(np.sqrt(np.mean(scattered**2))),
         float(got[known].sum()) / total if total else math.inf,
         (int(column_) * size + size // 2, int(row) * size + size // 2),
     )

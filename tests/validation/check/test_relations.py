@@ -239,6 +239,28 @@ def test_noise_is_no_fault_and_hides_one():
     assert {each.verdict for each in noisy} == {UNKNOWN}
 
 
+@pytest.mark.claim("relations")
+def test_more_noise_in_a_changed_frame_is_no_fault_and_a_wrong_pixel_is_one():
+    """Cycles has hardly any noise with one lamp, and draws between two: its `sum` failed."""
+    noise = np.random.default_rng(5).normal(size=(5, 48, 64, 3))
+    frames = [1 + size * each for size, each in zip((1e-5, 1e-5, 1e-5, 7e-3, 0.0), noise)]
+    names = ("first", "second", "again", "both", "quiet")
+    frames[3] += 1
+    shown = {name: {"total": frame} for name, frame in zip(names, frames)}
+    asked = [Asked("sum", ("first", "second", "both"))]
+
+    def verdict(again, **more):
+        return judge(asked, shown | more, again=("first", again), rounding=1e-6)[-1].verdict
+
+    assert verdict("again") == HOLDS
+    # A fault of a hundredth is beyond that noise; without any, a few pixels are a fault.
+    assert verdict("again", both={"total": 1.01 * frames[3]}) == FAILS
+    wrong = np.full((48, 64, 3), 2.0)
+    wrong[5::8, 5::8] *= 1.1
+    still = {name: {"total": np.ones((48, 64, 3))} for name in ("first", "second", "quiet")}
+    assert verdict("quiet", **still, both={"total": wrong}) == FAILS
+
+
 def test_sets_of_relations_that_fail_together_name_a_term():
     assert "constant in metres" in signature(answers("softened law"))
     assert "constant length" in signature(answers("constant light path"))
