@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -104,6 +105,8 @@ def check(
     kernel: KernelLike | None = None,
     *,
     model: ModelLike | None = None,
+    engine: str | None = None,
+    adapters: File | None = None,
     only: Words = (),
     size: Size = "64x48",
     precision: Literal["single", "double"] | None = None,
@@ -118,15 +121,16 @@ def check(
     it. `airlight describe SCENE --variants all -o DIR` writes scenes to render, with the file
     check.json that names their frames; or write that file for frames of your own. With `--method`
     a method of ours or of yours renders the frames. With `--model` they are references of an
-    engine's own equation: what fails then, no algorithm can make hold.
+    engine's own equation: what fails then, no algorithm can make hold. With `--engine` an engine
+    of `airlight capture` renders the frames.
 
     The exit status is 1 if a relation fails. Each row says what that points to.
 
     Parameters
     ----------
     what
-        The folder of a check.json, or the file; with `--method` or `--model` a built-in scene of
-        fog.
+        The folder of a check.json, or the file; with `--method`, `--model` or `--engine` a
+        built-in scene of fog.
     method
         Render and check this method: one of `airlight list methods`, or a user's as
         MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python also a function.
@@ -135,10 +139,15 @@ def check(
     model
         Check this equation, such as godot:range=9, see `airlight list models`, or terms such as
         light-path=off. Its lengths stay as they are where `units` doubles those of the scene.
+    engine
+        Render the frames in an engine, the name of an adapter of `airlight capture`, such as
+        three; `--set` takes its settings. Relations of scenes that it cannot have are left out.
+    adapters
+        With an engine: the folder of the adapters; by default docs/adapters of the clone.
     only
         Check these relations alone, such as units,pan.
     size
-        With a method or a model: width and height of the frames [pixels], or WxH.
+        Without frames of your own: their width and height [pixels], or WxH.
     precision
         With a method: its precision; by default double for a built-in one, single for a user's.
     margin
@@ -147,12 +156,14 @@ def check(
     progress
         Called with (fraction done, what); True shows a bar.
     parameters
-        Parameters of the method.
+        Parameters of the method, or settings of the engine.
 
     Raises
     ------
     InputError
         For a file or a frame that cannot be read, and a relation that there is not.
+    MissingError
+        If a program that an engine needs is missing.
 
     References
     ----------
@@ -169,6 +180,13 @@ def check(
         raise InputError(f"margin: got {margin:g}, expected a fraction above 0, such as 0.01")
     pixels = pixels_of(size)
     assert pixels is not None
+    if adapters is not None and engine is None:
+        raise InputError("adapters: they render for an engine; add --engine NAME")
+    if engine is not None:
+        beside = {"method": method, "kernel": kernel, "model": model, "precision": precision}
+        exclude("engine", "renders the frames", beside)
+        with telling(progress, f"{what} in {engine}") as tell:
+            return _engine(str(what), engine, parameters, adapters, chosen, pixels, margin, tell)
     if model is not None:
         exclude("model", "is no method", {"method": method, "kernel": kernel, **parameters})
         equation = chosen_model(model)
@@ -275,10 +293,50 @@ def _model(
         image = reference_of(mi.load_dict(changed), model)
         return {"airlight": image.airlight, "surface": image.surface}
 
-    # A spot of the equation may have another edge, which the camera in its place then has too.
-    edge = {"angle": "linear", "rim": "cosine"}.get(model.spot_of[0], model.spot_of[0])
     by, rounding = f"the equation of {model.title}", _ROUNDING["double"]
+    edge = _edge(model)
     return _rendered(scene, by, frame, only, size, rounding, margin, tell, falloff=edge)
+
+
+def _edge(model: "Model") -> str:
+    """Return the edge of the spots of an equation, which the camera in their place then has too."""
+    return {"angle": "linear", "rim": "cosine"}.get(model.spot_of[0], model.spot_of[0])
+
+
+def _engine(
+    scene: str,
+    engine: str,
+    settings: Mapping[str, Any],
+    adapters: Any,
+    only: Sequence[str],
+    size: tuple[int, int],
+    margin: float | None,
+    tell: Any,
+) -> RelationsKept:
+    """Render the frames in an engine, and judge them."""
+    from airlight.reference.storage.exr import read_exr
+    from airlight.reference.storage.files import temporary_folder
+    from airlight.reports.api.capture import capture
+    from airlight.validation.check.check_file import ROUNDING
+    from airlight.validation.scenes.models import model_of
+
+    with temporary_folder() as folder:
+        file = folder / "frame.exr"
+        capture_of = partial(capture, engine, output=file, adapters=adapters)
+        # The scene as it is says which edge the spots of the engine have, and whether it has noise.
+        first = capture_of(scene, size=size, settings=dict(settings))
+        edge = "linear" if first.model is None else _edge(model_of(first.model))
+        seed = first.settings.get("seed")
+
+        def frame(changed: Any, number: int) -> "dict[str, Array]":
+            # A renderer with noise draws other numbers for each frame.
+            drawn = {} if seed is None else {"seed": int(seed) + number}
+            capture_of(changed, settings={**settings, **drawn})
+            return dict(read_exr(file).layers)
+
+        by = f"{first.engine} {first.version}"
+        rounding = ROUNDING["half"]  # of the buffers of rasterisers
+        return _rendered(scene, by, frame, only, size, rounding, margin, tell, falloff=edge)
 
 
 def _rendered(

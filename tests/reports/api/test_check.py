@@ -2,6 +2,7 @@
 """Claim: exact methods keep all relations in float64; a folder of frames is judged as they are."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -157,3 +158,40 @@ def test_changed_scenes_are_written_with_the_file_that_names_their_frames(
     capsys.readouterr()
     assert run(["check", str(target), "--only", "intensity"]) == 0
     assert "2 of 2 relations hold" in capsys.readouterr().out
+
+
+# A renderer whose whole image is the sum of the lights, up to a cap; it takes one lamp.
+FLAT = """#!{python}
+import json, sys
+import numpy as np
+from airlight.reference.storage.exr import Image, write_exr
+
+scene, _, out, *words = sys.argv[1:]
+told = json.load(open(scene))["result"]
+settings = {{"cap": 1e30, "seed": 7}} | {{
+    name: float(value) for name, value in (word.split("=") for word in words)
+}}
+if len(told["lights"]) > 1:
+    sys.exit(print("Flat: it takes one lamp", file=sys.stderr) or 2)
+width, height = told["camera"]["size"]
+light = np.sum([lamp["intensity"] for lamp in told["lights"]], axis=0)
+fog = np.minimum(light, settings["cap"]) * np.ones((height, width, 3))
+write_exr(out, Image({{"airlight": fog, "surface": 0 * fog}}))
+told = {{"engine": "Flat", "version": "2", "settings": settings, "seconds": 0.0, "problems": [],
+        "model": "physical", "pixel": "centre", "device": ""}}
+print(json.dumps(told))
+"""
+
+
+@pytest.mark.claim("relations")
+def test_an_engine_renders_the_frames(variant, tmp_path):
+    (tmp_path / "flat.py").write_text(FLAT.format(python=sys.executable))
+    how = {"engine": "flat", "adapters": tmp_path, "size": (16, 12)}
+    linear = airlight.check("open-fog", only="intensity,sum", **how)
+    assert linear.title == "open-fog by Flat 2"
+    assert {each.name: each.verdict for each in linear.kept} == {
+        "again": "holds",
+        "intensity": "holds",
+    }
+    assert linear.notes == ("sum is left out: Flat: it takes one lamp",)
+    assert airlight.check("open-fog", only="intensity", cap=1.0, **how)["intensity"].fails
