@@ -187,4 +187,4 @@ def test_the_view_moves_changes_and_shows_the_error(browser):
         }
     finally:
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
+        process.communicate(timeout=120)

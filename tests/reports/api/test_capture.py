@@ -242,7 +242,7 @@ def test_an_adapter_ends_with_the_command(words, folder, tmp_path, sign):
         time.sleep(0.05)
     adapter = int((folder / "pid").read_text())
     command.send_signal(sign)
-    _, errors = command.communicate(timeout=30)
+    _, errors = command.communicate(timeout=120)
     assert command.returncode == -sign
     assert b"Traceback" not in errors
     while _runs(adapter):

@@ -88,12 +88,12 @@ def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
     assert address.startswith("http://127.0.0.1:")
     assert process.stdout.readline() == "Ctrl-C ends the view.\n"
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with opener.open(address, timeout=30) as response:
+    with opener.open(address, timeout=120) as response:
         assert response.status == 200
     children = _children(process.pid) if sys.platform == "linux" else []
     assert children or sys.platform != "linux"  # the reference
     process.send_signal(number)
-    assert process.communicate(timeout=30) == ("", "")
+    assert process.communicate(timeout=120) == ("", "")
     assert process.returncode == -number  # 130 and 143 for a shell
     stop = time.monotonic() + 10
     while any(os.path.exists(f"/proc/{child}") for child in children):

@@ -45,7 +45,7 @@ def fetched(address):
     """Status, headers and body; no proxy of this machine is asked."""
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with opener.open(address, timeout=10) as response:
+        with opener.open(address, timeout=60) as response:
             return response.status, response.headers, response.read()
     except urllib.error.HTTPError as error:
         with error:
@@ -101,8 +101,8 @@ def test_the_socket_wants_the_token_too(server, heard):
     assert heard == []
     own = server.address.rsplit("/", 2)[0]
     with websockets.connect(address + "socket", proxy=None, origin=own) as right:
-        assert json.loads(right.recv(timeout=10)) == {"kind": "hello", "number": 3}
-        message = right.recv(timeout=10)
+        assert json.loads(right.recv(timeout=60)) == {"kind": "hello", "number": 3}
+        message = right.recv(timeout=60)
         (size,) = struct.unpack_from("<I", message)
         assert size % 4 == 0
         assert json.loads(message[4 : 4 + size]) == {"kind": "frame", "frame": 1}
