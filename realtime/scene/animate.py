@@ -56,6 +56,7 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
         extent_spheres(extent),
         float(extent.back[0]),
         types,
+        without_sides=float(extent.lowest[0]) < 0,
     )
 
 

@@ -27,6 +27,9 @@ from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 Array = NDArray[np.float64]
 
 _MARGIN = 1.001  # so that rounding leaves nothing outside
+#: How far behind the rectangle a medium without sides is followed, in depths of the map: only rays
+#: within a thousandth of a radian of the light's direction are still over the map there.
+_BEHIND = 1024.0
 
 
 def media_spheres(boundaries: Sequence[Any]) -> Array:
@@ -112,7 +115,7 @@ def distance_before(spheres: Array, shapes) -> float:
 
 
 def directional_fields(
-    axis: Array, spheres: Array, back: float, types: ArrayTypes
+    axis: Array, spheres: Array, back: float, types: ArrayTypes, *, without_sides: bool = False
 ) -> dict[str, Any]:
     """Return the fields of a directional `Light` that follow from its direction and the media.
 
@@ -129,6 +132,8 @@ def directional_fields(
         From `distance_before` [m].
     types
         Array types of the fields.
+    without_sides
+        Whether the medium goes on beside and behind the rectangle.
     """
     middle = _middle(spheres)
     across, up, corner = _least_rectangle(axis, spheres[:, :3] - middle, spheres[:, 3])
@@ -139,7 +144,9 @@ def directional_fields(
     arrays = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
     position = arrays.pop("position")
     media = types.vector(*(aligned_array(types.scalar, column) for column in spheres[:, :3].T))
-    numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
+    depth = float(np.float32(back + behind))
+    numbers = {"depth": types.scalar(depth), "back": types.scalar(back)}
+    numbers["lowest"] = types.scalar(-_BEHIND * depth if without_sides else 0.0)
     extent = DirectionalExtent(
         **arrays, **numbers, media=media, radii=aligned_array(types.scalar, spheres[:, 3])
     )

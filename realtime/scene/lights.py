@@ -64,11 +64,15 @@ class Cone:
 
 @dataclass(frozen=True)
 class DirectionalExtent:
-    """A rectangle across a directional light where the media end, and the media before it."""
+    """A rectangle across a directional light, and the media before it, which end there, or the
+    shapes before it in a medium without sides.
+    """
 
     across: Any  #: half of one side, a three-vector [m]
     up: Any  #: half of the other [m]
     depth: Any  #: how far before it there are no shapes any more [m]
+    #: how far before it media end, 0; or a number below 0, where they have no sides [m]
+    lowest: Any
     media: Any  #: middles of spheres whose hull holds the media, several entries [m]
     radii: Any  #: their radii [m]
     back: Any  #: how far from the middle of the media there are none, in any direction [m]

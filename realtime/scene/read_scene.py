@@ -177,7 +177,13 @@ class _Bodies:
         """Return the fields of a `Light` from infinity, which travels along a unit vector."""
         # Without bounded media the beam lights all that is between the opaque shapes.
         spheres = media_spheres(self.boundaries) if self.boundaries else shape_spheres(self.opaque)
-        return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
+        return directional_fields(
+            axis,
+            spheres,
+            distance_before(spheres, self.opaque),
+            types,
+            without_sides=not self.boundaries,
+        )
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:

@@ -7,7 +7,7 @@ lies between the light and the displaced grid is lit. A point has the projective
 s) of `realtime.shadow_maps.projection`: planes stay planes and lines stay lines. The triangles of
 the displaced grid are therefore triangles over the texels of the map, linear in s; a camera ray is
 a straight line; and a point is lit where its s is above the height field. Where nothing is hit s =
-0: a vertex at infinity, or for parallel rays the end of the media.
+0: a vertex at infinity, or for parallel rays the end of the media; without sides it is far behind.
 
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
 

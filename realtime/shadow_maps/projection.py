@@ -9,12 +9,13 @@ light at (l, w) both projections are one homogeneous map from (u, v, s) to the p
 
 * w = 1: m is the axis, and P = l + (axis + u across + v up) / s. Hence s is the inverse
   of the planar depth [1/m].
-* w = 0: l = -axis, m is the middle of the rectangle behind which there are no media, and P = m + u
+* w = 0: l = -axis, m is the middle of the rectangle behind which there are no shapes, and P = m + u
   across + v up - s axis. Hence s is the height above that rectangle [m].
 
 It is linear in homogeneous coordinates, so planes stay planes and lines stay lines; the light
 itself is s = infinity, and a point is lit where its s is above the s of the first surface. Where
-nothing is hit s = 0: at infinity, or at the end of the media. The map is inverted with the vector d
+nothing is hit s = 0: at infinity, or at the end of the media; s is far below 0 in a medium without
+sides, which goes on behind the rectangle. The map is inverted with the vector d
 from l (w = 1) or m (w = 0) to the point: for d = a across + b up + c axis,
 
     (u, v, s, 1) ~ (a, b, 1, c)  for w = 1,        (a, b, -c, 1)  for w = 0.
@@ -40,6 +41,13 @@ class Projection:
     basis: tuple[Any, Any, Any] | None
     #: w = 0: distance along the axis from where rays of the map start to where the media end [m]
     depth: Any = None
+    #: w = 0: the s of what is behind all media, 0 or far below it [m]
+    lowest: Any = 0
+
+    @property
+    def goes_on(self) -> Any:
+        """Whether the medium goes on beside and behind the map of a directional light."""
+        return self.lowest < 0
 
     @property
     def w(self) -> int:
@@ -95,8 +103,8 @@ class Projection:
         `place`: (u, v) on a face; `distance`: along the rays, infinite where nothing is met [m].
         """
         if not self.w:
-            # Rays start `depth` above the rectangle; nothing met before it has the height 0.
-            return dr.maximum(self.depth - distance, 0)
+            # Rays start `depth` above the rectangle; what meets nothing ends behind all media.
+            return dr.maximum(self.depth - distance, self.lowest)
         # A point at planar depth 1 is sqrt(1 + |across|^2 (u^2 + v^2)) from the light.
         u, v = place
         across = dr.squared_norm(self.basis[0]) if self.basis else type(distance)(1)
@@ -107,7 +115,9 @@ def light_projection(light: Light) -> Projection:
     """Return the projection of the shadow map of a light, in the light's precision."""
     basis = light_basis(light)
     rounded = basis and tuple(type(light.position)(basis_vector) for basis_vector in basis)
-    return Projection(rounded, None if light.w else light.extent.depth)
+    if light.w:
+        return Projection(rounded)
+    return Projection(rounded, light.extent.depth, light.extent.lowest)
 
 
 def light_faces(light: Light) -> int:

@@ -12,7 +12,8 @@ of the ray, each is (1 - t) its value at one and t its value at the other, and x
 of an unbounded ray s = 0 and y = 1 / dc.
 
 On the face of a directional light u, v and s are linear in x itself, so y = x with weight 1 in
-place of s; the ray is cut where s = 0, and all before the largest height is lit.
+place of s; the ray is cut where the media end, at s = 0 or far behind it, and all before the
+largest height is lit. Where media have no sides, all beside the map is lit too.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray
 that stays on the border of two faces is in the face of the first axis alone: neighbours compute
@@ -61,9 +62,10 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
-    # Behind the rectangle of a directional light's map there are no media: the ray ends at s = 0.
+    # The ray of a directional light's map ends with the media. Without sides that is a place so far
+    # away that a little before it does as well: there D is above 0 where nothing stands.
     if not heights.projection.w:
-        begin, end = _cut(begin, end, s0, ds)
+        begin, end = _cut(begin, end, s0 - 0.999 * heights.projection.lowest, ds)
     # The neighbours across come later in the order of axes, except for the last axis; those
     # above only for the first one.
     for start, slope, is_first in (

@@ -189,7 +189,7 @@ def _widen(heights: InverseDepthField, bounds, texel, walls) -> None:
     value = ends - dr.select(
         right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3])
     )
-    value = dr.maximum(value, 0)  # no ray comes below
+    value = dr.maximum(value, heights.projection.lowest)  # no ray comes below
     low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
     # Every node that holds the texel, from the whole face down to the texel itself.
     for level in range(heights.finest + 1):

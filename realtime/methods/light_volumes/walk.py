@@ -123,10 +123,14 @@ def sum_lit_intervals(
         # which is the bias of this shadow.
         surface_lit = ~ray.walks | (line.excess[1] > -line.slack)
         reached = dr.select(passes & (end >= x1), surface_lit, reached)
-        return to_come >> _FACE_BITS, walk.lit, walk.opened, walk.intervals, reached
+        # Beside the map of a light whose medium has no sides nothing stands.
+        leaves = passes & beside & ~walk.lit
+        opened = dr.select(leaves, end, walk.opened)
+        return to_come >> _FACE_BITS, walk.lit | leaves, opened, walk.intervals, reached
 
     none = dr.full(mi.Bool, False, width)
-    state = none, start, no_intervals(zero, +start), none & True
+    beside = none | heights.projection.goes_on
+    state = +beside, start, no_intervals(zero, +start), none & True
     if heights.faces == 1:
         _, *state = of_face(mi.UInt32(0), *state)
     else:

@@ -9,8 +9,9 @@ import pytest
 
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
 from airlight.reference.quadrature.reference import reference_image
+from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.meshes import box, placed
-from airlight.validation.scenes.parts import mitsuba_mesh
+from airlight.validation.scenes.parts import camera, height_fog, mitsuba_mesh
 from tests.helpers import airlight_sum
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import ALONG, CUBE_AT, SIDES, TURN, plank, rays, shaded, sun, unit
@@ -136,3 +137,27 @@ def test_a_map_of_rays_that_miss_all_media(variant):
     }
     for method, parameters in (("ray-march", {"shadow": "map"}), ("light-volumes", {})):
         assert np.all(render(scene, method, **parameters).airlight == 0)
+
+
+@pytest.mark.parametrize("method", ["light-volumes", "min-max"])
+def test_fog_without_sides_is_lit_beside_and_behind_the_map(variant, method):
+    """A camera below all shapes saw no light, nor did one that looked past them: light volumes
+    were 80 % off where a plate hung over the camera.
+    """
+    register_height_fog()
+    seen = {
+        "below the shapes": ((0.3, -6.0, -3.1), (0.1, 0.0, -2.3)),
+        "past them": ((0.3, -6.0, 1.1), (7.0, 0.0, 1.3)),
+    }
+    for origin, target in seen.values():
+        scene = {
+            "type": "scene",
+            "fog": height_fog(
+                [(0.11, 0.0, 4.1)], -30.0, 40.0, albedo=(0.9, 0.7, 0.5), phase={"type": "isotropic"}
+            ),
+            "sensor": camera(origin, target, fov=61.0, size=(32, 24)),
+            "sun": sun(),
+            "plate": solid_box((2.3, 1.9, 0.2), (0.2, 0.1, 1.3)),
+        }
+        reference = reference_image(mi.load_dict(scene)).airlight
+        assert relative_rmse(render(scene, method, map=256).airlight, reference) < 0.02
