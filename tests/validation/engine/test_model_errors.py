@@ -14,8 +14,8 @@ from airlight.validation.engine.images import EngineImage, captured_model
 from airlight.validation.engine.judge import compare_scene
 from airlight.validation.engine.model_errors import model_errors
 from airlight.validation.scenes.loading import load_scene
-from airlight.validation.study import scene as scene_study
 from airlight.validation.study.scene import open_scene
+from airlight.validation.study.scene_images import image_row
 from airlight.validation.study.study import standard_study
 
 MODEL = Model(light_path="off", law="softened:1:16", range="quartic:8", name="an engine")
@@ -168,7 +168,7 @@ def test_the_row_of_an_image_has_both_errors(variant, tmp_path):
     )
     study = replace(standard_study("quick"), scenes=("sphere-spot",), configurations=())
     opened = open_scene("sphere-spot", study.of("sphere-spot").at((32, 24)), {})
-    judged = scene_study._image(
+    judged = image_row(
         opened, EngineImage("sphere-spot", "engine", tmp_path / "sphere-spot.engine.exr"), None
     )
     assert judged.row.model.algorithm == pytest.approx(0.02, rel=1e-3)
