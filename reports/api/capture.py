@@ -121,7 +121,7 @@ def capture(
     engine
         The name of an adapter, such as playcanvas or three.
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file; from Python also what
         `load_scene` takes or returns.
     output
         The .exr file to write.

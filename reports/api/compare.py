@@ -78,8 +78,9 @@ def compare(
     Parameters
     ----------
     reference
-        The image to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also a result
-        of `reference` or `render`, or an array (height, width, 3) [W/(m^2 sr)].
+        The image to compare with: an EXR file, or a scene (built-in or a Mitsuba XML or pbrt file);
+        from Python also a result of `reference` or `render`, or an array (height, width, 3)
+        [W/(m^2 sr)].
     test
         The image to judge, an EXR file; from Python also a result or an array. With a scene also
         several files, # for each digit of their number, such as frames/####.exr: the frames of
@@ -278,7 +279,7 @@ def _is_scene(word: Any) -> bool:
 
 
 def _is_xml(word: Any) -> bool:
-    return Path(str(word)).suffix.lower() == ".xml"
+    return Path(str(word)).suffix.lower() in (".xml", ".pbrt")
 
 
 @contextmanager

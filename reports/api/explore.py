@@ -56,7 +56,7 @@ def describe(
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file; from Python also what
         `load_scene` takes or returns.
     change
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
@@ -69,8 +69,8 @@ def describe(
         all: write the changed scenes of `airlight check` into the folder of `--output`, each as JSON
         and as glTF, and check.json, which names the frames to render.
     output
-        Write the scene as binary glTF 2.0, a .glb file, or its height fog or density grid as a grid
-        of Mitsuba, a .vol file.
+        Write the scene as binary glTF 2.0, a .glb file, as a scene of pbrt-v4, a .pbrt file, or
+        its height fog or density grid as a grid of Mitsuba, a .vol file.
     progress
         True prints notes on the scene on the error stream.
 
@@ -84,25 +84,31 @@ def describe(
         beside = {"change": several(change), "model": model}
         exclude("variants", "are those of a scene as it is", beside)
         return _variants(scene, size, several(output))
-    files = output_files(output, ".glb", ".vol")
+    files = output_files(output, ".glb", ".pbrt", ".vol")
     check_scene(scene)
     changes, chosen = changes_of(change), chosen_model(model)
     from airlight.reports.api.scenes import opened
     from airlight.reports.interchange.gltf import write_gltf
+    from airlight.reports.interchange.pbrt import write_pbrt
     from airlight.reports.interchange.scene import describe_scene
     from airlight.validation.scenes.changes import change_words
 
     loaded = opened(scene, size, changes, chosen)
-    # A .vol file holds a medium that varies, sampled to a grid; every other file is glTF.
+    # The ending says what is written; a .vol file holds a medium that varies, sampled to a grid.
     described = describe_scene(loaded)
-    volumes = [path for path in files if path.suffix.lower() == ".vol"]
-    written = [write_gltf(path, loaded) for path in files if path not in volumes]
-    grids = [_write_grid(path, loaded.scene) for path in volumes]
+    by_ending = {
+        ending: [path for path in files if path.suffix.lower() == ending]
+        for ending in (".glb", ".pbrt", ".vol")
+    }
+    pbrt = [str(each) for path in by_ending[".pbrt"] for each in write_pbrt(path, loaded)]
+    grids = [_write_grid(path, loaded.scene) for path in by_ending[".vol"]]
+    written = [write_gltf(path, loaded) for path in by_ending[".glb"]]
     note(progress, described["notes"])
     return Description(
         described=described,
         changes=tuple(change_words(changes)),
         gltf=written[-1] if written else None,
+        pbrt=tuple(pbrt),
         grid=grids[-1] if grids else "",
         advice=_model_advice(loaded) if chosen is None else "",
     )
@@ -115,6 +121,7 @@ class Description(Result):
     described: Mapping[str, Any]  #: see `reports.interchange.scene.describe_scene`
     changes: tuple[str, ...] = ()  #: of the scene, in words
     gltf: Mapping[str, Any] | None = None  #: the glTF file that was written
+    pbrt: tuple[str, ...] = ()  #: the files of the pbrt scene that was written
     grid: str = ""  #: the medium that reads the volume file that was written, as XML
     advice: str = ""  #: the model that the engine of a height fog solves, where none is named
 
@@ -161,6 +168,7 @@ class Description(Result):
             cut = ", ".join(self.gltf["tessellated"])
             more = f"; cut into triangles: {cut}" if cut else ""
             lines.append(f"{self.gltf['path']}: {self.gltf['triangles']} triangles{more}")
+        lines += [f"{self.pbrt[0]}: the scene for pbrt-v4"] if self.pbrt else []
         return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -168,6 +176,7 @@ class Description(Result):
         own = {
             "changes": list(self.changes),
             "gltf": self.gltf,
+            "pbrt": list(self.pbrt),
             "grid": self.grid,
             "advice": self.advice,
         }
@@ -244,7 +253,7 @@ def _write_grid(path: Path, scene: Any) -> str:
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
             f"output: got {path}, and the medium is no height fog and no grid; expected a name "
-            "that ends in .glb"
+            "that ends in .glb or .pbrt"
         )
     return write_fog_grid(path, medium)
 
@@ -273,7 +282,7 @@ def view(
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file.
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file.
     method
         A method of `airlight list methods`, or a user's as MODULE:FUNCTION,
         FILE.py:FUNCTION or FILE.glsl.

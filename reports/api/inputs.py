@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from airlight.validation.scenes.loading import LoadedScene
     from airlight.validation.study.configuration import Configuration
 
-    #: A built-in name, random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, an
+    #: A built-in name, random:SEED, the path of a Mitsuba XML or pbrt file, a Mitsuba dictionary, an
     #: `mi.Scene`, or what `load_scene` returned.
     SceneLike: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | LoadedScene | Any
     Scenes: TypeAlias = SceneLike | Sequence[SceneLike]

@@ -32,8 +32,8 @@ def rays(scene: SceneLike, size: Size | None = None) -> CameraRays:
     Parameters
     ----------
     scene
-        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML file, a Mitsuba
-        dictionary, or a scene that is loaded.
+        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML or pbrt file, a
+        Mitsuba dictionary, or a scene that is loaded.
     size
         Width and height of its image [pixels], or 'WxH'; the scene's own by default.
 

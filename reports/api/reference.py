@@ -66,7 +66,7 @@ def reference(
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file; from Python also what
         `load_scene` takes or returns.
     estimator
         quadrature has an error in every pixel, proven or estimated. single-scatter and volpath use random samples

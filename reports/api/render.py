@@ -56,8 +56,8 @@ def load_scene(
     Parameters
     ----------
     scene
-        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML file, a Mitsuba
-        dictionary, or a Mitsuba scene.
+        A built-in name (`airlight.SCENES`), random:SEED, the path of a Mitsuba XML or pbrt file, a
+        Mitsuba dictionary, or a Mitsuba scene.
     size
         Width and height of its image [pixels], or 'WxH'; the scene's own by default.
     model
@@ -113,7 +113,7 @@ def render(
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file; from Python also what
         `load_scene` takes or returns.
     method
         A method of `airlight list methods`, or a user's as MODULE:FUNCTION, FILE.py:FUNCTION or FILE.glsl; from Python

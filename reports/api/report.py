@@ -168,8 +168,8 @@ def report(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; four with `--quick`, eleven by default.
-        Or a study, a TOML file as for `airlight sweep`.
+        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; four with `--quick`, eleven by
+        default. Or a study, a TOML file as for `airlight sweep`.
     quick
         Few scenes and small images, for a first look in some minutes.
     full

@@ -124,9 +124,8 @@ def _from_mitsuba(scene: Any) -> OpenScene:
                 "you build it"
             )
         raise InputError(
-            f"scene: got {kind.__name__}, expected a name, the path of a Mitsuba XML file, a "
-            "Mitsuba dictionary of the "
-            "type 'scene', or a scene that is loaded"
+            f"scene: got {kind.__name__}, expected a name, the path of a Mitsuba XML or pbrt file, "
+            "a Mitsuba dictionary of the type 'scene', or a scene that is loaded"
         )
     if not scene.sensors():
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")

@@ -6,7 +6,6 @@ that sets a Mitsuba variant.
 """
 
 import ctypes
-import importlib.util
 import os
 import sys
 from collections.abc import Mapping
@@ -17,6 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airlight import __version__
+from airlight.errors import MissingError as MissingError
+from airlight.errors import require as require
 from airlight.reference.storage.build import build
 from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.gpu import cuda_status, optix_status
@@ -39,16 +40,6 @@ _PACKAGES = (
     "colour-science",
     "matplotlib",
 )
-
-
-class MissingError(RuntimeError):
-    """Something that airlight needs is missing on this machine.
-
-    The message is one line that says what is missing and what to type. The command line prints it
-    without a traceback and exits with status 3.
-    """
-
-    extra: str | None = None  #: whose packages are missing, where it is these
 
 
 #: Threads of Dr.Jit. With one, Mitsuba 3.9.1 never ends reading or writing an EXR file: its tasks
@@ -148,17 +139,6 @@ def activate(variant: str | None = None) -> str:
     dr.set_thread_count(max(LEAST_THREADS, dr.thread_count()))
     log_to_error_stream()
     return chosen.variant
-
-
-def require(package: str, extra: str, what: str) -> None:
-    """Raise MissingError where a package of an extra is not installed, before any work."""
-    if importlib.util.find_spec(package) is None:
-        error = MissingError(
-            f"{what} needs the package {package}: `./airlight` brings it in a clone, `pip install "
-            f"{package}` elsewhere"
-        )
-        error.extra = extra
-        raise error
 
 
 def child_environment(variant: str | None = None) -> dict[str, str]:

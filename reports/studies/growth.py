@@ -41,7 +41,7 @@ def scaling(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
+        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; colonnade by default.
     kinds
         The kinds of growing work: some of size,triangles,lights,map; all by default.
     method

@@ -150,7 +150,8 @@ def methods(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
+        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; all built-in scenes for fog by
+        default.
     method
         A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or
         FILE.glsl, or 'all', the default; may be given several times. A name stands for its standard
@@ -250,7 +251,7 @@ def decomposition(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
+        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; colonnade by default.
     method
         A method, as in `airlight study methods`; by default a ray march by a
         map, min-max and froxel-fog.

@@ -46,7 +46,7 @@ def noise(
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file.
+        A built-in scene, random:SEED or a Mitsuba XML or pbrt file.
     runs
         Number of runs of each method that draws random numbers.
     method

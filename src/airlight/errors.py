@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one exception for a user's mistake, and the name that a user may have meant.
+"""The one exception for a user's mistake, the one for what is missing on the machine, and the
+name that a user may have meant.
 
-Both sides of a comparison raise it: it computes nothing.
+Both sides of a comparison raise them: they compute nothing.
 """
 
 import difflib
+import importlib.util
 from collections.abc import Iterable
 
 
@@ -14,6 +16,27 @@ class InputError(ValueError):
     The message is one line that says what was given, what is expected and what to do. The command
     line prints it without a traceback and exits with status 2.
     """
+
+
+class MissingError(RuntimeError):
+    """Something that airlight needs is missing on this machine.
+
+    The message is one line that says what is missing and what to type. The command line prints it
+    without a traceback and exits with status 3.
+    """
+
+    extra: str | None = None  #: whose packages are missing, where it is these
+
+
+def require(package: str, extra: str, what: str) -> None:
+    """Raise MissingError where a package of an extra is not installed, before any work."""
+    if importlib.util.find_spec(package) is None:
+        error = MissingError(
+            f"{what} needs the package {package}: `./airlight` brings it in a clone, `pip install "
+            f"{package}` elsewhere"
+        )
+        error.extra = extra
+        raise error
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

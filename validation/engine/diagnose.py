@@ -178,7 +178,7 @@ def diagnose_file(
     path
         The EXR file.
     scene
-        A built-in scene or a Mitsuba XML file.
+        A built-in scene or a Mitsuba XML or pbrt file.
     layer, holds
         Which layer, and what it holds, see `validation.engine.observation.judged_layer`.
     pixel, light, progress

@@ -180,7 +180,7 @@ def compare_scene(
     Parameters
     ----------
     scene
-        A built-in scene or a Mitsuba XML file.
+        A built-in scene or a Mitsuba XML or pbrt file.
     path
         The EXR file.
     layer, holds

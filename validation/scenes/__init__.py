@@ -19,7 +19,9 @@ Read in this order:
 - `bodies.py`: refuses bounds of media that are no bodies beside one another;
 - `changes.py`: camera, lights and media of a scene changed by name, isotropic
   media given a mean cosine;
+- `vdb.py`: grids of OpenVDB as values and a box;
+- `pbrt`: scenes of pbrt as text and meshes for Mitsuba's parser;
 - `files`: scene files as people write them, made into what both readers take;
-- `loading.py`: a scene by its name or from a Mitsuba XML file, and what it is in keys of results;
+- `loading.py`: a scene by its name or from a file, and what it is in keys of results;
 - `animation.py`: the scenes of the frames of an animation.
 """

@@ -57,12 +57,12 @@ def load_scene(
     size: tuple[int, int] | None = None,
     changes: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> LoadedScene:
-    """Load a built-in scene or a Mitsuba XML file into the active variant.
+    """Load a built-in scene, a Mitsuba XML file or a pbrt file into the active variant.
 
     `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a
-    Mitsuba scene file; `size`: width and height of the image [pixels], by default the size that the
-    scene has; `changes`: values by name that replace those of the scene, see
-    `validation.scenes.changes`.
+    scene file of Mitsuba, or of pbrt, which ends in .pbrt; `size`: width and height of the image
+    [pixels], by default the size that the scene has; `changes`: values by name that replace those
+    of the scene, see `validation.scenes.changes`.
 
     Raises InputError for an unknown name, a missing or malformed file, a size that no image can
     have, and a change that the scene cannot have. Whether methods and reference support the scene

@@ -58,6 +58,11 @@ def random_parts(name: str) -> tuple[int, Path | None]:
     return int(seed), Path(unquote(value)) if comma else None
 
 
+def is_pbrt(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path is meant as a scene of pbrt."""
+    return Path(path).suffix.lower() == ".pbrt"
+
+
 def scene_stem(name_or_path: str) -> str:
     """Return the stem of the names of a scene's files: its name, the stem of
     its path, or 'random-7'.
@@ -85,7 +90,7 @@ def scene_file(name_or_path: str) -> Path:
     path, names = Path(name_or_path), scene_names()
     if name_or_path.strip() and path.is_dir():
         raise InputError(
-            f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML file in it"
+            f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML or pbrt file in it"
         )
     if path.is_file():
         return path
@@ -93,10 +98,10 @@ def scene_file(name_or_path: str) -> Path:
     # spelling the message then helps with.
     if path.suffix or os.sep in name_or_path:
         raise InputError(
-            f"scene: there is no file {name_or_path}; expected a Mitsuba XML file, random:SEED or "
-            f"one of {', '.join(names)}"
+            f"scene: there is no file {name_or_path}; expected a Mitsuba XML or pbrt file, random:SEED "
+            f"or one of {', '.join(names)}"
         )
     raise InputError(
         f"scene: got {name_or_path!r}, expected one of {', '.join(names)}, random:SEED or the path "
-        f"of a Mitsuba XML file{nearest(name_or_path, names)}"
+        f"of a Mitsuba XML or pbrt file{nearest(name_or_path, names)}"
     )

@@ -126,7 +126,7 @@ class SceneStudy:
 
 
 def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> SceneStudy:
-    """Load a scene for a study, by its built-in name or by the path of a Mitsuba XML file."""
+    """Load a scene for a study, by its built-in name or by the path of its file."""
     return SceneStudy(load_scene(name_or_path, study.sizes[0]), study, machine)
 
 

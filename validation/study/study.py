@@ -419,8 +419,8 @@ def _scene(what: str, value: object, *, folder: Path) -> str:
     path = folder / word
     if not path.is_file():
         raise InputError(
-            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML file "
-            "beside the study" + nearest(word, SCENES)
+            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML or "
+            "pbrt file beside the study" + nearest(word, SCENES)
         )
     return str(path.resolve())
 

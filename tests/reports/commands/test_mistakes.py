@@ -89,7 +89,7 @@ MISTAKES = (
     ("compare smoke image.exr --fit sigma_t", "the medium is a density grid"),
     ("compare smoke image.exr --diagnose", "the medium is a density grid"),
     ("describe open-frog", "did you mean 'open-fog'"),
-    ("describe open-fog -o fog.gltf", "expected a name that ends in .glb or .vol"),
+    ("describe open-fog -o fog.gltf", "expected a name that ends in .glb or .pbrt or .vol"),
     ("study integrals rays.csv --phase mie:51", "--phase"),
     ("study slab --tau 2", "--tau"),
     ("study slab 0 30", "expected a thickness"),

@@ -112,7 +112,7 @@ MISTAKES = {
     ),
     "OpenVDB": (
         smoke("smoke.vdb"),
-        r"smoke.vdb, OpenVDB, which is not read; expected a .vol file.*write\('smoke.vol'\)",
+        "gridvolume of medium 'fog' names the file smoke.vdb, which is not in",
     ),
     "an array for a grid": (
         smoke("values.npy"),

@@ -11,6 +11,7 @@ Read in this order:
 - `text.py`: what is no scene, before Mitsuba reads it;
 - `nodes.py`: the nodes of a parsed file;
 - `media.py`: extinction and albedo from what old files have;
+- `grids.py`: grids of OpenVDB as grids of Mitsuba;
 - `shapes.py`: instances written out, lamps on quads as rectangles, rooms of fog as boxes;
 - `camera.py`: what no camera may be, and what its clip planes cut from Mitsuba's images;
 - `references.py`: media that opaque shapes reference;

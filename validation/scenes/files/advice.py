@@ -95,9 +95,7 @@ def check_files(state: mi.parser.ParserState, path: Path) -> None:
         name = _name(state, index)
         # As Mitsuba resolves it: beside the scene file, then in its own folders.
         place = Path(str(mi.file_resolver().resolve(file)))
-        vdb = place.suffix.lower() in (".vdb", ".nvdb")
-        # A missing OpenVDB grid gets the second message: its format is refused anyway.
-        if not place.is_file() and not (vdb and plugin == "gridvolume"):
+        if not place.is_file():
             missing = (
                 "does not exist" if place.is_absolute() else f"is not in {path.parent.resolve()}"
             )
@@ -108,13 +106,11 @@ def check_files(state: mi.parser.ParserState, path: Path) -> None:
                 "from the scene's "
                 f"folder{slashes}: copy it there, or correct the filename"
             )
-        if plugin == "gridvolume" and (vdb or not _is_grid(place)):
-            what = "OpenVDB" if vdb else "no grid of Mitsuba"
+        if plugin == "gridvolume" and not _is_grid(place):
             raise InputError(
-                f"scene {path}: {name} names the file {file}, {what}, which is not read; expected "
-                "a .vol file: read "
-                "the values, (z, y, x), by a library of that format, and write them by "
-                f"mi.VolumeGrid(values).write('{place.stem}.vol')"
+                f"scene {path}: {name} names the file {file}, no grid of Mitsuba, which is not "
+                "read; expected a .vol or .vdb file: read the values, (z, y, x), by a library of "
+                f"that format, and write them by mi.VolumeGrid(values).write('{place.stem}.vol')"
             )
 
 

@@ -10,12 +10,13 @@ from types import MappingProxyType
 
 import mitsuba as mi
 
-from airlight.errors import InputError
+from airlight.errors import InputError, MissingError
 from airlight.reference.storage.files import temporary_folder
 from airlight.reference.storage.scene_digest import description_digest, give_description
 from airlight.validation.scenes.changes import give_lobes
 from airlight.validation.scenes.files.advice import check_colours, check_files, in_words
 from airlight.validation.scenes.files.camera import check_camera, clip_notes
+from airlight.validation.scenes.files.grids import give_grids
 from airlight.validation.scenes.files.media import (
     give_extinction,
     grey_densities,
@@ -31,6 +32,8 @@ from airlight.validation.scenes.files.shapes import (
     write_out_instances,
 )
 from airlight.validation.scenes.files.text import check_text
+from airlight.validation.scenes.names import is_pbrt
+from airlight.validation.scenes.pbrt.translate import translate
 
 _TAKEN = {
     "Emitter": ("point", "spot", "directional", "area", "constant", "envmap"),
@@ -58,18 +61,33 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
     # The resolver is global in Mitsuba: files beside this scene must not be found from the next
     # one.
     resolver = mi.file_resolver()
-    check_text(path)
     try:
         mi.set_file_resolver(mi.FileResolver(resolver))
         mi.file_resolver().prepend(str(path.parent))
+        if is_pbrt(path):
+            return _translated(config, path, lobes)
+        check_text(path)
         return _built(config, _parsed(config, path), path, lobes)
-    except InputError:
+    except (InputError, MissingError):
         raise
     # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
     except Exception as error:
         raise InputError(f"scene {path}: Mitsuba cannot read it: {in_words(error)}") from error
     finally:
         mi.set_file_resolver(resolver)
+
+
+def _translated(
+    config: mi.parser.ParserConfig, path: Path, lobes: Mapping[str, float]
+) -> mi.Object:
+    """Read a file of pbrt: its translation is treated as every other file."""
+    # The meshes of the translation are files, which must be there until the scene is built.
+    with temporary_folder() as folder:
+        translation = translate(path, folder)
+        for note in translation.notes:
+            mi.Log(mi.LogLevel.Warn, note)
+        state = mi.parser.parse_string(config, translation.xml)
+        return _built(config, _resolved(config, state), path, lobes)
 
 
 def _parsed(config: mi.parser.ParserConfig, path: Path) -> mi.parser.ParserState:
@@ -84,6 +102,12 @@ def _parsed(config: mi.parser.ParserConfig, path: Path) -> mi.parser.ParserState
         state = mi.parser.parse_string(config, re.sub(r"(</?)lookAt\b", r"\1lookat", text))
     else:
         state = mi.parser.parse_file(config, str(path))
+    return _resolved(config, state)
+
+
+def _resolved(
+    config: mi.parser.ParserConfig, state: mi.parser.ParserState
+) -> mi.parser.ParserState:
     mi.parser.transform_upgrade(config, state)
     mi.parser.transform_resolve(config, state)
     mi.parser.transform_merge_equivalent(
@@ -131,6 +155,7 @@ def _mend(state: mi.parser.ParserState, path: Path) -> None:
     _leave_out_rendering(state)
     name_nodes(state)
     check_kinds(state)
+    give_grids(state)
     check_files(state, path)
     for note in [*give_extinction(state), *mirrored_grids(state)]:
         mi.Log(mi.LogLevel.Warn, note)
