@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight.export`: an airlight kernel as shader code."""
+"""`airlight.export`: an airlight kernel as shader code; the conformance kit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from airlight.errors import InputError
 from airlight.reference.storage.build import build
-from airlight.reports.api.inputs import Files, one_error, output_files
+from airlight.reports.api.inputs import File, Files, exclude, one_error, output_files
 from airlight.reports.tables.record import Result
+from airlight.reports.tables.table import Column, Table, table
 
 #: The largest errors, as `python -m tests.helpers.exported` measured them.
 MEASURED = Path(__file__).parents[1] / "data" / "exported.json"
@@ -39,6 +41,69 @@ class Exported(Result):
         return [f"wrote {path}" for path in self.written] or [self.code.rstrip("\n")]
 
 
+@dataclass(frozen=True)
+class KitGroup:
+    """Certified rays of one quantity in the kit."""
+
+    name: str
+    value: str  #: the quantity, as a formula
+    rays: int
+
+
+@dataclass(frozen=True)
+class KitScene:
+    """A certified scene in the kit."""
+
+    name: str
+    files: tuple[str, ...]  #: in the folder of the kit
+    gaps: tuple[str, ...]  #: what a form of it lacks, in words
+
+
+@dataclass(frozen=True, repr=False)
+class Kit(Result):
+    """The conformance kit as it was written."""
+
+    folder: str
+    files: tuple[str, ...]  #: in the folder, those of scenes excepted
+    groups: tuple[KitGroup, ...]
+    scenes: tuple[KitScene, ...]
+
+    @property
+    def title(self) -> str:
+        """How much is in it."""
+        rays = sum(group.rays for group in self.groups)
+        return f"conformance kit: {rays} certified rays, {len(self.scenes)} scenes"
+
+    @property
+    def tables(self) -> Sequence[Table]:
+        """The groups of rays, and the scenes with what they lack."""
+        rays = table(
+            "rays",
+            (
+                Column("group", "group", words=True),
+                Column("rays", "rays"),
+                Column("value", "a function returns", words=True, long=True),
+            ),
+            [(group.name, group.rays, group.value) for group in self.groups],
+        )
+        scenes = table(
+            "scenes",
+            (
+                Column("scene", "scene", words=True),
+                Column("files", "files"),
+                Column("gaps", "not there, or not as certified", words=True, long=True),
+            ),
+            [(scene.name, len(scene.files), "; ".join(scene.gaps)) for scene in self.scenes],
+        )
+        return rays, scenes
+
+    @property
+    def lines(self) -> list[str]:
+        """Where the kit was written, and the page to read first."""
+        count = len(self.files) + sum(len(scene.files) for scene in self.scenes)
+        return [f"wrote {count} files into {self.folder}", f"read {self.folder}/README.md first"]
+
+
 @one_error
 def export(
     kernel: str = "exact",
@@ -47,13 +112,17 @@ def export(
     phase: str = "isotropic",
     test: bool = False,
     output: Files = (),
-) -> Exported:
-    """Print an airlight kernel as shader code, to paste into an engine.
+    kit: File | None = None,
+) -> Exported | Kit:
+    """Print an airlight kernel as shader code, to paste into an engine; write the conformance kit.
 
     The functions are `al_integral`, the airlight integral J [1/m]; `al_ray`, foot and height of a
     light over a ray; and `al_airlight`, the radiance. The head of the text says what they take, and
     the largest error and where it was measured. The text may be used without a notice (MIT-0). GLSL
     is for 4.30 and ES 3.00 with `precision highp float` and `precision highp int`.
+
+    The conformance kit tests code of your own: certified rays in C, Rust, JavaScript, GLSL and
+    JSON, and certified scenes for Mitsuba, pbrt, glTF, Blender and Godot, with the expected pixels.
 
     Parameters
     ----------
@@ -68,11 +137,14 @@ def export(
         Add `al_test`, the largest relative error over eight rays whose integral is known.
     output
         Write the text to this file.
+    kit
+        Write the conformance kit into this folder, which is new or empty, and no kernel.
 
     Raises
     ------
     InputError
-        For a kernel, language or phase function that cannot be exported.
+        For a kernel, language or phase function that cannot be exported, and for a folder that
+        has files.
 
     Examples
     --------
@@ -84,6 +156,16 @@ def export(
     from airlight.realtime.scene.phase import named_phase
     from airlight.reference.storage.files import write_text
 
+    if kit is not None:
+        beside = {
+            "kernel": kernel != "exact",
+            "language": language != "glsl",
+            "phase": phase != "isotropic",
+            "test": test,
+            "output": output,
+        }
+        exclude("kit", "it is written with all of its languages", beside)
+        return _kit(Path(kit))
     # The text takes g as an argument, and it has no room for tables: phase functions with tables or
     # with a value of g cannot be exported.
     if phase.startswith(("hg:", "tabulated", "mie")):
@@ -102,6 +184,18 @@ def export(
     for path in files:
         write_text(path, text)
     return Exported(kernel, language, phase, text, error, tuple(map(str, files)))
+
+
+def _kit(folder: Path) -> Kit:
+    from airlight.reports.kit.write import write_kit
+    from airlight.reports.machine.environment import activate
+
+    # Mitsuba reads the scenes that are written as glTF and for pbrt.
+    activate()
+    written = write_kit(folder)
+    groups = [KitGroup(group.name, group.value, len(group.rows)) for group in written.groups]
+    scenes = [KitScene(scene.name, scene.files, scene.gaps) for scene in written.scenes]
+    return Kit(str(folder), written.files, tuple(groups), tuple(scenes))
 
 
 def _head(kernel: str, language: str, phase: str, measured: str) -> str:

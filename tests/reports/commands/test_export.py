@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight export`: the text is printed or written whole; its head says how exact it is."""
+"""`airlight export`: the text is printed or written whole; its head says how exact it is; the kit
+is written whole beside nothing of others.
+"""
 
 import json
 import re
@@ -52,3 +54,48 @@ def test_a_phase_function_that_is_no_function_of_g_is_refused(phase, capsys):
         f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg"
         in capsys.readouterr().err
     )
+
+
+def test_the_kit_is_written_into_an_empty_folder_and_listed(variant, tmp_path, capsys):
+    folder = tmp_path / "kit"
+    assert run(["export", "--kit", str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.endswith(f"read {folder}/README.md first\n")
+    kit = airlight.export(kit=tmp_path / "other")
+    names = {*kit.files, *(name for scene in kit.scenes for name in scene.files)}
+    there = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert names == there
+    assert f"wrote {len(names)} files into {folder}" in printed
+    assert len(kit.scenes) == 12
+    # A file that somebody may have changed is never written again.
+    (folder / "example.c").write_text("mine")
+    assert run(["export", "--kit", str(folder)]) == 2
+    assert "which has files; expected a new or an empty folder" in capsys.readouterr().err
+    assert (folder / "example.c").read_text() == "mine"
+
+
+def test_a_kit_that_fails_leaves_nothing(variant, tmp_path, monkeypatch):
+    def full(path, loaded):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("airlight.reports.kit.write.write_gltf", full)
+    with pytest.raises(OSError, match="No space left"):
+        airlight.export(kit=tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (["quadrature-8"], "kernel"),
+        (["--language", "wgsl"], "language"),
+        (["--phase", "hg"], "phase"),
+        (["--test"], "test"),
+        (["-o", "kit.glsl"], "output"),
+    ],
+)
+def test_the_kit_excludes_all_other_options(words, name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["export", *words, "--kit", "kit"]) == 2
+    assert f"leave out {name}\n" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
