@@ -17,5 +17,7 @@ Read in this order:
 - `view/`: the live view in the browser;
 - `cluster/`: cells and references by the workers of a Dask cluster;
 - `sweep/`: what a sweep says, from its Parquet;
+- `kit/`: certified rays and scenes for other languages and renderers;
+- `challenge/`: unseen scenes of a seed, and one number for an entry;
 - `commands/`: the command line, made of these functions.
 """

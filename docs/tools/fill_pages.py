@@ -16,7 +16,7 @@ import re
 import sys
 from pathlib import Path
 
-from parts import api, engines, listed, measured, paper, shown, tested
+from parts import api, challenge, engines, listed, measured, paper, shown, tested
 
 ROOT = Path(__file__).resolve().parents[2]
 _PART = re.compile(
@@ -32,7 +32,7 @@ def filled(text: str) -> str:
 def _part(match: re.Match[str]) -> str:
     # Only functions that the module defines count: an imported one of the same name is no part.
     name = match[1].replace("-", "_")
-    for module in (api, engines, listed, measured, paper, shown, tested):
+    for module in (api, challenge, engines, listed, measured, paper, shown, tested):
         function = getattr(module, name, None)
         if function is not None and function.__module__ == module.__name__:
             head = match[0].partition("\n")[0]

@@ -14,7 +14,8 @@ Read in this order:
 - `report.py`: `report`; `engines.py`: that on engines of others
 - `diff.py`: `diff` of two reports; `paper.py`: `paper`
 - `sweep.py`: `sweep`
+- `challenge.py`: `challenge_new`, `challenge_score`, `challenge_board`
 - `explore.py`: `describe`, `view`
 - `capture.py`: `capture`, a scene in an engine of others
-- `export.py`: `export`, a kernel as shader code
+- `export.py`: `export`, a kernel as shader code, and the conformance kit
 """

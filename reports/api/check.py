@@ -332,7 +332,7 @@ def _engine(
             # A renderer with noise draws other numbers for each frame.
             drawn = {} if seed is None else {"seed": int(seed) + number}
             capture_of(changed, settings={**settings, **drawn})
-            return dict(read_exr(file).layers)
+            return {name: values.astype(float) for name, values in read_exr(file).layers.items()}
 
         by = f"{first.engine} {first.version}"
         rounding = ROUNDING["half"]  # of the buffers of rasterisers

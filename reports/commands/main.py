@@ -27,6 +27,7 @@ from cyclopts import App, Group, Parameter
 from airlight.errors import InputError
 from airlight.reference.storage.build import build
 from airlight.reports.api.capture import capture
+from airlight.reports.api.challenge import challenge_board, challenge_new, challenge_score
 from airlight.reports.api.check import check
 from airlight.reports.api.compare import compare
 from airlight.reports.api.diff import diff
@@ -79,10 +80,21 @@ _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
     "Start": (doctor, list_, render, view, completion),
     "Measure": (report, diff, sweep, run_study),
     "Images": (reference, compare, check, describe, capture, export),
-    "Papers": (paper,),
+    "Papers": (paper, challenge_new, challenge_score, challenge_board),
     "Develop": (run_tests,),
 }
-_NAMES = {run_tests: "test", run_study: "study"}  #: where the function cannot have the name
+#: where the function cannot have the name; two words are a command of a group
+_NAMES = {
+    run_tests: "test",
+    run_study: "study",
+    challenge_new: "challenge new",
+    challenge_score: "challenge score",
+    challenge_board: "challenge board",
+}
+#: The groups of commands, with their help.
+_GROUPS = {
+    "challenge": "Judge a method in scenes drawn after it is named: one number that a paper can cite."
+}
 _EPILOGUE = f"""Environment
 
 {VARIANT_VARIABLE}: where kernels run, cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
@@ -298,17 +310,28 @@ def make_app(words: Sequence[str] = (), *, whole: bool = False) -> App:
     app["--help"].group = app["--version"].group = Group("Options", sort_key=99)
     # A command has only its name and first sentence until it is the one that runs: reading all
     # signatures would slow every start.
+    groups: dict[str, tuple[App, Group]] = {}
     for number, (title, functions) in enumerate(_PANELS.items()):
         group = Group(title, sort_key=number)
         for at, function in enumerate(functions):
-            name = _NAMES.get(function, function.__name__)
-            asked = whole or name in words[:1]
-            sub = App(name=name, help=_help(function, whole=asked), group=group, sort_key=at, **how)
+            *above, name = _NAMES.get(function, function.__name__).split()
+            asked = whole or [*above, name] == list(words[: len(above) + 1])
+            holder, panel = app, group
+            # The first command of a group makes it.
+            if above:
+                if above[0] not in groups:
+                    made = App(
+                        name=above[0], help=_GROUPS[above[0]], group=group, sort_key=at, **how
+                    )
+                    groups[above[0]] = made, Group("Actions", sort_key=0)
+                    app.command(made)
+                holder, panel = groups[above[0]]
+            sub = App(name=name, help=_help(function, whole=asked), group=panel, sort_key=at, **how)
             if asked and function is run_study:
                 _add_studies(sub, words, whole=whole)
             elif asked:
                 sub.default(_command(function, words, endings=_ENDINGS.get(function, ())))
-            app.command(sub)
+            holder.command(sub)
     return app
 
 
@@ -330,7 +353,8 @@ def _add_studies(app: App, words: Sequence[str], *, whole: bool) -> None:
 def command_names() -> list[tuple[str, ...]]:
     """Return the words of every command and every study."""
     names = [_NAMES.get(each, each.__name__) for several in _PANELS.values() for each in several]
-    return [*((name,) for name in names if name != "study"), *(("study", name) for name in STUDIES)]
+    several = [tuple(name.split()) for name in names if name != "study"]
+    return [*several, *(("study", name) for name in STUDIES)]
 
 
 def find_command(words: Sequence[str]) -> App:

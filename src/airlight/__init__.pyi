@@ -20,6 +20,9 @@ from .reference.scene.model import Model as Model
 from .reference.storage.exr import read_exr as read_exr
 from .reference.storage.exr import write_exr as write_exr
 from .reports.api.capture import capture as capture
+from .reports.api.challenge import challenge_board as challenge_board
+from .reports.api.challenge import challenge_new as challenge_new
+from .reports.api.challenge import challenge_score as challenge_score
 from .reports.api.check import check as check
 from .reports.api.compare import compare as compare
 from .reports.api.diff import diff as diff

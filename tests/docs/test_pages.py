@@ -101,7 +101,9 @@ def test_commands_and_options_that_documents_name_exist():
         )
         for line in lines:
             match = re.match(
-                r"(?:\./)?airlight\s+(study [a-z-]+|[a-z]+)\b(.*)", line, flags=re.DOTALL
+                r"(?:\./)?airlight\s+((?:study|challenge) [a-z-]+|[a-z]+)\b(.*)",
+                line,
+                flags=re.DOTALL,
             )
             if match is None or match[1] == "test":
                 continue

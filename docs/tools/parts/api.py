@@ -22,6 +22,7 @@ TOPICS = {
         "render reference Model compare check capture error_metrics multiple_scattering_fraction Budget"
     ),
     "Measure": "report diff study STUDIES sweep paper configuration time_frame",
+    "A number to cite": "challenge_new challenge_score challenge_board",
     "Scenes": "load_scene describe view SCENES certified_data",
     "Methods and kernels": "METHODS find_method KERNELS export",
     "A method of your own": "rays Method Layers parameter marched_steps light_tables light_choice",
@@ -46,6 +47,9 @@ _RESULTS = (
     "reports.api.explore.Description",
     "reports.api.report.Report",
     "reports.api.engines.EnginesReport",
+    "reports.api.challenge.ChallengeWritten",
+    "reports.api.challenge.ChallengeScore",
+    "reports.api.challenge.ChallengeBoard",
     "reports.studies.registry.Study",
     "reports.studies.methods.MethodsStudy",
     "reports.studies.kernels.Integrals",

@@ -20,7 +20,9 @@ from airlight.reports.studies.registry import STUDIES
 ROOT = Path(__file__).resolve().parents[3]
 _COMMANDS = [["study"], *(["study", name] for name in STUDIES)]
 _COMMANDS += [
-    [cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several
+    cli._NAMES.get(each, each.__name__).split()
+    for several in cli._PANELS.values()
+    for each in several
 ]
 
 
