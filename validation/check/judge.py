@@ -187,8 +187,8 @@ def block_errors(sides: Sides) -> BlockErrors:
     beyond = np.maximum(np.abs(got - wanted) - spread, 0.0) / brightness
     blocks = np.where(known, beyond, -1.0).max(axis=2)
     row, column_ = np.unravel_index(int(blocks.argmax()), blocks.shape)
-    # A mean of n independent values has the variance (mean(d^2) - mean(d)^2)/(n - 1). What sampling
-    # explains of a pixel is no noise.
+    # A mean of n independent values has the variance (mean(d^2) - mean(d)^2)/(n - 1). Differences
+    # that sampling explains are no noise.
     difference = sides.got - sides.wanted
     difference = np.sign(difference) * np.maximum(np.abs(difference) - sampling, 0.0)
     variance = block_means(difference**2, size) - block_means(difference, size) ** 2

@@ -123,7 +123,7 @@ def sum_lit_intervals(
         # which is the bias of this shadow.
         surface_lit = ~ray.walks | (line.excess[1] > -line.slack)
         reached = dr.select(passes & (end >= x1), surface_lit, reached)
-        # Beside the map of a light whose medium has no sides nothing stands.
+        # Nothing stands beside the map of a light whose medium has no sides.
         leaves = passes & beside & ~walk.lit
         opened = dr.select(leaves, end, walk.opened)
         return to_come >> _FACE_BITS, walk.lit | leaves, opened, walk.intervals, reached
