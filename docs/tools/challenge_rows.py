@@ -19,8 +19,7 @@ from pathlib import Path
 
 import airlight
 from airlight.reference.storage.files import write_text
-from airlight.reports.challenge.draw import DrawnScene, draw_scenes
-from airlight.reports.challenge.folder import load_drawn
+from airlight.reports.challenge.draw import DrawnScene, draw_scenes, load_drawn
 from airlight.reports.challenge.record import Score, score_text
 from airlight.reports.challenge.seed import seed_words
 

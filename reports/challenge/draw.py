@@ -18,18 +18,19 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from airlight.reference.quadrature.reference import reference_of
-from airlight.reference.storage.files import temporary_folder
+from airlight.reference.storage.files import temporary_folder, write_bytes
 from airlight.reports.challenge.scene_xml import ply_bytes, scene_xml
 from airlight.reports.challenge.seed import EACH, FORMAT, KINDS, SIZE
 from airlight.validation.certified.files import certified_data
 from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
-from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.scenes.meshes import Mesh, box, grid, icosphere, placed, scaled
 from airlight.validation.scenes.parts import (
     Plugin,
@@ -118,9 +119,7 @@ def draw_scenes(seed: str) -> tuple[DrawnScene, ...]:
 def _is_seen(scene: DrawnScene) -> bool:
     """Return whether fog is lit in half of the view: a camera under a floor sees none of a sun."""
     with temporary_folder() as folder:
-        for name, data in scene.files.items():
-            (folder / name).write_bytes(data)
-        loaded = load_scene(str(folder / scene.file), (16, 12))
+        loaded = load_drawn(folder, scene, (16, 12))
         lit = reference_of(loaded.scene).airlight.max(axis=2) > 0
     return bool(lit.mean() > 0.5)
 
@@ -298,6 +297,21 @@ def _engine(engine: str, draws: Draws) -> tuple[RandomScene, Plugin, str]:
 
 
 # --- files ----------------------------------------------------------------------------------------
+
+
+def load_drawn(folder: Path, scene: DrawnScene, size: tuple[int, int] | None = None) -> LoadedScene:
+    """Write the Mitsuba file of a scene and its meshes into a folder, and load it, at its own
+    size by default.
+    """
+    for name, data in scene.files.items():
+        write_bytes(folder / name, data, flush=False)
+    # Mitsuba's note that its own image of fog without bounds ends at the far plane is no news.
+    level = mi.logger().log_level()
+    mi.logger().set_log_level(mi.LogLevel.Error)
+    try:
+        return replace(load_scene(str(folder / scene.file), size), purpose=scene.purpose)
+    finally:
+        mi.logger().set_log_level(level)
 
 
 def _suns(stage: RandomScene) -> list[Light]:

@@ -4,22 +4,24 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
-
 from airlight.errors import InputError
 from airlight.reference.storage.build import build
-from airlight.reference.storage.files import ensure_folder, write_bytes, write_text
-from airlight.reports.challenge.draw import DrawnScene, draw_scenes, scenes_digest
+from airlight.reference.storage.files import ensure_folder, write_text
+from airlight.reports.challenge.draw import (
+    DrawnScene,
+    draw_scenes,
+    load_drawn,
+    scenes_digest,
+)
 from airlight.reports.challenge.seed import FORMAT, SIZE, check_seed
 from airlight.reports.data.records import read_json
 from airlight.reports.interchange.gltf import write_gltf
 from airlight.reports.interchange.scene import describe_scene
 from airlight.validation.columns import plain, record_of
-from airlight.validation.scenes.loading import LoadedScene, load_scene
 
 FILE, SCENES = "challenge.json", "scenes"  #: in the folder of a challenge
 LAYER = "airlight"  #: of the images of an entry
@@ -98,19 +100,6 @@ def _write_scene(folder: Path, scene: DrawnScene) -> None:
     text = json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False)
     write_text(folder / f"{scene.name}.json", text + "\n")
     write_gltf(folder / f"{scene.name}.glb", loaded)
-
-
-def load_drawn(folder: Path, scene: DrawnScene) -> LoadedScene:
-    """Write the Mitsuba file of a scene and its meshes into a folder, and load it."""
-    for name, data in scene.files.items():
-        write_bytes(folder / name, data, flush=False)
-    # Mitsuba's note that its own image of fog without bounds ends at the far plane is no news.
-    level = mi.logger().log_level()
-    mi.logger().set_log_level(mi.LogLevel.Error)
-    try:
-        return replace(load_scene(str(folder / scene.file)), purpose=scene.purpose)
-    finally:
-        mi.logger().set_log_level(level)
 
 
 def _without_place(described: dict[str, Any], scene: DrawnScene) -> dict[str, Any]:

@@ -18,14 +18,14 @@ from airlight.reference.scene.camera import film_directions, pixel_centres
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.build import build
 from airlight.reference.storage.files import temporary_folder
-from airlight.reports.challenge.draw import DrawnScene, draw_scenes, scenes_digest
+from airlight.reports.challenge.draw import DrawnScene, draw_scenes, load_drawn, scenes_digest
 from airlight.reports.challenge.entry import (
     check_whole,
     images_digest,
     read_airlight,
     read_entry,
 )
-from airlight.reports.challenge.folder import check_scenes, load_drawn
+from airlight.reports.challenge.folder import check_scenes
 from airlight.reports.challenge.number import FLOOR, rounded, rounded_out, scene_error
 from airlight.reports.challenge.record import (
     SCHEMA,

@@ -52,7 +52,7 @@ def test_files_of_certified_scenes_have_the_certified_radiance(
     from airlight.reference.quadrature.image import quadrature_image
     from airlight.reference.scene.read import read_reference
     from airlight.reports.challenge import draw
-    from airlight.reports.challenge.folder import load_drawn
+    from airlight.reports.challenge.draw import load_drawn
 
     monkeypatch.setattr(draw, "_is_shown", lambda stage: True)
     scenes = json.loads((data_folder / "certified_fog.json").read_text())["scenes"]
@@ -67,7 +67,7 @@ def test_files_of_certified_scenes_have_the_certified_radiance(
 
 def test_engines_fog_is_written_by_the_parameters_of_the_engine(small, tmp_path):
     from airlight.reference.scene.read import read_reference
-    from airlight.reports.challenge.folder import load_drawn
+    from airlight.reports.challenge.draw import load_drawn
     from airlight.validation.scenes.engine_fog import fog_of_engine
 
     scene = drawn("7")[2]
