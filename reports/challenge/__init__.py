@@ -4,7 +4,6 @@
 Read in this order:
 
 - `seed.py`: the seed, made of the words of an entry or given;
-- `scene_xml.py`: a scene as a Mitsuba file with meshes beside it;
 - `draw.py`: a seed to 24 scenes of three kinds;
 - `folder.py`: challenge.json, its digest, and the files that `new` writes;
 - `number.py`: the number, its floor and its interval;

@@ -26,8 +26,8 @@ import numpy as np
 
 from airlight.reference.quadrature.reference import reference_of
 from airlight.reference.storage.files import temporary_folder, write_bytes
-from airlight.reports.challenge.scene_xml import ply_bytes, scene_xml
 from airlight.reports.challenge.seed import EACH, FORMAT, KINDS, SIZE
+from airlight.reports.interchange.mitsuba_xml import ply_bytes, scene_xml
 from airlight.validation.certified.files import certified_data
 from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
 from airlight.validation.scenes.loading import LoadedScene, load_scene

@@ -8,6 +8,7 @@ Read in this order:
 - `gltf.py`: the scene as glTF
 - `cut.py`: a mesh cut at the bounds of a medium
 - `pbrt.py`: the scene as a file of pbrt-v4
+- `mitsuba_xml.py`: a scene as a file of Mitsuba
 - `fog_grid.py`: height fog as a grid of densities
 - `words.py`: the scene as a table
 """

@@ -16,9 +16,11 @@ from airlight.validation.arrays import Array
 from airlight.validation.scenes.meshes import Mesh
 from airlight.validation.scenes.parts import Plugin
 
-#: The elements of the plugins that scenes of a challenge have.
+#: The elements of the plugins that such scenes have.
 _ELEMENTS = {
+    "volpath": "integrator",
     "perspective": "sensor",
+    "independent": "sampler",
     "hdrfilm": "film",
     "box": "rfilter",
     "homogeneous": "medium",
@@ -31,24 +33,29 @@ _ELEMENTS = {
     "spot": "emitter",
     "directional": "emitter",
     "ply": "shape",
+    "sphere": "shape",
+    "cube": "shape",
+    "rectangle": "shape",
     "twosided": "bsdf",
     "diffuse": "bsdf",
 }
 #: The elements of lists of three numbers that are no colours, by their names.
-_TRIPLES = {"position": "point", "direction": "vector"}
+_TRIPLES = {"position": "point", "center": "point", "direction": "vector"}
 
 
-def scene_xml(scene: Plugin) -> str:
+def scene_xml(scene: Plugin, comment: str = "") -> str:
     """Return a Mitsuba XML file for the dictionary of a scene, whose meshes are files.
 
     Parameters
     ----------
     scene
-        As `mi.load_dict` takes it, made of numbers, words, transforms and plugins of the kinds that
-        a challenge has.
-
+        As `mi.load_dict` takes it, made of numbers, words, transforms and plugins of `_ELEMENTS`;
+        a transform may be {"matrix": rows} too.
+    comment
+        Words at the top.
     """
     lines = ['<?xml version="1.0" encoding="utf-8"?>', '<scene version="3.0.0">']
+    lines += [f"    <!-- {comment} -->"] if comment else []
     for name, part in scene.items():
         if isinstance(part, Mapping):
             lines += ["    " + line for line in _plugin(name, part, label="id")]
@@ -58,7 +65,9 @@ def scene_xml(scene: Plugin) -> str:
 def _lines(name: str, value: object) -> Iterator[str]:
     """Yield the lines of a property or a plugin."""
     named = f"name={quoteattr(name)}"
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and "matrix" in value:
+        yield from _lines(name, np.array(value["matrix"]))
+    elif isinstance(value, Mapping):
         yield from _plugin(name, value, label="name")
     elif isinstance(value, mi.ScalarTransform4f | mi.ScalarTransform4d | np.ndarray):
         matrix = value if isinstance(value, np.ndarray) else matrix_of(value)
