@@ -18,10 +18,10 @@ from airlight.reports.challenge.draw import (
     scenes_digest,
 )
 from airlight.reports.challenge.seed import FORMAT, SIZE, check_seed
-from airlight.reports.data.records import read_json
+from airlight.reports.data.records import read_versioned
 from airlight.reports.interchange.gltf import write_gltf
 from airlight.reports.interchange.scene import describe_scene
-from airlight.validation.columns import plain, record_of
+from airlight.validation.columns import plain
 
 FILE, SCENES = "challenge.json", "scenes"  #: in the folder of a challenge
 LAYER = "airlight"  #: of the images of an entry
@@ -121,16 +121,8 @@ def _listed(folder: Path, scene: DrawnScene) -> ListedScene:
 
 def read_challenge(file: Path) -> Challenge:
     """Return the content of challenge.json; refuse a file of another kind or version."""
-    import msgspec
-
     wanted = f"{FILE} of `airlight challenge new`"
-    found = read_json(file, wanted)
-    if not isinstance(found, dict) or found.get("schema") != FORMAT:
-        raise InputError(f"{file} is no {wanted} of this version, {FORMAT}; write the scenes again")
-    try:
-        challenge = record_of(found, Challenge)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{file}: {error}; expected {wanted}") from error
+    challenge = read_versioned(file, Challenge, FORMAT, wanted, "write the scenes again")
     check_seed(challenge.seed, challenge.entry, str(file))
     return challenge
 

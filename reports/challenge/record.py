@@ -19,8 +19,8 @@ from airlight.reports.challenge.number import (
     rounded,
     rounded_out,
 )
-from airlight.reports.data.records import read_json
-from airlight.validation.columns import plain, record_of
+from airlight.reports.data.records import read_versioned
+from airlight.validation.columns import plain
 
 SCHEMA = "airlight-challenge-score/1"
 _UNIT = 1e-3  # of a number of four digits, at most
@@ -113,16 +113,8 @@ def read_score(file: Path) -> Score:
     """Return the content of a file score.json; refuse one whose number does not follow from its
     errors.
     """
-    import msgspec
-
     wanted = "a score of `airlight challenge score -o`"
-    found = read_json(file, wanted)
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA:
-        raise InputError(f"{file} is no {wanted[2:]} of this version, {SCHEMA}; score again")
-    try:
-        score = record_of(found, Score)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{file}: {error}; expected {wanted}") from error
+    score = read_versioned(file, Score, SCHEMA, wanted, "score again")
     if not (score.scenes and _DIGEST.fullmatch(score.digests.scenes)):
         raise InputError(f"{file} has no scenes, or no digest of them; score again")
     # Another machine finds the same number again, but for the rounding of logarithms.

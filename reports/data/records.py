@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path, PureWindowsPath
-from typing import Any, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from airlight.errors import InputError
 from airlight.reference.storage.build import Build
@@ -24,6 +24,8 @@ from airlight.validation.statistics.records import Agreement, MultipleScattering
 from airlight.validation.study.row import Row
 from airlight.validation.study.settings import Settings, Size
 from airlight.validation.timing import Scaling
+
+_T = TypeVar("_T")
 
 SCHEMA = "airlight-report/5"
 _BEFORE = "airlight-report/4"  # read too: one key has another name there
@@ -282,6 +284,24 @@ def read_json(path: Path, wanted: str) -> Any:
         raise InputError(f"cannot read {path}: {error.strerror}; expected {wanted}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not valid JSON ({error}); expected {wanted}") from error
+
+
+def read_versioned(file: Path, record: type[_T], schema: str, wanted: str, again: str) -> _T:
+    """Return the record in a JSON file that says its schema; refuse a file of another kind or
+    version.
+
+    `wanted`: what it should be, `again`: what to do where it is not, both in words.
+    """
+    from msgspec import ValidationError
+
+    found = read_json(file, wanted)
+    if not isinstance(found, dict) or found.get("schema") != schema:
+        kind = wanted.removeprefix("a ")
+        raise InputError(f"{file} is no {kind} of this version, {schema}; {again}")
+    try:
+        return record_of(found, record)
+    except ValidationError as error:
+        raise InputError(f"{file}: {error}; expected {wanted}") from error
 
 
 def _finite(digits: str) -> float | str:

@@ -7,9 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from airlight.errors import InputError
-from airlight.reports.data.records import Environment, Size, read_json
-from airlight.validation.columns import record_of
+from airlight.reports.data.records import Environment, Size, read_versioned
 from airlight.validation.engine.model_errors import ModelErrors, PartError
 
 SCHEMA = "airlight-engines/1"
@@ -147,16 +145,8 @@ def engines_file(path: Path | str) -> Path | None:
 
 def read_engines(file: Path) -> Engines:
     """Return the content of a file engines.json."""
-    import msgspec
-
     wanted = f"{FILE} of `airlight report --engines`"
-    found = read_json(file, wanted)
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA:
-        raise InputError(f"{file} is no {wanted} of this version, {SCHEMA}; make it again")
-    try:
-        return record_of(found, Engines)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{file}: {error}; expected {wanted}") from error
+    return read_versioned(file, Engines, SCHEMA, wanted, "make it again")
 
 
 def named_files(data: Engines) -> Iterator[str]:

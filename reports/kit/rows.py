@@ -87,6 +87,7 @@ _FOOT = (
     Column("foot", "distance along the ray to the foot of the light's perpendicular [m]"),
     Column("height", "distance of the light from the ray [m]"),
 )
+_LOBES = (Column("phase", "phase function of mean 1", ("isotropic", "rayleigh", "hg")), _G)
 _LAWS = ("power", "softened", "clamped", "sphere")
 _WINDOWS = ("none", "quartic", "fourth", "square", "linear", "cut")
 _CLOSE = (
@@ -107,8 +108,7 @@ def groups() -> tuple[Group, ...]:
 
 def _rays() -> Group:
     columns = (
-        Column("phase", "phase function of mean 1", ("isotropic", "rayleigh", "hg")),
-        _G,
+        *_LOBES,
         *_RAY,
         *_ENDS,
         _SIGMA,
@@ -130,8 +130,7 @@ def _rays() -> Group:
 
 def _feet() -> Group:
     columns = (
-        Column("phase", "phase function of mean 1", ("isotropic", "rayleigh", "hg")),
-        _G,
+        *_LOBES,
         *_FOOT,
         *_ENDS,
         _SIGMA,
