@@ -33,7 +33,7 @@ differ, see `reference.monte_carlo.batches`. Sums, means and standard errors are
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -44,8 +44,11 @@ from numpy.typing import NDArray
 
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
-from airlight.reference.scene.clouds import CloudScene
-from airlight.reference.scene.read import VACUUM, ReferenceMedium, ReferenceScene, whole_scene
+from airlight.reference.monte_carlo.volpath_gaps import check_gaps
+from airlight.reference.scene.clouds import Cloud, CloudScene
+from airlight.reference.scene.convex_bounds import Bounds, read_bounds
+from airlight.reference.scene.homogeneous_medium import VACUUM, ReferenceMedium
+from airlight.reference.scene.read import ReferenceScene, whole_scene
 from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 
 Array = NDArray[np.float64]
@@ -100,6 +103,7 @@ def volpath_batch(
     )
     if reference.directional or reference.sky is not None:
         _check_far(reference)
+    check_gaps([(medium.name, medium.bounds) for medium in reference.media])
     # Light seen directly belongs to neither layer.
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
     traced = _Traced(
@@ -121,6 +125,12 @@ def volpath_batch(
         # The same paths once more, now with light from surfaces; the difference is what these add.
         surface = _trace(traced, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
+
+
+def _convex(cloud: Cloud) -> Iterator[tuple[str, Bounds]]:
+    """Yield the bounds of a cloud where they are convex: gaps of others are not measured."""
+    with suppress(InputError):
+        yield cloud.name, read_bounds(cloud.shape)
 
 
 def _check_far(reference: ReferenceScene) -> None:
@@ -297,6 +307,7 @@ def volpath_orders_batch(
     the last `math.inf` for one without end.
     """
     check_samples(samples)
+    check_gaps([body for cloud in clouds.clouds for body in _convex(cloud)])
     traced = _Traced(clouds.scene, (VACUUM, *clouds.clouds), clouds.origin, clouds.direction)
     counts = np.full(len(clouds.direction), samples)
 

@@ -18,7 +18,9 @@ Read in this order:
 - `sky.py`: the light of a uniform sky;
 - `replicates.py`: how many samples a ray needs, and means whose intervals hold;
 - `mesh_choice.py`: which triangles of a mesh of light samples lie on;
-- `light_samples.py`: samples of area lights for a ray or a surface point;
+- `half_planes.py`: area lights cut by half planes about an axis;
+- `light_samples.py`: samples of area lights along a ray;
+- `light_sections.py`: sections of area lights for a surface point;
 - `shared_samples.py`: even points on them, for sums that all rays share;
 - `area_lights.py`: the airlight of area lights, and the surfaces that they light.
 """

@@ -15,7 +15,7 @@ that few samples suffice. Surfaces at the end of a ray receive, from their own s
 
 f cos_s by Mitsuba's `BSDF.eval`. V is exact along sections, and samples are drawn where V is 1. A
 few fixed sections first find the points that see only a part of a light that is no mesh: these get
-sections in pairs. `reference.quadrature.light_samples` draws both kinds of samples,
+sections in pairs. `reference.quadrature.light_samples` and `light_sections` draw the samples,
 `reference.quadrature.replicates` says how many a ray gets: eight independent scramblings each give
 a mean, and their spread the standard error.
 """
@@ -34,9 +34,9 @@ from numpy.typing import NDArray
 from airlight.reference.quadrature.fields import field_of, optical_depth
 from airlight.reference.quadrature.integrate import Terms, cosine_profile, sums_of
 from airlight.reference.quadrature.light_airlight import worth_of_doubt
-from airlight.reference.quadrature.light_samples import (
+from airlight.reference.quadrature.light_samples import samples_for_rays
+from airlight.reference.quadrature.light_sections import (
     Sections,
-    samples_for_rays,
     sections_for_points,
     solid_angle,
     to_sphere,

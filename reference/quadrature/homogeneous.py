@@ -62,7 +62,8 @@ from airlight.reference.quadrature.intervals import (
     shadow_kinks,
 )
 from airlight.reference.scene.convex_bounds import Bounds, Sphere
-from airlight.reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.read import ReferenceScene, homogeneous_around
 from airlight.reference.visibility.distances import crossed_facets, crossings, sphere_crossings
 from airlight.reference.visibility.planes import Rays
 

@@ -58,7 +58,8 @@ from airlight.reference.quadrature.surface import (
 )
 from airlight.reference.scene.camera import film_directions, pixel_centres
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.shapes import Shapes, read_shapes
 from airlight.reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
 from airlight.reference.visibility.distances import exact_distance

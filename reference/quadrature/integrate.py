@@ -29,7 +29,8 @@ from airlight.analytic.panels import (
     log_distance,
 )
 from airlight.reference.quadrature.intervals import Pieces, Stretches
-from airlight.reference.scene.read import ReferenceLight, ReferenceMedium
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.point_light import ReferenceLight
 from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.visibility.planes import Rays, falloff
 

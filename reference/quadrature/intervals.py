@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.distances import crossings, half_chord
 from airlight.reference.visibility.planes import Rays, cone_interval

@@ -20,7 +20,8 @@ from airlight.reference.quadrature.model_terms import (
     strength_of,
 )
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.shapes import Shapes, read_shapes
 from airlight.reference.visibility.candidates import Ball
 from airlight.reference.visibility.certificate import LitIntervals, coordinates

@@ -77,7 +77,7 @@ def choose_for_rays(
 
 def choose_for_points(light: ReferenceAreaLight, place: Array, square: Array) -> Choice:
     """Choose triangles for samples of surface points; the parameters are those
-    of `light_samples.sections_for_points`.
+    of `light_sections.sections_for_points`.
     """
     mesh = _Mesh(light)
     way = place[:, None] - mesh.centre

@@ -54,8 +54,10 @@ from airlight.reference.quadrature.intervals import (
     cut_stretches,
 )
 from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
 from airlight.reference.scene.model import Law, Model, Range
-from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 from airlight.reference.visibility.distances import half_chord
 from airlight.reference.visibility.planes import Rays, spot_edge

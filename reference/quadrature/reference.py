@@ -44,7 +44,8 @@ from airlight.reference.quadrature.replicates import Kept as Part
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.convex_bounds import holds
 from airlight.reference.scene.model import PHYSICAL, Model
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from airlight.reference.quadrature.mesh_choice import choose_by_area, places_in
 from airlight.reference.scene.area_light import ReferenceAreaLight
-from airlight.reference.scene.read import ReferenceLight
+from airlight.reference.scene.point_light import ReferenceLight
 
 Array = NDArray[np.float64]
 

@@ -51,7 +51,9 @@ from airlight.reference.quadrature.model_terms import (
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene, has_mirrors, scene_from
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene, has_mirrors
+from airlight.reference.scene.shape_roles import scene_from
 from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]

@@ -11,11 +11,15 @@ Read in this order:
 - `colours.py`: colours of lights and media, checked;
 - `camera.py`: the camera, and directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
+- `point_light.py`: points and spots, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: area lights, read and checked;
 - `varying.py`: media whose extinction differs from place to place: height fog and density grids;
 - `model_words.py`: the terms of an engine's equation in words, and what each may be;
 - `model.py`: an engine's equation by its terms: facts about it, and no physics;
+- `homogeneous_medium.py`: media of one extinction;
+- `medium_around.py`: the medium around the camera;
+- `shape_roles.py`: which shapes stop light, and which bound media;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;

@@ -26,14 +26,12 @@ from airlight.reference.scene.directional_light import (
     is_directional,
     read_directional,
 )
-from airlight.reference.scene.read import (
+from airlight.reference.scene.homogeneous_medium import (
     ReferenceMedium,
     read_medium,
     read_scattering,
-    scene_from,
-    scene_of,
-    sorted_shapes,
 )
+from airlight.reference.scene.shape_roles import scene_from, scene_of, sorted_shapes
 from airlight.reference.scene.varying import grid_values
 
 Array = NDArray[np.float64]

@@ -18,9 +18,6 @@ from airlight.analytic.phase import (
     CornetteShanks,
     HenyeyGreenstein,
     Isotropic,
-    PhaseFunction,
-    Rayleigh,
-    Tabulated,
     phase_from_words,
 )
 from airlight.errors import InputError
@@ -32,71 +29,25 @@ from airlight.reference.scene.camera import (
     pixel_centres,
 )
 from airlight.reference.scene.colours import colour
-from airlight.reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from airlight.reference.scene.directional_light import (
     DirectionalLight,
     is_directional,
     read_directional,
 )
-from airlight.reference.scene.model import PHYSICAL, Model
-from airlight.reference.scene.transforms import SAME, matrix_of, stretch
-from airlight.reference.scene.varying import (
-    NO_EXTINCTION,
-    GridMedium,
-    HeightMedium,
-    VaryingMedium,
-    is_grid,
-    is_height_fog,
-    read_grid,
-    read_height_fog,
+from airlight.reference.scene.homogeneous_medium import (
+    BoundedMedium,
+    ReferenceMedium,
+    read_bounded,
 )
+from airlight.reference.scene.medium_around import grid_in_a_shape, read_ambient
+from airlight.reference.scene.model import PHYSICAL, Model
+from airlight.reference.scene.point_light import ReferenceLight, read_point_light
+from airlight.reference.scene.shape_roles import scene_of, sorted_shapes
+from airlight.reference.scene.varying import NO_EXTINCTION, HeightMedium, VaryingMedium
 
 Array = NDArray[np.float64]
 
 _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
-
-
-@dataclass(frozen=True)
-class ReferenceLight:
-    """A point or spot light, or a point of an area light."""
-
-    position: Array  #: [m]
-    intensity: Array  #: radiant intensity on the axis [W/sr], RGB
-    axis: Array | None = None  #: spot: unit vector; of a point of an area light the normal
-    cutoff: float = np.pi  #: spot: half angle of the cone [rad]
-    beam: float = np.pi  #: spot: half angle of full intensity [rad]
-    cosine: bool = False  #: whether the intensity falls off as the cosine of the angle to the axis
-
-    @property
-    def is_soft(self) -> bool:
-        """Whether the intensity falls off within the cone."""
-        return self.cosine or (self.axis is not None and bool(self.beam < self.cutoff))
-
-
-@dataclass(frozen=True)
-class ReferenceMedium:
-    """A homogeneous medium."""
-
-    sigma_t: Array  #: extinction [1/m], RGB
-    albedo: Array  #: RGB
-    phase: PhaseFunction
-    plugin: "mi.Medium | None"  #: None for a vacuum
-
-    @property
-    def largest(self) -> Array:
-        """Its largest extinction, the same at all places, RGB [1/m]."""
-        return self.sigma_t
-
-
-VACUUM = ReferenceMedium(np.zeros(3), np.zeros(3), Isotropic(), None)
-
-
-@dataclass(frozen=True)
-class BoundedMedium(ReferenceMedium):
-    """A homogeneous medium within convex bounds."""
-
-    bounds: Bounds  #: what it fills
-    name: str  #: the id of the shape that bounds it
 
 
 @dataclass(frozen=True)
@@ -154,16 +105,16 @@ def read_reference(scene: "mi.Scene", model: Model = PHYSICAL) -> ReferenceScene
             "the scene has no light; expected at least one emitter of type 'point', 'spot', "
             "'directional' or 'area'"
         )
-    lights = tuple(_read_light(emitter) for emitter in points)
+    lights = tuple(read_point_light(emitter) for emitter in points)
     origin = camera_matrix(sensor)[:3, 3]
     area = tuple(read_area_light(emitter, origin) for emitter in emitters if is_area(emitter))
     # Shapes that stop light, and shapes that bound media. The medium of a shape that holds the
     # whole box of a density grid counts as the medium around the camera, and the shape bounds
     # nothing.
     opaque, boundaries = sorted_shapes(scene)
-    grid = _grid_in_a_shape(sensor, boundaries, origin)
-    media = () if grid else tuple(_read_bounded(shape) for shape in boundaries)
-    medium = grid or _read_ambient(sensor, origin, media, boundaries)
+    grid = grid_in_a_shape(sensor, boundaries, origin)
+    media = () if grid else tuple(read_bounded(shape) for shape in boundaries)
+    medium = grid or read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in emitters if is_directional(emitter))
     # Light from infinity never arrives through an unbounded medium, nor along paths in height fog
     # that do not rise.
@@ -286,36 +237,6 @@ def _rebuilt(scene: "mi.Scene", emitters: "list[mi.Emitter]") -> "mi.Scene":
     return built
 
 
-def sorted_shapes(scene: "mi.Scene") -> "tuple[list[mi.Shape], list[mi.Shape]]":
-    """Return the opaque shapes and the shapes that bound a medium; all others take no part."""
-    opaque, boundaries = [], []
-    for shape in scene.shapes():
-        inside, outside = shape.interior_medium(), shape.exterior_medium()
-        # A surface stops light; a shape of material `null` is the boundary of a medium or nothing.
-        # The estimators have no third kind of shape.
-        null = shape.bsdf().class_name() == "Null"
-        if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
-            raise InputError(
-                f"shape '{shape.id()}' is partly transparent; expected opaque surfaces, or "
-                "material 'null'"
-            )
-        if not null and (inside is not None or outside is not None):
-            raise InputError(
-                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} "
-                "material; expected the material 'null' on it, and no media on other shapes"
-            )
-        if not null:
-            opaque.append(shape)
-        elif inside is not None:
-            boundaries.append(shape)
-        elif outside is not None:
-            raise InputError(
-                f"shape '{shape.id()}' is a hole in a medium; expected media inside of convex "
-                "bounds"
-            )
-    return opaque, boundaries
-
-
 def has_mirrors(reference: ReferenceScene) -> bool:
     """Return whether an opaque shape is a mirror, which shows lights that have an extent.
 
@@ -333,263 +254,3 @@ def has_mirrors(reference: ReferenceScene) -> bool:
             )
         found = True
     return found
-
-
-def scene_of(shapes: "list[mi.Shape]", whole: "mi.Scene") -> "mi.Scene":
-    """Return a scene of some of the shapes of `whole`, or `whole` itself if these are all of its
-    shapes.
-    """
-    return whole if len(shapes) == len(whole.shapes()) else scene_from(shapes)
-
-
-def scene_from(shapes: "list[mi.Shape]") -> "mi.Scene":
-    """Return a scene of some shapes, which keep their names if these can be keys of a dictionary of
-    Mitsuba.
-    """
-    # The key of a shape becomes its name, in the whole scene too.
-    names = {shape.id() for shape in shapes}
-    are_keys = len(names) == len(shapes) and not any("." in name or not name for name in names)
-    return mi.load_dict(
-        {"type": "scene"}
-        | {
-            shape.id() if are_keys else f"shape{number}": shape
-            for number, shape in enumerate(shapes)
-        }
-    )
-
-
-def _read_ambient(
-    sensor: "mi.Sensor",
-    origin: Array,
-    media: tuple[BoundedMedium, ...],
-    boundaries: "list[mi.Shape]",
-) -> ReferenceMedium | VaryingMedium:
-    """Return the medium around all bounds; refuse a camera or a shape that names another."""
-    camera_medium = sensor.get_medium()
-    # The camera may be in one of the bounded media: the medium around is then the exterior of that
-    # shape.
-    ambient = camera_medium
-    for medium, shape in zip(media, boundaries, strict=True):
-        if in_surface(medium.bounds, origin):
-            raise InputError(
-                f"the camera is in the surface of shape '{medium.name}'; move it off, inside or "
-                "outside"
-            )
-        if holds(medium.bounds, origin):
-            if camera_medium != medium.plugin:
-                raise InputError(
-                    f"the camera is inside of shape '{medium.name}', but references another medium "
-                    "or none; reference that shape's interior medium in the sensor"
-                )
-            ambient = shape.exterior_medium()
-    # All bounded media lie in one and the same medium.
-    for medium, shape in zip(media, boundaries, strict=True):
-        if shape.exterior_medium() != ambient:
-            raise InputError(
-                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or "
-                "the camera; expected the medium that the camera references as exterior of all "
-                "shapes, or none at all"
-            )
-    if is_height_fog(ambient) or is_grid(ambient):
-        kind = "height fog" if is_height_fog(ambient) else "a density grid"
-        # Height fog and grids are alone: bodies in them would need integrals of both.
-        if media:
-            raise InputError(
-                f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove "
-                "the medium of the shape, or take a medium of type 'homogeneous' around it"
-            )
-        read_varying = read_height_fog if is_height_fog(ambient) else read_grid
-        return read_varying(ambient, *read_scattering(ambient))
-    if ambient is not None:
-        return read_medium(ambient, "the medium")
-    if not media:
-        raise InputError(
-            "the camera references no medium: it would be in a vacuum; reference the medium in the "
-            "sensor"
-        )
-    return VACUUM
-
-
-def _grid_in_a_shape(
-    sensor: "mi.Sensor", boundaries: "list[mi.Shape]", origin: Array
-) -> GridMedium | None:
-    """Return a density grid in vacuum if the scene's only boundary holds the whole box of the grid:
-    the grid ends at its box, and the boundary bounds nothing.
-    """
-    shape = boundaries[0] if len(boundaries) == 1 else None
-    if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
-        return None
-    camera_medium, inside = sensor.get_medium(), shape.interior_medium()
-    grid = read_grid(inside, *read_scattering(inside))
-    low, high = (
-        np.array(corner, dtype=np.float64).ravel()
-        for corner in (shape.bbox().min, shape.bbox().max)
-    )
-    # The shape may be smaller than the box by 1e-5 of a side: its numbers are rounded. The test of
-    # the bounding box is quick; the shape itself must then hold all eight corners of the grid,
-    # drawn in by 1e-5 on each side.
-    fraction = 1e-5
-    margin = fraction * (grid.high - grid.low)
-    if np.any(low > grid.low + margin) or np.any(high < grid.high - margin):
-        return None
-    bounds, middle = read_bounds(shape), 0.5 * (grid.low + grid.high)
-    corners = np.array(np.meshgrid(*zip(grid.low, grid.high, strict=True))).reshape(3, 8).T
-    if not all(
-        holds(bounds, middle + (1 - 2 * fraction) * (corner - middle)) for corner in corners
-    ):
-        return None
-    # A camera in the shape must reference the grid's medium. A camera outside may reference it,
-    # since the grid is vacuum beyond its box.
-    if camera_medium not in ((inside,) if holds(bounds, origin) else (None, inside)):
-        raise InputError(
-            f"the camera references another medium than that of shape '{shape.id()}', a density "
-            "grid, or is in the shape and references none; expected that medium"
-        )
-    return grid
-
-
-def _read_bounded(shape: "mi.Shape") -> BoundedMedium:
-    inside = read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
-    return BoundedMedium(
-        inside.sigma_t,
-        inside.albedo,
-        inside.phase,
-        inside.plugin,
-        bounds=read_bounds(shape),
-        name=shape.id(),
-    )
-
-
-def read_medium(medium: "mi.Medium", name: str) -> ReferenceMedium:
-    """Read a homogeneous medium; messages call it by `name`."""
-    if is_height_fog(medium):
-        raise InputError(
-            f"{name} is height fog, which has no sides; expected it in the sensor, and no shape "
-            "around it"
-        )
-    if not medium.is_homogeneous():
-        raise InputError(
-            f"{name} is heterogeneous; expected a medium of type 'homogeneous', or a density grid "
-            "in the sensor, or one in vacuum in a convex shape that holds its whole box"
-        )
-    parameters = mi.traverse(medium)
-    _require_constant(parameters, "sigma_t", name)
-    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64) * float(
-        parameters["scale"]
-    )
-    return ReferenceMedium(
-        colour(sigma_t, f"{name}: its sigma_t"), *read_scattering(medium), medium
-    )
-
-
-def read_scattering(medium: "mi.Medium") -> tuple[Array, PhaseFunction]:
-    """Return the albedo of a medium, RGB, the same everywhere, and its phase function."""
-    parameters = mi.traverse(medium)
-    _require_constant(parameters, "albedo", f"medium '{medium.id()}'")
-    albedo = colour(
-        parameters["albedo.value.value"],
-        f"medium '{medium.id()}': its albedo",
-        largest=1 + 1e-6,  # rounding
-    )
-    return albedo, _read_phase(medium.phase_function())
-
-
-def _require_constant(parameters: "mi.SceneParameters", coefficient: str, name: str) -> None:
-    if f"{coefficient}.value.value" not in parameters:
-        raise InputError(
-            f"{name}: its {coefficient} differs from place to place; expected one number or one "
-            "'rgb'"
-        )
-
-
-def _read_phase(phase: "mi.PhaseFunction") -> PhaseFunction:
-    parameters = mi.traverse(phase)
-    name = phase.class_name()
-    if name == "IsotropicPhaseFunction":
-        return Isotropic()
-    if name == "RayleighPhaseFunction":
-        return Rayleigh()
-    if name == "HGPhaseFunction":
-        return HenyeyGreenstein(float(parameters["g"][0]))
-    if name == "TabulatedPhaseFunction":
-        return Tabulated(tuple(np.array(parameters["values"]).tolist()))
-    raise InputError(
-        f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase"
-    )
-
-
-def _read_light(emitter: "mi.Emitter") -> ReferenceLight:
-    name = emitter.class_name()
-    if name not in ("PointLight", "SpotLight"):
-        word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(
-            name, name
-        )
-        raise InputError(
-            f"light '{emitter.id()}' of type '{word}' is the scene's only light; expected lights "
-            "of type 'point', 'spot', 'directional', 'area' or 'constant'"
-        )
-    parameters = mi.traverse(emitter)
-    matrix = matrix_of(emitter.world_transform())
-    spot = name == "SpotLight"
-    # With a texture its value on the axis would stand for all of the cone.
-    if spot and "texture.value" not in parameters:
-        raise InputError(
-            f"light '{emitter.id()}' has a texture; expected one intensity: remove the texture"
-        )
-    if spot and stretch(matrix) - 1 > SAME:
-        raise InputError(
-            f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} "
-            "to 1; expected one scale for all axes and no shear, which a 'rotate' brings whose "
-            "axis is not of unit length: take the scale away, in a modelling program before the "
-            "export"
-        )
-    # A spot stands at the origin of its frame and shines along its axis z; a point light has a
-    # position of its own, and any axis will do.
-    position = (
-        matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
-    )
-    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]) if spot else np.array([0.0, 0.0, 1.0])
-    # Mitsuba's own answer at a far point on the axis, where positions lose no digits that matter.
-    distance = 1024.0 * max(1.0, float(np.abs(position).max()))
-    interaction = dr.zeros(mi.Interaction3f)
-    interaction.p = mi.Point3f(*(position + distance * axis).tolist())
-    dr.make_opaque(interaction)  # one kernel for all lights of a kind
-    # Irradiance times the squared distance is the intensity.
-    _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-    intensity = _as_given(
-        emitter, colour(arriving, f"light '{emitter.id()}': its intensity") * distance**2
-    )
-    if not spot:
-        return ReferenceLight(position, intensity)
-    degrees = float(parameters["cutoff_angle"][0])
-    # The interval of a cone on a ray (`reference.visibility.planes`) holds below a half space.
-    if not 0 < degrees < 90:
-        raise InputError(
-            f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than "
-            "0 and less than 90: a wider light is a 'point' light"
-        )
-    cutoff = np.deg2rad(degrees)
-    return ReferenceLight(
-        position,
-        intensity,
-        axis,
-        cutoff,
-        min(np.deg2rad(float(parameters["beam_width"][0])), cutoff),
-    )
-
-
-def _as_given(emitter: "mi.Emitter", measured: Array) -> Array:
-    """Return the intensity that the scene gives, if it agrees with the measured one, which is
-    rounded to float32.
-    """
-    parameters = mi.traverse(emitter)
-    if "intensity.value" not in parameters:
-        return measured
-    texture = (
-        np.array(parameters["texture.value"], dtype=np.float64)
-        if "texture.value" in parameters
-        else 1.0
-    )
-    given = np.array(parameters["intensity.value"], dtype=np.float64) * texture
-    given = colour(given, f"light '{emitter.id()}': its intensity")
-    return given if np.allclose(given, measured, rtol=1e-5, atol=0) else measured

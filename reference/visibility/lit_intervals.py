@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.convex_bounds import Sphere
-from airlight.reference.scene.read import ReferenceScene, scene_of
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.shape_roles import scene_of
 from airlight.reference.scene.shapes import Shapes, read_shapes
 from airlight.reference.visibility.candidates import Ball, Near, near_shapes
 from airlight.reference.visibility.certificate import LitIntervals, certified

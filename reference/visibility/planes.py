@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.reference.scene.read import ReferenceLight
+from airlight.reference.scene.point_light import ReferenceLight
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

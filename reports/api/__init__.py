@@ -7,7 +7,8 @@ Read in this order:
 - `scenes.py`: scenes as results
 - `results.py`: images as results
 - `comparisons.py`: comparisons, diagnoses and fits as results
-- `render.py`: `load_scene`, `render`, and which configurations are asked for
+- `render.py`: `load_scene`, `render`; `frames.py`: the work of it;
+- `configurations.py`: the methods that a user names, checked
 - `reference.py`: `reference`
 - `compare.py`: `compare`, with `--diagnose` and `--fit`
 - `check.py`: `check`, relations between frames

@@ -30,7 +30,8 @@ from airlight.reports.tables.table import Interval, Table, numbers, table, words
 from airlight.validation.columns import plain
 from airlight.validation.comparison.images import Comparison, shown
 from airlight.validation.engine.diagnose import Diagnosis
-from airlight.validation.engine.judge import EngineComparison, Verdict
+from airlight.validation.engine.judge import EngineComparison
+from airlight.validation.engine.verdict import Verdict
 from airlight.validation.fit.fit import Fit
 from airlight.validation.fit.fit import Fitted as FittedParameter
 from airlight.validation.metrics.errors import Metrics, colours

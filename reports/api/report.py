@@ -431,7 +431,7 @@ def _measured(
             check_scene(each)
     activate()
     from airlight.realtime.methods.shader.source import is_users
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.reports.report.measure import write_report
     from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
     from airlight.validation.study.study import RandomScenes, standard_study

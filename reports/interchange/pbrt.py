@@ -25,7 +25,9 @@ from airlight.errors import InputError
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.convex_bounds import Polyhedron, holds
-from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.transforms import matrix_of
 from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.storage.build import build

@@ -13,12 +13,9 @@ from airlight.realtime.scene.read_scene import read_scene, scene_notes
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import (
-    ReferenceLight,
-    ReferenceMedium,
-    ReferenceScene,
-    read_reference,
-)
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
 from airlight.validation.scenes.loading import LoadedScene

@@ -52,7 +52,7 @@ def scaling(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.reports.tables.costs import cliffs, scaling_tables
     from airlight.validation.study.growth import ladder, study_growth
     from airlight.validation.study.study import GROWTH, standard_study

@@ -176,7 +176,7 @@ def methods(
     >>> found.fastest(1e-3).error.relative_rmse < 1e-3
     True
     """
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.reports.machine.own_process import in_own_process
     from airlight.reports.report.claims import own_faults
     from airlight.reports.tables.methods import methods_table, times_words
@@ -262,7 +262,7 @@ def decomposition(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.validation.study.study import standard_study
 
     # Scenes and methods of the standard study, unless others are named.

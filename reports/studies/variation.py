@@ -60,7 +60,7 @@ def noise(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.reports.api.scenes import opened
     from airlight.validation.motion.noise import BLURS, time_words
     from airlight.validation.study.configuration import named_configurations
@@ -202,7 +202,7 @@ def motion(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.configurations import asked_configurations
     from airlight.reports.api.scenes import opened
     from airlight.validation.study.configuration import named_configurations
     from airlight.validation.study.variation import method_motion

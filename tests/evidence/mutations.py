@@ -129,7 +129,7 @@ def _spots(change: Callable[..., Any]) -> Wrap:
         light = function(emitter)
         return light if light.axis is None or light.cutoff > 3 else change(light)
 
-    return Wrap("airlight.reference.scene.read:_read_light", around)
+    return Wrap("airlight.reference.scene.read:read_point_light", around)
 
 
 def _wide(light, cutoff: float):
@@ -524,7 +524,9 @@ _WIDE = _all(
         ),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
-        "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),
+        "area-surface-both-sides": Wrap(
+            "airlight.reference.quadrature.light_sections:sections_for_points", _for_points
+        ),
         "area-surface-bright-segment": Rewrite(
             _WEIGHTED, "value_ * np.exp(-shadow_) * weight_[:, None]", "value_ * weight_[:, None]"
         ),

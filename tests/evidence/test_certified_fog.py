@@ -19,12 +19,9 @@ from airlight.reference.quadrature.homogeneous import HomogeneousField
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.integrate import Terms, profile_of
 from airlight.reference.quadrature.intervals import lit_stretches
-from airlight.reference.scene.read import (
-    ReferenceLight,
-    ReferenceMedium,
-    ReferenceScene,
-    read_reference,
-)
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights

@@ -14,7 +14,8 @@ from airlight.reference.quadrature.fields import field_of
 from airlight.reference.quadrature.integrate import Paths, Terms
 from airlight.reference.quadrature.model_terms import Route, lamp_terms
 from airlight.reference.scene.model import Model
-from airlight.reference.scene.read import ReferenceLight, read_reference
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import read_reference
 from airlight.reference.visibility.planes import rays_at
 from airlight.validation.certified.files import certified_data
 from tests.helpers.scenes import tiny_scene

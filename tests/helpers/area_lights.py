@@ -14,7 +14,7 @@ from airlight.reference.quadrature.area_lights import (
     seen_samples,
     turn_of_sections,
 )
-from airlight.reference.quadrature.light_samples import sections_for_points
+from airlight.reference.quadrature.light_sections import sections_for_points
 from airlight.reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.read import ReferenceScene, read_reference

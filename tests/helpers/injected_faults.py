@@ -21,7 +21,8 @@ from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.camera import film_directions, pixel_centres
 from airlight.reference.scene.directional_light import is_directional
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.engine.curves import agx, blender_filmic, filmic, to_srgb
 from airlight.validation.estimates.quadrature import reference_layer
 from airlight.validation.fog_model.view import Scenery

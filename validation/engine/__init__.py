@@ -20,6 +20,8 @@ Read in this order:
 - `diagnose.py`: what is wrong with an image;
 - `hints.py`: what may be wrong with an image as a whole, without any path of light;
 - `model_errors.py`: the error of an engine's equation apart from that of its algorithm;
-- `judge.py`: whether an image is right;
+- `judge.py`: an image against the reference of its scene;
+- `verdict.py`: whether an image is right;
+- `other_orders.py`: whether an image of a cloud holds light of all orders;
 - `images.py`: a folder of images, found by scene, for the report.
 """

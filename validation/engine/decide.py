@@ -41,9 +41,9 @@ from pathlib import Path
 import numpy as np
 
 from airlight.validation.arrays import Array, Bools, Index
-from airlight.validation.engine.judge import BLOCK
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
+from airlight.validation.engine.verdict import BLOCK
 
 #: Relative error of the fog model itself, in most pixels: of pixel centres the error of its
 #: quadrature, of means over pixels the error of 3 x 3 rays.
@@ -73,7 +73,7 @@ class Blocks:
     @classmethod
     def of(cls, predictor: Predictor) -> "Blocks":
         """Return the blocks of what is looked at."""
-        # As many pixels a side as in a comparison (`validation.engine.judge`), but six blocks at
+        # As many pixels a side as in a comparison (`validation.engine.verdict`), but six blocks at
         # least along the shorter side: a few blocks tell no noise from a gradient. Not all pixels
         # are looked at, so that blocks have different numbers of them, or none.
         height, width = predictor.shape

@@ -2,8 +2,9 @@
 """The diagnosis of an image of a scene: every fault predicts the image that it would
 make, and the data choose.
 
-1. An image that is right by `validation.engine.judge` is right: no fault is looked for.
-   One that is black is black.
+1. An image that is right by `validation.engine.verdict` is right: no fault is looked for.
+   One that is black is black. One of a cloud that holds light of all orders is none of single
+   scattering.
 2. The stages of `stages.py` try faults, until one leaves nothing to explain. Whether pixels are
    centres or means is decided once, by the errors that the first stage leaves.
 3. `decide.py` chooses an explanation, and says whether it is named.
@@ -11,7 +12,9 @@ make, and the data choose.
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,12 +27,9 @@ from airlight.validation.engine.decide import LITTLE, Candidates
 from airlight.validation.engine.equations import asked_words, engine_title
 from airlight.validation.engine.error_place import place_words
 from airlight.validation.engine.hints import find_hints
-from airlight.validation.engine.judge import RIGHT as RIGHT_ERROR
 from airlight.validation.engine.judge import (
     EngineComparison,
     ReferenceOf,
-    all_but_few,
-    judge,
     judge_image,
     references,
 )
@@ -43,14 +43,17 @@ from airlight.validation.engine.observation import (
     scene_of_size,
     with_rest,
 )
+from airlight.validation.engine.other_orders import other_orders
 from airlight.validation.engine.prediction import Predictor, SceneLight
 from airlight.validation.engine.search import Explanation
 from airlight.validation.engine.stages import QUICK, Attempt
+from airlight.validation.engine.verdict import RIGHT as RIGHT_ERROR
+from airlight.validation.engine.verdict import all_but_few, judge
 from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.scenes.models import model_of
 
-RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
+RIGHT, BLACK, ORDERS, UNEXPLAINED = "right", "black", "orders", "unexplained"
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class Diagnosis:
     path: str
     layer: str
     pixel: str  #: 'centre' or 'area'
-    #: name of the first explanation: a fault, or 'right', 'black' or 'unexplained'
+    #: name of the first explanation: a fault, or 'right', 'black', 'orders' or 'unexplained'
     first: str
     ranked: tuple[Ranked, ...]  #: one where no fault was looked for
     residual: float  #: mean relative error of the image as it is
@@ -115,6 +118,8 @@ class Diagnosis:
             return [f"No fault is found, and the difference is {self.rest} ({self.verdict})."]
         if self.first == BLACK:
             return [f"The image is black: {self.verdict}."]
+        if self.first == ORDERS:
+            return [f"No fault is looked for: {self.ranked[0].words}."]
         if self.first == UNEXPLAINED:
             return [f"Nothing here explains it{place} ({self.verdict}).", *self._nearest()]
         # A pair of faults is two rows, each of which names both.
@@ -204,6 +209,7 @@ def diagnose_file(
             pixel=pixel,
             light=light,
             reference_of=reference_of,
+            at_size=partial(scene_of_size, scene, path=path, changes=changes, model=model),
             progress=progress,
         )
         diagnoses.append(diagnosis)
@@ -226,6 +232,7 @@ def diagnose_image(
     pixel: str | None = None,
     light: SceneLight | None = None,
     reference_of: ReferenceOf | None = None,
+    at_size: Callable[[tuple[int, int]], LoadedScene] | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Say what is wrong with an image of a scene.
@@ -243,6 +250,9 @@ def diagnose_image(
         The paths of light of this scene, which several images of it share.
     reference_of
         A function that computes the scene's reference for 'centre' or 'area'.
+    at_size
+        A function that loads the scene at another size; without it nobody asks whether an image
+        of clouds holds light of further orders.
     progress
         Called with (fraction done, what).
 
@@ -266,12 +276,19 @@ def diagnose_image(
     compared = judge_image(
         image, judged, loaded, reference_of, path=path, pixel=pixel, mask=image.with_data()
     )
+    # Light of further orders hides every fault of single scattering where it is most of the light.
+    orders = None
+    if at_size is not None and not compared.verdict.right:
+        bias = compared.comparison.metrics.relative_bias
+        orders = other_orders(loaded, at_size, judged.holds, bias)
+    is_hidden = orders is not None and orders.dominate
     # The comparison has decided what the pixels of a right image are. Elsewhere the first stage is
     # tried with every kind of pixels, and the smaller error decides. An image that is wrong as a
     # whole, such as a black one, needs no search.
     light = light or SceneLight(observation.reference)
-    pixels = (compared.pixel,) if compared.verdict.right else pixel_kinds(image, pixel)
-    is_searched = not compared.verdict.right and not compared.hints.reason
+    is_plain = compared.verdict.right or is_hidden
+    pixels = (compared.pixel,) if is_plain else pixel_kinds(image, pixel)
+    is_searched = not is_plain and not compared.hints.reason
 
     def begun(kind: str) -> Attempt:
         attempt = Attempt.begun(Predictor(replace(observation, area=kind == "area"), light), kind)
@@ -302,6 +319,10 @@ def diagnose_image(
     )
     if compared.verdict.right:
         return diagnosis
+    if orders is not None and is_hidden:
+        row = Ranked(ORDERS, (orders.more,), orders.words, diagnosis.residual, 0.0, ())
+        found = replace(diagnosis, first=ORDERS, ranked=(row,), rest="", explained=False)
+        return replace(found, verdict=f"not right: {orders.words}")
     if compared.hints.reason:
         # A reference is black where nothing should be seen: the image is black only if it is right.
         reason = compared.hints.reason
@@ -312,7 +333,10 @@ def diagnose_image(
     # Where a few pixels are wrong and all others right, such as a mark on the image, no path of
     # light explains it: the later stages are left out.
     is_right_so_far = not attempt.candidates.chosen.faults
-    few = all_but_few(compared, image.with_data()) if is_right_so_far else ""
+    few = ""
+    if is_right_so_far:
+        correct, shown = (each.astype(np.float64) for each in (compared.reference, compared.image))
+        few = all_but_few(correct, shown, image.with_data())
     if not few:
         attempt = attempt.finished(progress)
     return _concluded(diagnosis, attempt, compared, few)

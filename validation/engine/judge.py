@@ -12,23 +12,14 @@ without the faults of the whole that `hints.py` finds, the error is the mean of
 
 No single value decides this mean. The kind with the smaller error fits.
 
-**Verdict.** The noise of a path tracer is independent from pixel to pixel, and near a light its
-variance is infinite: no bound on the error of single pixels tells noise from a fault. Means over
-blocks of pixels do: noise falls as the root of their number, an error of light, medium or shadow
-stays. An image is right if the relative error of the block means,
-
-    |sum(t) - sum(r)| / max(sum(r), 0.05 n mean(r))    over the n pixels of a block, by channel,
-
-is at most `RIGHT` in the root mean square without the worst hundredth of the blocks, which are
-beside the light; if the best factor is as close to one; and if nothing is suspected of the image as
-a whole.
+The verdict is that of `verdict.py`.
 """
 
 import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +34,7 @@ from airlight.reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.comparison.images import Comparison, compare_images, read_mask
 from airlight.validation.engine.error_place import ErrorPlace, error_place
-from airlight.validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
+from airlight.validation.engine.hints import GAIN, Hints, find_hints
 from airlight.validation.engine.model_errors import ModelErrors, model_errors
 from airlight.validation.engine.observation import (
     KINDS,
@@ -57,6 +48,8 @@ from airlight.validation.engine.observation import (
     relative_errors,
     scene_of_size,
 )
+from airlight.validation.engine.other_orders import OtherOrders, other_orders
+from airlight.validation.engine.verdict import Verdict, block_errors, judge
 from airlight.validation.estimates.agreement import pixel_angle
 from airlight.validation.estimates.quadrature import (
     known_to,
@@ -67,42 +60,10 @@ from airlight.validation.estimates.quadrature import (
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
-from airlight.validation.statistics.comparison import block_sums, check_margin
+from airlight.validation.statistics.comparison import check_margin
 from airlight.validation.statistics.estimate import Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
-
-BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
-RIGHT = 0.01  #: largest relative error of an image that is called right
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether an image is right."""
-
-    right: bool
-    reasons: tuple[str, ...]  #: why it is not; empty if it is
-    block: int  #: side of a block [pixels]
-    block_error: float  #: relative error of block means; NaN where no block is lit
-    block_noise: float  #: the relative error of block means that scatter of pixels alone makes
-
-    @property
-    def noise_alone(self) -> bool:
-        """Whether the scatter within blocks explains the error of their means, and
-        nothing else is in the way.
-        """
-        return len(self.reasons) <= 1 and self.block_noise > self.block_error / math.sqrt(2)
-
-    @property
-    def words(self) -> str:
-        """Return a sentence."""
-        if not self.right:
-            return f"not right: {'; '.join(self.reasons)}"
-        size = (
-            "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
-        )
-        scatter = f"the scatter of single pixels alone makes {100 * self.block_noise:.2g} %"
-        return f"right: {size} are within {100 * self.block_error:.2g} % ({scatter})"
 
 
 @dataclass(frozen=True)
@@ -226,8 +187,26 @@ def compare_scene(
         margin=margin,
         all_metrics=all_metrics,
     )
+    if not compared.verdict.right:
+        at_size = partial(scene_of_size, scene, path=path, changes=changes, model=model)
+        orders = other_orders(
+            loaded, at_size, judged.holds, compared.comparison.metrics.relative_bias
+        )
+        compared = compared if orders is None else _with_orders(compared, orders)
     compared = with_model(compared, judged, loaded, chosen, progress)
     return compared if margin_total is None else _within_total(compared, margin_total)
+
+
+def _with_orders(compared: EngineComparison, orders: OtherOrders) -> EngineComparison:
+    """Return a comparison that says which orders of scattering the image may hold.
+
+    Where these dominate, no factor of single scattering says anything of the image.
+    """
+    words = (orders.words,) if orders.dominate else (*compared.hints.words, orders.words)
+    hints = replace(compared.hints, words=words)
+    correct, image = (np.asarray(v, dtype=np.float64) for v in (compared.reference, compared.image))
+    verdict = judge(correct, image, hints, compared.comparison.failures)
+    return replace(compared, hints=hints, verdict=verdict)
 
 
 def with_model(
@@ -265,7 +244,7 @@ def errors_of(
         lambda model: expected_layer(
             reference_image(loaded.scene, pixel=compared.pixel, model=model, progress=tell), judged
         ),
-        lambda correct, other: _block_errors(correct, other, side)[0],
+        lambda correct, other: block_errors(correct, other, side)[0],
     )
 
 
@@ -490,94 +469,3 @@ def _error(reference: Array, image: Array, where: Bools) -> float:
         return 0.0
     floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     return float(np.abs(relative_errors(reference[chosen], image[chosen], floor)).mean())
-
-
-def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
-    """Decide whether an image is right.
-
-    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of
-    the image as a whole; `failures`: why it must be called wrong anyway: values that are not
-    finite, or negative.
-    """
-    # Ten blocks at least along the shorter side of the image.
-    side = min(BLOCK, max(1, min(reference.shape[:2]) // 10))
-    error, noise = _block_errors(reference, image, side)
-    reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
-    # A factor other than one, or an image without light, counts only where nothing else is wrong.
-    if not reasons and abs(hints.factor - 1) > RIGHT:
-        reasons.append(f"the best factor is {hints.factor:.4g}")
-    if not reasons and math.isnan(error):
-        reasons.append("nothing is lit in the pixels that are compared")
-    # Light where the reference has none is wrong by no number.
-    if not reasons and math.isinf(error):
-        reasons.append("the reference is black")
-    if RIGHT < error < math.inf:
-        size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
-        scatter = ", most of it scatter of single pixels: render more samples, or march more steps"
-        most = scatter if noise > error / math.sqrt(2) else ""
-        reasons.append(f"{size} are {100 * error:.3g} % off{most}")
-    return Verdict(not reasons, tuple(reasons), side, error, noise)
-
-
-def all_but_few(compared: EngineComparison, mask: Bools | None = None) -> str:
-    """Say which pixels are wrong where these are few and all others are right;
-    nothing where that is not so.
-
-    `mask`: which pixels were compared, (height, width); all by default.
-    """
-    reference, image = (
-        np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image)
-    )
-    chosen = np.ones(reference.shape[:2], dtype=bool) if mask is None else mask
-    finite = np.isfinite(reference) & chosen[..., None]
-    floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
-    errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
-    # Six median errors: noise of a normal distribution is beyond in 5 pixels of 100 000.
-    wrong = chosen & (errors > max(RIGHT, 6.0 * float(np.median(errors[chosen]))))
-    count = np.count_nonzero(chosen)
-    # A tenth of the pixels may be a mark on the image, or a hole in it; more are another image.
-    if not 0 < np.count_nonzero(wrong) <= 0.1 * count:
-        return ""
-    # All others must be right by the same verdict.
-    others = np.where((chosen & ~wrong)[..., None], image, np.nan)
-    if not judge(reference, others, find_hints(reference, others), ()).right:
-        return ""
-    row, column = np.nonzero(wrong)
-    return (
-        f"all is right but {len(row)} of {count} pixels, in columns {column.min()} to "
-        f"{column.max()} and rows "
-        f"{row.min()} to {row.max()} from the upper left"
-    )
-
-
-def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
-    """Return the relative error of the means of lit blocks, and the error that
-    the scatter of pixels within them alone would make.
-    """
-    # Sums over blocks, of each channel: pixels that count, light of the reference, light of the
-    # image, and their difference and its square.
-    finite = np.isfinite(reference) & np.isfinite(image)
-    correct, test = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
-    difference = test - correct
-    count, light, test_light, offset, square = (
-        block_sums(values, side)
-        for values in (finite.astype(float), correct, test, difference, difference**2)
-    )
-    # A block that is dimmer in both images than 5 % of the mean says nothing.
-    floor = 0.05 * float(correct[finite].mean()) if finite.any() else 0.0
-    lit = (count > 0) & (np.maximum(light, test_light) > floor * count)
-    if not lit.any():
-        return math.nan, math.nan
-    # Light where the reference has none at all is wrong by any factor, and that is no noise.
-    if floor == 0:
-        return math.inf, 0.0
-    scale = np.maximum(light, floor * count)[lit]
-    error = np.abs(offset[lit]) / scale
-    # Noise that is independent from pixel to pixel gives the sum of a block the variance
-    # sum(d^2) - sum(d)^2/n.
-    scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
-    # Without the worst hundredth of the blocks; of less than a hundred, none may be wrong.
-    best = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
-    return math.sqrt(float(np.mean(error[best] ** 2))), math.sqrt(
-        float(np.mean((scatter / scale**2)[best]))
-    )

@@ -16,7 +16,6 @@ from airlight.validation.engine.decide import MODEL_ERROR, MOST_LEFT, Blocks, Ca
 from airlight.validation.engine.equations import terms_that_matter
 from airlight.validation.engine.fault import Fault
 from airlight.validation.engine.faults import KINDS, faults_of
-from airlight.validation.engine.judge import RIGHT
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import (
     COARSE,
@@ -25,6 +24,7 @@ from airlight.validation.engine.search import (
     best_shape,
     explain,
 )
+from airlight.validation.engine.verdict import RIGHT
 
 QUICK, PAIRS = "quick", "pairs"
 STAGES = (QUICK, PAIRS, "paths", "extent")

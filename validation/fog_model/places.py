@@ -43,7 +43,8 @@ from airlight.reference.quadrature.intervals import (
 )
 from airlight.reference.quadrature.light_airlight import LitRays, sun_stretches
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.distances import crossings
 from airlight.reference.visibility.planes import falloff, rays_at

@@ -22,7 +22,8 @@ from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.shapes import Shapes, read_shapes
 from airlight.reference.scene.varying import HeightMedium
 from airlight.reference.visibility.candidates import Ball

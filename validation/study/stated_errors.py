@@ -44,13 +44,9 @@ from airlight.reference.quadrature.intervals import AMBIENT, camera_segments, sc
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.convex_bounds import normals_at
 from airlight.reference.scene.directional_light import DirectionalLight
-from airlight.reference.scene.read import (
-    ReferenceLight,
-    ReferenceMedium,
-    ReferenceScene,
-    homogeneous_around,
-    read_reference,
-)
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene, homogeneous_around, read_reference
 from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.visibility.distances import crossings
 from airlight.validation.arrays import Array, Bools, Index

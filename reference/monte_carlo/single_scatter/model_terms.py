@@ -43,8 +43,9 @@ import numpy as np
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings
 from airlight.reference.monte_carlo.single_scatter.model_lamps import colour, number
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
 from airlight.reference.scene.model import Model
-from airlight.reference.scene.read import ReferenceMedium, ReferenceScene
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import GridMedium
 
 _FOUR_PI = 4 * math.pi

@@ -45,7 +45,8 @@ from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, 
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
 from airlight.reference.scene.model import Model
-from airlight.reference.scene.read import ReferenceScene, scene_from, whole_scene
+from airlight.reference.scene.read import ReferenceScene, whole_scene
+from airlight.reference.scene.shape_roles import scene_from
 
 #: points of the unit square
 SquarePoints: TypeAlias = "tuple[mi.Float64, mi.Float64]"

@@ -55,7 +55,8 @@ from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 from airlight.reference.quadrature.light_airlight import lit_sums
 from airlight.reference.quadrature.model_terms import route_of
 from airlight.reference.quadrature.surface import surface_hits
-from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.visibility.certificate import LitIntervals
 from airlight.reference.visibility.distances import exact_distance
 from airlight.reference.visibility.planes import Rays, cone_interval, rays_at

@@ -14,7 +14,8 @@ from scipy.special import roots_legendre
 from airlight.reference.quadrature import area_lights
 from airlight.reference.quadrature.area_lights import area_surface, beams_of
 from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.quadrature.light_samples import samples_for_rays, sections_for_points
+from airlight.reference.quadrature.light_samples import samples_for_rays
+from airlight.reference.quadrature.light_sections import sections_for_points
 from airlight.reference.quadrature.replicates import (
     REPLICATES,
     PointPlan,

@@ -13,7 +13,8 @@ from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.replicates import PointPlan
-from airlight.reference.scene.read import ReferenceMedium, read_reference
+from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.reference.scene.varying import HeightMedium
 from airlight.validation.scenes.loading import load_scene

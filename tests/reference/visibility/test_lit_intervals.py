@@ -13,7 +13,8 @@ import pytest
 from airlight.reference.quadrature import image as quadrature
 from airlight.reference.quadrature import light_airlight
 from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.scene.read import ReferenceLight, read_reference
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shapes import Disks, Shapes
 from airlight.reference.visibility.candidates import Ball, near_shapes
 from airlight.reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked

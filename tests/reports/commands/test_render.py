@@ -145,7 +145,7 @@ def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pay
         asked.append((frames, layers))
         raise InputError("enough")
 
-    monkeypatch.setattr("airlight.reports.api.render._ready", ready)
+    monkeypatch.setattr("airlight.reports.api.frames._ready", ready)
     for samples, timed in ((1, False), (4, False), (1, True)):
         with pytest.raises(InputError, match="enough"):
             airlight.render("open-fog", "unshadowed", samples=samples, timed=timed)

@@ -4,7 +4,6 @@ called right where it is.
 """
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,14 +15,9 @@ from airlight.validation.comparison.images import compare_images
 from airlight.validation.engine.error_place import error_place
 from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import EngineImage, measure_image
-from airlight.validation.engine.judge import (
-    Verdict,
-    all_but_few,
-    compare_scene,
-    judge,
-    references,
-)
+from airlight.validation.engine.judge import compare_scene, references
 from airlight.validation.engine.observation import expected_layer, judged_layer, observation_of
+from airlight.validation.engine.verdict import Verdict, all_but_few, judge
 from airlight.validation.estimates.quadrature import (
     reference_error,
     reference_layer,
@@ -335,9 +329,8 @@ def test_pixels_that_a_file_does_not_hold_are_not_among_the_few_that_are_wrong()
     reference, held = np.ones((40, 40, 3)), np.arange(40)[None, :] < np.full((40, 1), 38)
     image = reference * held[..., None]
     image[7:9, 5] = 3.0
-    compared = SimpleNamespace(reference=reference, image=image)
     words = "all is right but 2 of 1520 pixels, in columns 5 to 5 and rows 7 to 8"
-    assert words in all_but_few(compared, held)
+    assert words in all_but_few(reference, image, held)
 
 
 def test_light_that_a_mask_leaves_out_does_not_hide_the_few_pixels_that_are_wrong():
@@ -347,9 +340,8 @@ def test_light_that_a_mask_leaves_out_does_not_hide_the_few_pixels_that_are_wron
     held = np.arange(40)[:, None] >= np.full((1, 40), 10)
     image = reference.copy()
     image[20:22, 5] = 3e-3
-    compared = SimpleNamespace(reference=reference, image=image)
     words = "all is right but 2 of 1200 pixels, in columns 5 to 5 and rows 20 to 21"
-    assert words in all_but_few(compared, held)
+    assert words in all_but_few(reference, image, held)
 
 
 def test_the_rest_of_an_error_is_that_of_the_pixels_that_are_compared():
@@ -401,6 +393,20 @@ def test_a_mask_does_not_change_the_verdict_on_the_pixels_that_it_leaves():
     verdict = judge(np.concatenate([expected] * 4), masked, hints, ())
     assert alone.right
     assert (verdict.right, verdict.block_error) == (True, alone.block_error)
+
+
+@pytest.mark.claim("engine-suspects", tolerance="none: 3 % of noise, 30 % of another image")
+@pytest.mark.parametrize(("scatter", "named"), [(0.03, True), (0.3, False)])
+def test_a_curve_that_leaves_a_third_of_the_error_is_not_suspected(scatter, named):
+    """Dim values that the sRGB curve makes ten times as bright lose nine tenths of their error to
+    its inverse, whatever is left.
+    """
+    rng = np.random.default_rng(5)
+    expected = 0.004 * np.exp(0.6 * rng.standard_normal((60, 80, 3)))
+    encoded = 1.055 * expected ** (1 / 2.4) - 0.055
+    image = encoded * np.exp(0.4 * scatter * rng.standard_normal(expected.shape))
+    hints = find_hints(expected, image)
+    assert any("sRGB curve" in words for words in hints.words) is named
 
 
 @pytest.mark.claim(

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from airlight.reference.quadrature.image import quadrature_image
-from airlight.reference.scene.read import ReferenceLight, read_reference
+from airlight.reference.scene.point_light import ReferenceLight
+from airlight.reference.scene.read import read_reference
 from airlight.validation.fog_model.radiance import Fog, FogModel, scene_fog
 from airlight.validation.fog_model.view import _level, scattering_paths, view_of
 from airlight.validation.scenes.loading import load_scene
