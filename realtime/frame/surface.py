@@ -23,6 +23,7 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from airlight.realtime.numerics.array_types import Metres, PerRay
 from airlight.realtime.numerics.recorded import Frozen
@@ -139,7 +140,9 @@ class LitSurfaces:
         cosine, r, arriving = _arriving(light, visible)
         lit = visible.seen & (cosine > 0)
         if shadow_rays:
-            lit &= ~self.geometry.ray_test(light.shadow_ray_from(visible.interaction), lit)
+            box = self.geometry.bbox()
+            size = float(np.linalg.norm(np.ravel(box.max) - np.ravel(box.min)))
+            lit &= ~self.geometry.ray_test(light.shadow_ray_from(visible.interaction, size), lit)
         reflected = (
             visible.albedo
             * arriving

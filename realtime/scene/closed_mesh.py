@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from airlight.errors import InputError
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles
-from airlight.realtime.transforms import turned_outwards
+from airlight.realtime.transforms import host_matrix, turned_outwards
 
 Array = NDArray[np.float64]
 
@@ -203,14 +203,11 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
 
 
 def _read_sphere(shape) -> Bounds:
-    box = shape.bbox()
-    low, high = (
-        np.array(box.min, dtype=np.float64).ravel(),
-        np.array(box.max, dtype=np.float64).ravel(),
-    )
-    # Mitsuba says the box of a sphere and not its scales: unequal sides show an ellipsoid.
-    size = high - low
-    if np.ptp(size) > FLAT * size.max():
+    # The transform keeps the radius of a small sphere far from the origin, which the box of its
+    # float32 corners rounds.
+    matrix = host_matrix(mi.traverse(shape)["to_world"])
+    scales = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.ptp(scales) > FLAT * scales.max():
         raise _refusal(
             shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh"
         )
@@ -223,8 +220,8 @@ def _read_sphere(shape) -> Bounds:
         np.zeros((0, 3)),
         np.zeros(0),
         np.zeros((0, 3, 3)),
-        0.5 * (low + high),
-        float(size.mean() / 2),
+        matrix[:3, 3],
+        float(scales.mean()),
     )
 
 

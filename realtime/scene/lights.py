@@ -184,13 +184,32 @@ class Light:
         # must not block the light.
         return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
 
-    def shadow_ray_from(self, interaction) -> Any:
+    def shadow_ray_from(self, interaction, size: float) -> Any:
         """Return the Mitsuba ray from a surface interaction that is blocked where the
         light does not reach it.
+
+        Parameters
+        ----------
+        interaction
+            Where camera rays meet surfaces.
+        size
+            The size of the scene [m].
         """
-        if self.w:
-            return interaction.spawn_ray_to(mi.Point3f(self.position))
-        return interaction.spawn_ray(mi.Vector3f(-self.axis))
+        if size >= 1:
+            if self.w:
+                return interaction.spawn_ray_to(mi.Point3f(self.position))
+            return interaction.spawn_ray(mi.Vector3f(-self.axis))
+        # Mitsuba starts a ray RayEpsilon (1 + the largest coordinate) off its surface, which is
+        # far beyond the walls of a scene of a millimetre: in a small scene its size stands for
+        # the 1 m.
+        away = mi.math.RayEpsilon * (size + dr.max(dr.abs(interaction.p)))
+        way = mi.Vector3f(self.toward(type(self.position)(interaction.p)))
+        start = interaction.p + interaction.n * dr.mulsign(away, dr.dot(interaction.n, way))
+        if not self.w:
+            return mi.Ray3f(start, way)
+        way = mi.Point3f(self.position) - start
+        length = dr.norm(way)
+        return mi.Ray3f(start, way / length, length * (1 - mi.math.ShadowEpsilon), 0.0, [])
 
     def rays_from(self, unit) -> tuple[Any, Any]:
         """Return the origins of rays from a light at a place, and how far they are from it [m].

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Height fog: its airlight is `analytic.height_fog` in the rays' planes.
 
-Under a sun it has a closed form. A weight along the ray, such as the fade of a model, has none: its
-integrand is summed by panels that span four scale heights at most.
+Under a sun it has a closed form. A weight along the ray, such as the fade of a model, and light
+paths of one length have none: their integrand is summed by panels that span four scale heights at
+most.
 """
 
 from collections.abc import Callable
@@ -86,7 +87,7 @@ class HeightField:
         """Return the airlight of each ray from its lit stretches, and a bound of
         its error, (rays, 3) each.
         """
-        if not rays.w and terms.profile is not None:
+        if not rays.w and (terms.profile is not None or terms.paths.length):
             return sum_stretches(
                 rays,
                 stretches,
@@ -223,9 +224,16 @@ class _SunIntegrand:
     same: Index = field(default_factory=lambda: np.zeros(3, np.int64))
 
     @staticmethod
-    def of(medium: HeightMedium, rays: Rays, lit: Stretches, paths: Paths) -> "_SunIntegrand":
-        """Cut lit stretches at heights where the density has kinks, and every four scale heights."""
+    def of(
+        medium: HeightMedium, rays: Rays, lit: Stretches, paths: Paths
+    ) -> "_SunIntegrand | None":
+        """Cut lit stretches at heights where the density has kinks, and every four scale heights;
+        return None where no light arrives from them.
+        """
         fog = fog_of(medium)
+        lit = _until_dark(fog, medium, rays, lit, paths)
+        if not len(lit[0]):
+            return None
         # Beyond 64 scale heights on either side a layer is as good as nothing, or all is dark.
         steps = 4.0 * np.arange(-16, 17)
         layers = [layer.base + layer.scale_height * steps for layer in fog.layers]
@@ -251,5 +259,31 @@ class _SunIntegrand:
         depth = self.paths.of_camera(ray)[:, None] * fog.optical_depth(start, z, x)
         if self.paths.light:
             depth = depth + self.paths.light * fog.unbounded(z, mu)
+        if self.paths.length:
+            depth = depth + self.paths.length * fog.density(z)
         value = np.exp(np.nan_to_num(fog.log_density(z) - depth, nan=-np.inf, neginf=-np.inf))
         return (value * medium.phase(scatter))[:, :, None], np.minimum(depth, 745.0)[:, :, None]
+
+
+def _until_dark(
+    fog: HeightFog, medium: HeightMedium, rays: Rays, lit: Stretches, paths: Paths
+) -> Stretches:
+    """Return stretches up to where the depth to the camera leaves no light in float64, or the ray
+    has left all layers: a panel that is much longer would miss what is lit.
+    """
+    ray, x0, x1 = lit
+    start, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up
+    camera, powers = paths.of_camera(ray), np.array([[-14.0], [14.0]]) * np.ones(len(ray))
+    # Halves of 28 decades of metres: 2^-24 of them is far finer than a panel.
+    for _ in range(24):
+        middle = powers.mean(axis=0)
+        x = 10.0**middle
+        is_dark = camera * fog.optical_depth(start, start + rise * x, x) > 745.0
+        powers = np.where([~is_dark, is_dark], middle, powers)
+    end = np.minimum(x1, 10.0 ** powers[1])
+    if not fog.constant:
+        top = max(layer.base + 64.0 * layer.scale_height for layer in fog.layers)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            end = np.where(rise > 0, np.minimum(end, np.maximum((top - start) / rise, 0.0)), end)
+    left = end > x0
+    return ray[left], x0[left], end[left]

@@ -129,19 +129,19 @@ def route_of(reference: ReferenceScene, distance: Array) -> Route:
 
 
 def _check_suns(reference: ReferenceScene, end: Array) -> None:
-    """Refuse suns that no closed form or no sum has."""
-    model = reference.model
-    if not reference.directional or not model.factors[1] or model.constant:
+    """Refuse suns whose light no path to the camera attenuates, on rays that stay in the fog."""
+    model, medium = reference.model, reference.medium
+    if not reference.directional or not model.factors[1] or model.constant or model.camera_scale:
         return
-    if isinstance(reference.medium, HeightMedium) and model.light_length:
-        raise InputError(
-            f"model: light-path is {model.light_path}; in height fog under a sun expected on, off "
-            "or a fraction"
-        )
-    unbounded = isinstance(reference.medium, ReferenceMedium) and np.any(
-        reference.medium.sigma_t * reference.medium.albedo > 0
-    )
-    if unbounded and not model.camera_scale and np.isinf(end).any():
+    stays = np.isinf(end)
+    if isinstance(medium, ReferenceMedium):
+        stays &= bool(np.any(medium.sigma_t * medium.albedo > 0))
+    elif isinstance(medium, HeightMedium):  # a level ray, at a height with fog
+        height = float(reference.origin @ medium.up)
+        stays &= (reference.direction @ medium.up == 0) & (medium.floor <= height <= medium.cap)
+    else:
+        return
+    if stays.any():
         raise InputError(
             "model: camera-path is off, so that a sun in a medium without bounds adds light without "
             "end; expected an end of the fog, such as ends=spheres:0:100"
@@ -313,7 +313,10 @@ def ray_factor(reference: ReferenceScene, route: Route) -> Array | float:
 def depth_of_behind(reference: ReferenceScene, route: Route) -> Array:
     """Return the depth that attenuates what lies behind the fog of a ray, (rays, 3) [1]."""
     scale = reference.model.surface_paths[0] * route.steps
-    return scale * _depth(reference, route.start, route.end)
+    depth = scale * _depth(reference, route.start, route.end)
+    # A source that covers no more than its cap leaves the rest of what is behind it.
+    most = reference.model.most
+    return np.minimum(depth, -np.log1p(-most)) if most < 1 else depth
 
 
 def _depth(reference: ReferenceScene, low: Array, high: Array) -> Array:
@@ -376,8 +379,10 @@ def _lobes(reference: ReferenceScene, route: Route) -> Array:
     lobe, total = reference.model.lobe_of, np.zeros((len(route.start), 3))
     if lobe is None:
         return total
-    begin = np.maximum(route.start, lobe.start)
-    opacity = -np.expm1(-route.camera * _depth(reference, begin, np.maximum(route.end, begin)))
+    # It has a beginning of its own, on rays that reach the fog.
+    begin = np.full_like(route.start, lobe.start)
+    end = np.where(route.end > route.start, np.maximum(route.end, begin), begin)
+    opacity = -np.expm1(-route.camera * _depth(reference, begin, end))
     for sun in reference.directional:
         towards = np.maximum(reference.direction @ -sun.direction, 0.0)
         total += (towards**lobe.power)[:, None] * sun.irradiance * opacity

@@ -11,15 +11,15 @@ both ways, piece by piece. A directional light has its irradiance in the place o
 unbounded shadow segment: only bodies attenuate it.
 
 **The error of a surface** is estimated: Mitsuba computes f cos I / r^2 in single precision. The
-place of a hit is known to a few roundings of its coordinates, and with it the direction to a light
-at the distance r to
+place p of a hit is known to a few roundings of its coordinates and of those of the camera o. With
+it are the direction to a light at the distance r, and the normal of a sphere of the curvature k, to
 
-    e = 2^-22 (1 + max |p| / r).
+    e = 2^-22 (1 + max(|p|, |o|) (1 / r + k)).
 
 The error is the difference that a turn of this direction by e towards the normal makes, which is
 large at grazing incidence and in a sharp lobe, and e itself, and 16 roundings, times the radiance.
-It is no part of it which point a ray meets, which is Mitsuba's, and whether that point is lit, which
-the lit intervals of the ray say.
+It is no part of it which point a ray meets, which is Mitsuba's, and whether that point is lit,
+which the lit intervals of the ray say.
 
 **Area lights and the background** are seen with their own radiance, a layer beside the others.
 
@@ -78,7 +78,8 @@ def surface_hits(reference: ReferenceScene) -> SurfaceHits:
         dr.normalize(mi.Vector3f(reference.direction.T)),
     )
     dr.make_opaque(ray)  # one kernel for all cameras
-    interaction = reference.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+    flags = mi.RayFlags.All | mi.RayFlags.dNSdUV  # with the curvature, see `_curvature`
+    interaction = reference.occluders.ray_intersect(ray, flags, coherent=True)
     dr.eval(interaction)  # whatever is read of it
     valid = np.array(interaction.is_valid(), dtype=bool)
     return SurfaceHits(
@@ -122,7 +123,8 @@ def lit_surface(
         return total, error
     far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
     point = reference.origin + far[:, None] * reference.direction
-    size = np.abs(point).max(axis=1)
+    size = np.maximum(np.abs(point), np.abs(reference.origin)).max(axis=1)
+    bent = size * _curvature(interaction)
     to_camera, light_scale = depth_of_behind(reference, route), reference.model.surface_paths[1]
     # The emitters are sorted like `lights`: places first, then directions.
     emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
@@ -145,7 +147,8 @@ def lit_surface(
         radiance = as_rows(reflected * arriving)
         # The same from a direction that is turned towards the normal by its uncertainty: e of the
         # derivation, at most 45 degrees, for a light on the surface.
-        turn = 2.0**-22 * (1 + size / np.maximum(r, 2.0**-22 * size + np.finfo(float).tiny))
+        nearest = 2.0**-22 * size + np.finfo(float).tiny
+        turn = 2.0**-22 * (1 + bent + size / np.maximum(r, nearest))
         normal = mi.Vector3f(interaction.n)
         turned = dr.normalize(towards.d + normal * on_device(mi.Float, turn))
         other = interaction.bsdf().eval(
@@ -171,6 +174,19 @@ def lit_surface(
     return total, error
 
 
+def _curvature(interaction: "mi.SurfaceInteraction3f") -> Array:
+    """Return how fast the normals of spheres turn where rays meet them, one over the radius,
+    (rays,) [1/m]; 0 on other shapes, and where nothing is met.
+    """
+    turned, moved = (
+        np.array(dr.norm(each), dtype=np.float64) for each in (interaction.dn_dv, interaction.dp_dv)
+    )
+    # The parameters of a mesh are not those of its interpolated normals.
+    curved = np.array(interaction.is_valid() & ~interaction.shape.is_mesh(), dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(curved & (moved > 0), turned / moved, 0.0)
+
+
 def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     """Return the radiance of area lights and the sky that mirrors show at the pixel centres,
     (pixels, 3) [W/(m^2 sr)]; of mirrors in mirrors the first alone reflects.
@@ -194,7 +210,7 @@ def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     far = hits.distance[rows]
     point = origin + far[:, None] * direction
     # Rays start a step along their way, a thousand roundings, so as not to meet the mirror itself.
-    step = 1e-4 * (1 + np.abs(point).max(axis=1))
+    step = 1e-4 * (_metre(reference.occluders) + np.abs(point).max(axis=1))
     start = point + step[:, None] * onwards
     ray = mi.Ray3f(vectors(mi.Point3f, start), vectors(mi.Vector3f, onwards))
     next_surface = step + np.array(reference.occluders.ray_intersect(ray).t, dtype=np.float64)
@@ -245,6 +261,12 @@ def emitted_light(reference: ReferenceScene, distance: Array, route: Route | Non
     return total
 
 
+def _metre(scene: "mi.Scene") -> float:
+    """Return 1 m, or the size of a smaller scene, for steps of rays off surfaces [m]."""
+    box = scene.bbox()
+    return min(1.0, float(np.linalg.norm(np.ravel(box.max) - np.ravel(box.min))))
+
+
 def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
     """Yield where rays meet a mesh from the side that emits, crossing after
     crossing, (rays,) [m]; else NaN.
@@ -264,7 +286,7 @@ def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Ite
         walking &= not light.opaque
         # The next crossing is looked for 1e-5 of the distance and 1e-5 m beyond this one, which
         # float32 rays would otherwise meet again.
-        start = np.where(walking, at * (1 + 1e-5) + 1e-5, start)
+        start = np.where(walking, at * (1 + 1e-5) + 1e-5 * _metre(mesh), start)
 
 
 def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:

@@ -32,9 +32,11 @@ and a sun of irradiance E adds the same with E for I edge f(r) w(r), and `suns` 
     fade           none; START:END: q falls along a line in the depth z, 1 at START and 0 at END [m];
                    it is above 1 before START, and no ambient light or constant source has it
     source         lights; constant:R,G,B: C (1 - exp(-a tau_c)) and no light of lamps and suns
-    cap            none; the most that 1 - exp(-a tau_c) of a constant source can be
+    cap            none; the most that 1 - exp(-a tau_c) of a constant source can be, and the most
+                   that it hides of a surface
     lobe           none; n[:START]: each sun adds E max(cos, 0)^n (1 - exp(-a tau_c)) to a constant
-                   source, from the distance START on [m], cos that of the angle between ray and sun
+                   source, from the distance START on [m] where the ray reaches the fog, cos that of
+                   the angle between ray and sun
     ambient        none; R,G,B: A adds int albedo sigma_t A exp(-a tau_c) dx [W/(m^2 sr)]
     lit            off; k: L = 1 - exp(-k X), X the sum over lights without the albedo: what is lit
                    is what is dense

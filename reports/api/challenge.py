@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from airlight.errors import InputError
 from airlight.reports.api.inputs import File, Files, Progress, one_error, output_files, telling
 from airlight.reports.tables.record import Result
-from airlight.reports.tables.table import Interval, Table, numbers, table, words
+from airlight.reports.tables.table import Interval, Row, Table, numbers, table, words
 
 if TYPE_CHECKING:
     from airlight.reports.challenge.board import BoardTable
@@ -49,7 +49,8 @@ class ChallengeWritten(Result):
             f"{self.challenge.digest[:12]}",
             f"to write: {self.challenge.write}",
             'and entry.toml, with a line method = "NAME, commit ..."; authors, machine and '
-            "settings are optional",
+            'settings are optional; under [cannot] a line NAME = "REASON" for a scene that the '
+            "method cannot have",
             f"to score: {shlex.join(['airlight', 'challenge', 'score', str(self.folder)])} -o "
             "score.json",
         ]
@@ -132,14 +133,28 @@ class ChallengeScore(Result):
     @property
     def tables(self) -> Sequence[Table]:
         """The scenes: their errors, with the intervals that the reference leaves, and times."""
+        from airlight.reports.challenge.record import CANNOT
+
         columns = (
             *words("scene", "kind"),
             *numbers(error="error", interval="between", how={"digits": 4}),
             *numbers(bias="bias", how={"digits": 2, "sign": True}),
             *numbers(seconds="frame s", how={"digits": 3}),
         )
+        # A scene without an image has the reason in place of numbers.
         rows = [
-            (each.name, each.kind, each.error, Interval(*each.interval), each.bias, each.seconds)
+            Row({"scene": each.name, "kind": each.kind, "error": CANNOT}, reason=each.cannot)
+            if each.cannot
+            else Row(
+                {
+                    "scene": each.name,
+                    "kind": each.kind,
+                    "error": each.error,
+                    "interval": Interval(*each.interval),
+                    "bias": each.bias,
+                    "seconds": each.seconds,
+                }
+            )
             for each in self.score.scenes
         ]
         whole = table(
@@ -152,10 +167,15 @@ class ChallengeScore(Result):
     def lines(self) -> Sequence[str]:
         """The number, the same by kind, and what to cite."""
         low, high = self.interval
-        kinds = ", ".join(f"{kind} {number:.3g}" for kind, number in self.score.kinds.items())
+        kinds = ", ".join(
+            f"{kind} {of if isinstance(of, str) else f'{of:.3g}'}"
+            for kind, of in self.score.kinds_shown.items()
+        )
+        black = f"{self.score.had} scenes have an image; the others count as black, error 1"
         return [
             f"number: {self.number:.4g}, 95 % interval {low:.4g} to {high:.4g} ({kinds}; smaller "
             f"is better, errors below {self.score.floor:g} count as that)",
+            *([black] if self.score.cannot else []),
             f"to cite: {self.score.cite}",
             *(f"wrote {path}" for path in self.files),
         ]
@@ -175,9 +195,11 @@ def challenge_score(
     """Score an entry: the error of each of its images, and one number with its interval.
 
     The scenes are drawn again from the seed; changed ones are refused, and so is an entry that
-    lacks an image. References come from the cache, or take half a minute. The error
-    of a scene is the root mean square of the error of its airlight over that of the reference, and
-    the number is the geometric mean over scenes, each counted as 0.001 at least.
+    lacks an image. A scene that the method cannot have is named in entry.toml, under [cannot] as
+    NAME = "reason", and counts as a black image, whose error is 1. References come from the cache,
+    or take half a minute. The error of a scene is the root mean square of the error of its airlight
+    over that of the reference, and the number is the geometric mean over scenes, each counted as
+    0.001 at least.
 
     The same entry has the same score.json on any machine: `-o` writes it.
 

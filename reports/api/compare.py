@@ -33,6 +33,7 @@ from airlight.reports.api.inputs import (
 from airlight.validation.scenes.names import check_scene, is_random, scene_names
 
 if TYPE_CHECKING:
+    from airlight.reference.scene.model import Model
     from airlight.reference.storage.exr import Image
     from airlight.reports.api.comparisons import (
         FittedFog,
@@ -104,7 +105,8 @@ def compare(
     model
         With a scene: judge by the equation of an engine, such as playcanvas:range=8, see `airlight list models`, or
         by terms such as light-path=off. The error of the equation and that of the algorithm are then told apart.
-        With `--diagnose` faults are looked for on top of it. physical leaves out the model that a scene file names.
+        With `--diagnose` faults are looked for on top of it, and `--fit` finds the fog that it has. physical leaves
+        out the model that a scene file names.
     all_metrics
         Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
@@ -179,8 +181,8 @@ def compare(
             {"fit": fit, "mask": mask, "frames": frames, "margin_total": margin_total, **about},
         )
     if fit is not None:
-        of_models = {"model": model, "margin_total": margin_total}
-        exclude("fit", "asks for the fog of one image", {"frames": frames, **of_models, **about})
+        beside = {"frames": frames, "margin_total": margin_total, **about}
+        exclude("fit", "asks for the fog of one image", beside)
     check_scene(scene)
     # Several files: frames of an animation with frames.json, or independent renders of one frame.
     # Both are judged as a whole, so that a choice of pixels or a diagnosis of one image has no
@@ -209,6 +211,7 @@ def compare(
             test,
             fit,
             changes=changes_of(change),
+            model=chosen_model(model),
             layer=layer,
             holds=holds,
             pixel=pixel,
@@ -422,6 +425,7 @@ def _fit(
     parameters: Any,
     *,
     changes: Mapping[str, Sequence[float]],
+    model: "Model | None",
     layer: str | None,
     mask: Any,
     progress: Any,
@@ -448,7 +452,7 @@ def _fit(
 
     # The scene is loaded at the size of the image, whose pixels the fit explains.
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
-    loaded = scene_of_size(str(scene), size, name, changes)
+    loaded = scene_of_size(str(scene), size, name, changes, model)
     with telling(progress, "fit") as tell:
         result = fit_image(
             layers,

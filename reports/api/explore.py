@@ -2,6 +2,7 @@
 """`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
 
 import json
+import os
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from airlight.reports.tables.table import Table
 from airlight.validation.scenes.names import check_scene
 
 if TYPE_CHECKING:
+    from airlight.reference.scene.model import Model
     from airlight.validation.scenes.loading import LoadedScene
 
 
@@ -110,6 +112,7 @@ def describe(
         gltf=written[-1] if written else None,
         pbrt=tuple(pbrt),
         grid=grids[-1] if grids else "",
+        asked=model.strip() if isinstance(model, str) else _model_words(scene, loaded, chosen),
         advice=_model_advice(loaded) if chosen is None else "",
     )
 
@@ -120,6 +123,7 @@ class Description(Result):
 
     described: Mapping[str, Any]  #: see `reports.interchange.scene.describe_scene`
     changes: tuple[str, ...] = ()  #: of the scene, in words
+    asked: str = ""  #: the words of its model, where the command that judges needs them
     gltf: Mapping[str, Any] | None = None  #: the glTF file that was written
     pbrt: tuple[str, ...] = ()  #: the files of the pbrt scene that was written
     grid: str = ""  #: the medium that reads the volume file that was written, as XML
@@ -157,6 +161,7 @@ class Description(Result):
         from airlight.validation.scenes.models import model_line
 
         options = [word for change in self.changes for word in ("--change", change)]
+        options += ["--model", self.asked] if self.asked else []
         command = ["airlight", "compare", self["source"], self["file"]["name"], *options]
         lines = [f"to judge it: {shlex.join(command)}"]
         if self["model"] is not None:
@@ -181,6 +186,21 @@ class Description(Result):
             "advice": self.advice,
         }
         return {**self.described, **{name: value for name, value in own.items() if value}}
+
+
+def _model_words(scene: Any, loaded: "LoadedScene", chosen: "Model | None") -> str:
+    """Return what a user types beside a scene to judge by its model; nothing where its name or its
+    file says as much.
+    """
+    from airlight.validation.scenes.files.text import named_in
+    from airlight.validation.scenes.models import DEFAULT, PHYSICAL_NAME
+
+    if chosen is None and isinstance(scene, str | os.PathLike):
+        return ""
+    # A scene from Python may have another model than its file.
+    is_named = loaded.path is not None and named_in(loaded.path, DEFAULT).model is not None
+    plain = PHYSICAL_NAME if chosen is not None or is_named else ""
+    return loaded.model.terms or plain
 
 
 def _model_advice(loaded: "LoadedScene") -> str:

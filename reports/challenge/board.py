@@ -12,7 +12,7 @@ from statistics import median
 
 from airlight.errors import InputError
 from airlight.reference.storage.build import build
-from airlight.reports.challenge.record import SCHEMA, Score, read_score
+from airlight.reports.challenge.record import CANNOT, SCHEMA, Score, read_score
 from airlight.reports.challenge.seed import KINDS
 from airlight.reports.data.records import read_json
 from airlight.reports.page.filters import drawn
@@ -23,7 +23,8 @@ from airlight.reports.tables.table import table as table_of_rows
 EXPLANATION = (
     "The error of a scene is the root mean square of the error of its airlight over that of the "
     "reference. The number is the geometric mean over the scenes, each counted as 0.001 at least; "
-    "smaller is better. The interval is what other scenes drawn "
+    "smaller is better. A scene that a method cannot have counts as a black image, whose error is "
+    "1. The interval is what other scenes drawn "
     "alike would give, with 95 % confidence. Entries whose intervals overlap are tied: their order "
     "says nothing."
 )
@@ -105,6 +106,7 @@ def board_table(board: BoardTable) -> Table:
         *words(method="method"),
         *numbers(number="number", interval="95 % interval", how={"digits": 3}),
         *words(tied="tied with"),
+        *words(had="scenes"),
         *numbers(*KINDS, how={"digits": 2}),
         Column("seconds", "frame", "s", digits=3),
         *words(machine="machine"),
@@ -119,10 +121,11 @@ def board_table(board: BoardTable) -> Table:
             "number": score.number,
             "interval": Interval(*score.interval),
             "tied": ", ".join(each.tied) or None,
+            "had": score.had,
             "seconds": median(seconds) if seconds else None,
             "machine": score.entry.machine or None,
         }
-        return Row(values | dict(score.kinds))
+        return Row(values | score.kinds_shown)
 
     return table_of_rows(
         f"Challenge {board.seed}", columns, map(row, board.rows), explanation=EXPLANATION
@@ -138,7 +141,10 @@ def scenes_table(board: BoardTable) -> Table:
             for at, row in enumerate(board.rows)
         ),
     )
-    errors = [{each.name: each.error for each in row.score.scenes} for row in board.rows]
+    errors: list[dict[str, Value]] = [
+        {each.name: CANNOT if each.cannot else each.error for each in row.score.scenes}
+        for row in board.rows
+    ]
     rows = [
         Row({"scene": name} | {f"entry-{at}": each.get(name) for at, each in enumerate(errors)})
         for name in errors[0]

@@ -6,7 +6,7 @@ certified scenes with occluders, whose rays are known to 12 digits, with a camer
 that nobody has seen. `engine`: stages in height fog that parameters of an engine say, two each of
 four engines.
 
-Scenes have what most methods can have, as an entry must be whole: fog around the camera, points,
+Scenes have what most methods can have, as others count as black images: fog around the camera, points,
 spots and suns, triangles. A stage is drawn again where light reaches too little of the view or
 nearly all of it, which a method without shadows would have exactly, and where triangles times
 lights exceed `_MOST`, so that its reference takes seconds.

@@ -8,15 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from airlight.errors import InputError
+from airlight.errors import InputError, nearest
 from airlight.reference.storage.exr import layer, read_exr
 from airlight.reports.challenge.folder import FILE, LAYER, Challenge, read_challenge
-from airlight.reports.challenge.record import Entry
+from airlight.reports.challenge.record import CANNOT, Entry
 from airlight.reports.challenge.seed import SIZE, check_seed, seed_of_entry, seed_words
 from airlight.reports.data.records import read_json
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.metrics.errors import wrong_pixels
-from airlight.validation.readers import Reader, read_named, read_number, read_toml, read_word
+from airlight.validation.readers import (
+    Reader,
+    by_name,
+    read_named,
+    read_number,
+    read_toml,
+    read_word,
+)
 
 ENTRY, TIMES = "entry.toml", "times.json"  #: in the folder of an entry
 _LONGEST = 1e7  # of a frame [s], some months
@@ -30,6 +37,7 @@ class EntryFolder:
     entry: Entry
     challenge: Challenge | None  #: None where there is no challenge.json
     times: Mapping[str, float]  #: of a frame by scene [s]; empty where none is given
+    cannot: Mapping[str, str]  #: why a scene has no image, by its name
 
 
 def read_entry(folder: Path) -> EntryFolder:
@@ -47,7 +55,7 @@ def read_entry(folder: Path) -> EntryFolder:
             'method, commit 1f2e3d"'
         )
     challenge = read_challenge(folder / FILE) if (folder / FILE).is_file() else None
-    said = _said(folder / ENTRY)
+    said, cannot = _said(folder / ENTRY)
     # The seed is in challenge.json, in entry.toml, or made of the words of the entry; where it is
     # said twice it is the same.
     words = said.get("entry") or (challenge.entry if challenge else "")
@@ -68,12 +76,12 @@ def read_entry(folder: Path) -> EntryFolder:
     if not facts["method"]:
         raise InputError(f"{folder / ENTRY}: it names no method; expected a line method = ...")
     return EntryFolder(
-        folder, Entry(**facts, seed=seed, entry=words), challenge, _times(folder / TIMES)
+        folder, Entry(**facts, seed=seed, entry=words), challenge, _times(folder / TIMES), cannot
     )
 
 
-def _said(file: Path) -> dict[str, str]:
-    """Return what entry.toml says, as words."""
+def _said(file: Path) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what entry.toml says, as words, and its reasons by the names of scenes."""
     readers: dict[str, Reader[str]] = {
         "method": read_word,
         "authors": _words,
@@ -83,9 +91,18 @@ def _said(file: Path) -> dict[str, str]:
         "entry": read_word,
     }
     try:
-        return read_named("", read_toml("entry", file), readers)
+        data = read_toml("entry", file)
+        reasons = by_name(_reason)(CANNOT, data.get(CANNOT, {}))
+        return read_named("", data, readers, CANNOT), reasons
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
+
+
+def _reason(what: str, value: object) -> str:
+    """Return why a method cannot have a scene, as one line."""
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{what}: got {value!r}, expected the reason in words")
+    return " ".join(value.split())
 
 
 def _words(what: str, value: object) -> str:
@@ -112,17 +129,37 @@ def _times(file: Path) -> dict[str, float]:
 
 
 def check_whole(found: EntryFolder, names: Sequence[str]) -> None:
-    """Refuse an entry that lacks images, and times of other scenes."""
-    missing = [f"{name}.exr" for name in names if not (found.folder / f"{name}.exr").is_file()]
+    """Refuse an entry in which a scene has neither an image nor a reason or both, one without any
+    image, and reasons and times of other scenes.
+    """
+    for name in found.cannot:
+        if name not in names:
+            raise InputError(
+                f"{found.folder / ENTRY}: got {CANNOT}.{name}, expected the name of a scene, such "
+                f"as {names[0]}{nearest(name, names)}"
+            )
+    if len(found.cannot) == len(names):
+        raise InputError(
+            f"{found.folder / ENTRY}: {CANNOT} names all {len(names)} scenes; expected an image of "
+            "one at least: a method that can have none has no entry"
+        )
+    images = [name for name in names if (found.folder / f"{name}.exr").is_file()]
+    if both := [f"{name}.exr" for name in images if name in found.cannot]:
+        raise InputError(
+            f"entry: {found.folder} has {', '.join(both)}, and {ENTRY} says that the method cannot "
+            f"have {'it' if len(both) == 1 else 'them'}; expected one of both: leave the other out"
+        )
+    missing = [f"{name}.exr" for name in names if name not in {*images, *found.cannot}]
     if missing:
         raise InputError(
             f"entry: {found.folder} lacks {len(missing)} of {len(names)} images: "
-            f"{', '.join(missing)}; an entry is whole: render these too"
+            f"{', '.join(missing)}; an entry is whole: render these too, or say in {ENTRY} under "
+            f"[{CANNOT}] why the method cannot have them"
         )
-    if stray := sorted(set(found.times) - set(names)):
+    if stray := sorted(set(found.times) - set(images)):
         raise InputError(
-            f"{found.folder / TIMES}: got {', '.join(stray)}, expected names of the scenes, "
-            f"such as {names[0]}"
+            f"{found.folder / TIMES}: got {', '.join(stray)}, expected names of scenes with an "
+            f"image, such as {images[0]}"
         )
 
 
@@ -143,10 +180,17 @@ def read_airlight(path: Path) -> Array:
     return values
 
 
-def images_digest(folder: Path, names: Sequence[str]) -> str:
-    """Return the digest of the images of an entry: SHA-256 over lines `sha256  name`."""
+def images_digest(folder: Path, names: Sequence[str], cannot: Mapping[str, str]) -> str:
+    """Return the digest of the images of an entry: SHA-256 over lines `sha256  name`, and `cannot
+    name  reason` for a scene without an image.
+
+    No SHA-256 begins with `cannot`, and a reason is one line: two entries have one text only where
+    they say and show the same.
+    """
     lines = [
-        f"{hashlib.sha256((folder / f'{name}.exr').read_bytes()).hexdigest()}  {name}.exr\n"
+        f"{CANNOT}  {name}.exr  {cannot[name]}\n"
+        if name in cannot
+        else f"{hashlib.sha256((folder / f'{name}.exr').read_bytes()).hexdigest()}  {name}.exr\n"
         for name in sorted(names)
     ]
     return hashlib.sha256("".join(lines).encode()).hexdigest()

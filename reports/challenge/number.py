@@ -16,6 +16,13 @@ count as F, as they are of files and not of a method: half floats alone have up 
 Without the floor one scene that a method has exactly, at 1e-8, would outweigh several that it
 misses.
 
+A scene that a method cannot have counts as a black image, t = 0. Its error is
+
+    e_s = rms(0 - r) / rms(r) = 1
+
+for every r that is not dark, so that the stated error of the reference moves neither end of it. An
+entry could have handed in a black image, so that saying so gains nothing.
+
 The stated error of the reference is d: |r - r'| <= d for the true r'. By the triangle inequality of
 the root mean square the true e_s is between
 
@@ -50,6 +57,10 @@ class SceneError:
     error: float
     low: float
     high: float
+
+
+#: of a black image, whatever the reference is: see the module
+BLACK = SceneError(1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)

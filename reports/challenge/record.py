@@ -13,6 +13,7 @@ from pathlib import Path
 
 from airlight.errors import InputError
 from airlight.reports.challenge.number import (
+    BLACK,
     Combined,
     SceneError,
     combined,
@@ -23,6 +24,8 @@ from airlight.reports.data.records import read_versioned
 from airlight.validation.columns import plain
 
 SCHEMA = "airlight-challenge-score/1"
+#: the table of entry.toml with reasons by the names of scenes; tables say it in place of an error
+CANNOT = "cannot"
 _UNIT = 1e-3  # of a number of four digits, at most
 _DIGEST = re.compile("[0-9a-f]{64}")
 
@@ -50,6 +53,7 @@ class SceneScore:
     bias: float  #: mean error over the mean of the reference [1]
     pixels: int  #: that were judged
     seconds: float | None  #: of a frame, as the entry says
+    cannot: str = ""  #: why there is no image, which counts as a black one; empty where there is
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +81,34 @@ class Score:
     digests: Digests
 
     @property
+    def cannot(self) -> dict[str, tuple[str, ...]]:
+        """The names of the scenes that the method cannot have, by the reason."""
+        reasons: dict[str, tuple[str, ...]] = {}
+        for scene in self.scenes:
+            if scene.cannot:
+                reasons[scene.cannot] = (*reasons.get(scene.cannot, ()), scene.name)
+        return reasons
+
+    @property
+    def kinds_shown(self) -> dict[str, float | str]:
+        """The number of each kind, and `cannot` in place of 1 where it has no image of a kind."""
+        had = {scene.kind for scene in self.scenes if not scene.cannot}
+        return {kind: number if kind in had else CANNOT for kind, number in self.kinds.items()}
+
+    @property
+    def had(self) -> str:
+        """How many of the scenes have an image, such as 16 of 24."""
+        return f"{sum(not scene.cannot for scene in self.scenes)} of {len(self.scenes)}"
+
+    @property
     def cite(self) -> str:
         """The sentence that a paper cites."""
         low, high = self.interval
         digests = self.digests
+        part = f" with {self.had} scenes, the others as black images," if self.cannot else ""
         return (
-            f"{self.entry.method}: {self.number:.3g} (95 % interval {low:.3g} to {high:.3g}) in "
-            f"the airlight challenge, seed {self.entry.seed}, scenes {digests.scenes[:12]}, images "
+            f"{self.entry.method}: {self.number:.3g} (95 % interval {low:.3g} to {high:.3g}){part} "
+            f"in the airlight challenge, seed {self.entry.seed}, scenes {digests.scenes[:12]}, images "
             f"{digests.images[:12]}, airlight {digests.airlight}, commit {digests.commit[:12]}"
         )
 
@@ -117,6 +142,13 @@ def read_score(file: Path) -> Score:
     score = read_versioned(file, Score, SCHEMA, wanted, "score again")
     if not (score.scenes and _DIGEST.fullmatch(score.digests.scenes)):
         raise InputError(f"{file} has no scenes, or no digest of them; score again")
+    black = (BLACK.error, BLACK.low, BLACK.high)
+    for scene in score.scenes:
+        if scene.cannot and (scene.error, *scene.interval) != black:
+            raise InputError(
+                f"{file}: {scene.name} has no image and the error {scene.error:g}; expected 1, that "
+                "of a black image: score again"
+            )
     # Another machine finds the same number again, but for the rounding of logarithms.
     again, _ = combined_score(score.scenes, score.digests.scenes)
     said = (score.number, *score.interval)

@@ -26,7 +26,7 @@ from airlight.reports.challenge.entry import (
     read_entry,
 )
 from airlight.reports.challenge.folder import check_scenes
-from airlight.reports.challenge.number import FLOOR, rounded, rounded_out, scene_error
+from airlight.reports.challenge.number import BLACK, FLOOR, rounded, rounded_out, scene_error
 from airlight.reports.challenge.record import (
     SCHEMA,
     Digests,
@@ -46,6 +46,8 @@ _JUMP = 1e-2  # of a distance: a surface that bends or leans changes it by less 
 def score_entry(folder: Path, progress: Progress) -> Score:
     """Judge all images of an entry; needs an active Mitsuba variant.
 
+    A scene that the method cannot have is a row of a black image.
+
     Raises InputError for an entry that lacks images, and for scenes that were changed.
     """
     found = read_entry(folder)
@@ -55,27 +57,34 @@ def score_entry(folder: Path, progress: Progress) -> Score:
     names = [scene.name for scene in scenes]
     check_whole(found, names)
     # All files are read before the first reference is computed.
-    images = {name: read_airlight(folder / f"{name}.exr") for name in names}
+    images = {
+        name: read_airlight(folder / f"{name}.exr") for name in names if name not in found.cannot
+    }
     rows = []
     with temporary_folder() as place:
         for number, scene in enumerate(scenes):
             progress(number / len(scenes), scene.name)
             reference, judged = scene_reference(place, scene)
-            values, test = reference.airlight[judged], images[scene.name][judged]
+            values = reference.airlight[judged]
             if not values.any():
                 raise InputError(
                     f"seed {found.entry.seed}: no light reaches the view of {scene.name}, so that no "
                     "error is relative to it; expected a seed without such a scene: take another"
                 )
-            error = scene_error(values, reference.airlight_error[judged], test)
+            error, bias = BLACK, -1.0
+            if scene.name in images:
+                test = images[scene.name][judged]
+                error = scene_error(values, reference.airlight_error[judged], test)
+                bias = float((test - values).mean() / values.mean())
             row = SceneScore(
                 name=scene.name,
                 kind=scene.kind,
                 error=rounded(error.error),
                 interval=rounded_out((error.low, error.high)),
-                bias=rounded(float((test - values).mean() / values.mean())),
+                bias=rounded(bias),
                 pixels=int(judged.sum()),
                 seconds=found.times.get(scene.name),
+                cannot=found.cannot.get(scene.name, ""),
             )
             rows.append(row)
     digest = scenes_digest(scenes)
@@ -90,7 +99,7 @@ def score_entry(folder: Path, progress: Progress) -> Score:
         scenes=tuple(rows),
         digests=Digests(
             scenes=digest,
-            images=images_digest(folder, names),
+            images=images_digest(folder, names, found.cannot),
             airlight=build().airlight,
             commit=build().commit,
             program=build().digest,

@@ -40,6 +40,8 @@ def _surfaces(reference, hits, shadows):
     of_camera, of_light = model.surface_paths
     first, last = (reference.origin + x[:, None] * reference.direction[ray] for x in (start, end))
     depth = (of_camera * steps)[:, None] * depth_between(reference, first, last - first)
+    if model.constant is not None and model.most < 1:
+        depth = np.minimum(depth, -np.log(1 - model.most))
     for light in (*reference.lights, *reference.directional):
         if isinstance(light, DirectionalLight):
             way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(ray), np.inf)

@@ -42,8 +42,9 @@ def marched(reference, distance, steps=STEPS, shadows=True):
     if model.constant is not None:
         total += np.array(model.constant) * np.minimum(1 - np.exp(-depth), model.most)
         if model.lobe_of is not None:
-            begin = np.maximum(start, model.lobe_of.start)
-            own = 1 - np.exp(-camera[:, None] * marched_depth(reference, begin, end, steps))
+            begin = np.full_like(start, model.lobe_of.start)
+            last = np.where(end > start, np.maximum(end, begin), begin)
+            own = 1 - np.exp(-camera[:, None] * marched_depth(reference, begin, last, steps))
             for sun in reference.directional:
                 cosine = np.maximum(-(reference.direction @ sun.direction), 0)
                 total += (cosine**model.lobe_of.power)[:, None] * sun.irradiance * own

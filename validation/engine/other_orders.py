@@ -66,9 +66,9 @@ def other_orders(
     loaded, at_size
         The scene at the size of the image, and a function that loads it at another size.
     holds
-        What the image holds, see `judged_layer`.
+        The light that the image holds, see `judged_layer`.
     relative_bias
-        Of the image against the reference [1].
+        The bias of the image against the reference [1].
     """
     if relative_bias is None or relative_bias < _BRIGHTER:
         return None

@@ -38,6 +38,7 @@ from airlight.validation.fit.solve import (
 from airlight.validation.fit.unknowns import Unknown, read_unknowns
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.models import model_line, model_parts, model_words
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class Fit:
     #: what is wrong with the file, such as pixels that are not finite
     failures: tuple[str, ...] = ()
     note: str = ""  #: what the reader of the file changed or left out, such as other primaries
+    model: Mapping[str, str] | None = None  #: name and terms of an equation that is not physical
 
     @property
     def lines(self) -> list[str]:
@@ -81,6 +83,7 @@ class Fit:
             "are left out"
         )
         lines = [
+            *([] if self.model is None else [model_line(**self.model)]),
             f"{self.path} as {holds} of {self.scene}, {PIXEL_WORDS[self.pixel]}: "
             f"{100 * self.explained:.6g} % of its "
             f"variance is explained; the relative rmse left is {self.residual:.3g}, the usual "
@@ -131,8 +134,8 @@ def fit_image(
     image, path
         The image, and its name in messages.
     loaded
-        The scene at the size of the image: it says the geometry, the camera, the lights, and all
-        parameters that are not looked for.
+        The scene at the size of the image: it says the geometry, the camera, the lights, the
+        equation, and all parameters that are not looked for.
     parameters
         The names of the parameters that are looked for, see `validation.fit.unknowns`.
     layer, holds
@@ -156,8 +159,8 @@ def fit_image(
     took = stopwatch()
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    observation, wrong = observation_of(image, judged, loaded.scene, mask=mask)
-    unknowns = read_unknowns(parameters, observation.reference, starts or {})
+    observation, wrong = observation_of(image, judged, loaded.scene, mask=mask, model=loaded.model)
+    unknowns = read_unknowns(parameters, observation.reference, starts or {}, loaded.model)
     # Pixels that are cut off at the brightest value say only that they are brighter. 20 000 rays
     # are looked at, each pixel by itself: more say nothing new of few numbers.
     stops = stopped(np.where(observation.used[:, None], observation.values, np.nan)).any(axis=1)
@@ -184,9 +187,9 @@ def fit_image(
         lambda each: _wrong(each.solution) < 1e-5,
     )
     fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, best)
-    return replace(
-        fit, seconds=took().seconds, failures=wrong, note=str(image.attributes.get(NOTE, ""))
-    )
+    words = None if loaded.model.is_physical else model_parts(model_words(loaded.model))
+    note = str(image.attributes.get(NOTE, ""))
+    return replace(fit, seconds=took().seconds, failures=wrong, note=note, model=words)
 
 
 def _predictor(observation: Observation) -> Predictor:

@@ -88,7 +88,7 @@ class Model:
             predictor,
             unknowns,
             inward(numbers, [each.starts[0] for each in numbers]),
-            Guess(predictor.fog),
+            predictor.unchanged,
         )
 
     @property

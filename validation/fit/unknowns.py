@@ -21,17 +21,19 @@ are possible, and a step is a relative change.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from airlight.analytic.height_fog import HeightFog
+from airlight.analytic.phase import CornetteShanks
 from airlight.errors import InputError, nearest
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.engine.fault import Fault, Number, Values
 from airlight.validation.engine.prediction import Guess, Predictor
-from airlight.validation.fog_model.radiance import Fog, Path, colour, scene_fog
+from airlight.validation.fog_model.radiance import Fog, Path, PhaseLaw, colour, scene_fog
 from airlight.validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
@@ -75,13 +77,20 @@ class Unknown(Fault):
         return _KINDS[self.kind][1]
 
 
-def _unknown(name: str, kind: str, paths: tuple[Path, ...], scene: float) -> Unknown:
+def _unknown(
+    name: str,
+    kind: str,
+    paths: tuple[Path, ...],
+    scene: float,
+    meaning: Callable[[float], float | PhaseLaw] = float,
+) -> Unknown:
+    """Return a number of a fog; `meaning` is what the fog has for its value."""
     number = Number(*_RANGES[_KINDS[kind][0]], starts=(scene,), scale=_KINDS[kind][0])
 
     def change(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         fog = guess.fog
         for path in paths:
-            fog = fog.put(path, p[0])
+            fog = fog.put(path, meaning(p[0]))
         return replace(guess, fog=fog)
 
     return Unknown(
@@ -124,16 +133,20 @@ def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> 
 
 
 def read_unknowns(
-    names: Sequence[str], reference: ReferenceScene, starts: Mapping[str, float]
+    names: Sequence[str],
+    reference: ReferenceScene,
+    starts: Mapping[str, float],
+    model: Model = PHYSICAL,
 ) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
-    `starts`: values to begin with, by name; those of the scene by default.
+    `starts`: values to begin with, by name; those of the scene by default. `model` is the equation
+    that the image should solve.
     """
     fog = scene_fog(reference)
     if not names:
         raise InputError(f"fit: got none, expected some of {', '.join(NAMES)}")
-    unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog))
+    unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog, model))
     # Two names may stand for one number, such as sigma_t and sigma_t.r.
     paths: set[Path] = set()
     for unknown in unknowns:
@@ -150,7 +163,7 @@ def read_unknowns(
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
 
-def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
+def _read(name: str, reference: ReferenceScene, fog: Fog, model: Model) -> list[Unknown]:
     # A name has up to three parts, 'sigma_t.r:fog': the kind, a channel, and a medium or light.
     # phase.g has a dot that is no channel.
     word, _, place = name.partition(":")
@@ -193,7 +206,7 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
     unknowns = []
     for number, ending in _chosen(name, place, kind, reference, fog):
         if kind in _OF_MEDIA:
-            unknowns += _of_medium(kind, channels, number, ending, reference, fog)
+            unknowns += _of_medium(kind, channels, number, ending, reference, fog, model)
         elif kind == "intensity":
             unknowns.append(_unknown(kind + ending, kind, ((kind, number),), 1.0))
         else:
@@ -208,6 +221,7 @@ def _of_medium(
     ending: str,
     reference: ReferenceScene,
     fog: Fog,
+    model: Model,
 ) -> list[Unknown]:
     """Return the unknowns of a medium; `ending`: of their names, where there are several media."""
     if kind == "phase.g":
@@ -218,9 +232,18 @@ def _of_medium(
                 "fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has "
                 f"'{phase.name}'"
             )
-        return [
-            _unknown(kind + ending, kind, (("phase", number),), g if isinstance(g, float) else 0.0)
-        ]
+        if model.phase not in ("scene", "none", "cornette-shanks"):
+            raise InputError(
+                f"fit: 'phase.g' is that of the scene, and the model has phase={model.phase}; leave "
+                "one of them out"
+            )
+        begin, path = g if isinstance(g, float) else 0.0, ("phase", number)
+        law = CornetteShanks if model.phase == "cornette-shanks" else float
+        return [_unknown(kind + ending, kind, (path,), begin, law)]
+    if kind == "albedo" and model.lit_scale is not None:
+        raise InputError(
+            "fit: 'albedo' is no part of the model, which has a lit density; leave one of them out"
+        )
     # Channels that are all equal in the scene are one unknown; otherwise each of them is one.
     values = getattr(fog, kind)[number]
     groups = (

@@ -249,8 +249,10 @@ class FogModel:
         if fog.lobe is None or sun is None:
             return 0.0
         power, start = fog.lobe
+        # The lobe has a beginning of its own, on rays that reach the fog.
         begin, end = self._ray_ends(fog)
-        begin = np.maximum(begin, start)
+        end = np.where(end > begin, end, 0.0)
+        begin = np.full_like(end, start)
         towards = np.maximum(self.view.reference.direction @ -sun.direction, 0.0)
         opacity = -np.expm1(-self._fraction(fog) * self._depth(fog, begin, np.maximum(end, begin)))
         return self._of_pixels((towards**power)[:, None] * opacity)
@@ -389,11 +391,12 @@ class FogModel:
         # One exponential serves all channels of the same extinction. A node whose exponent is no
         # number, such as 0 times an infinite length, sends nothing.
         for channels in _alike(fog):
-            attenuated = strength * np.exp(
-                np.nan_to_num(
-                    log_density - ways @ sigma_t[:, channels[0]], nan=-np.inf, neginf=-np.inf
-                )
-            )
+            exponent = log_density - ways @ sigma_t[:, channels[0]]
+            if places.is_surface and fog.most < 1:
+                # A source that covers no more than its cap leaves the rest of the surface behind it.
+                depth = fog.camera_segment[layer] * camera @ sigma_t[:, channels[0]]
+                exponent += np.maximum(depth + np.log1p(-fog.most), 0.0)
+            attenuated = strength * np.exp(np.nan_to_num(exponent, nan=-np.inf, neginf=-np.inf))
             if places.is_surface:
                 for channel in channels:
                     total[:, channel] = np.bincount(

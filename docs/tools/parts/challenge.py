@@ -3,6 +3,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from statistics import mean, stdev
@@ -22,25 +23,52 @@ def _record() -> Any:
 
 
 def challenge_rows() -> str:
-    """Return the built-in methods that were scored, and those that have no entry."""
-    record = _record()
-    scores = [record_of(each, Score) for each in record["scores"]]
+    """Return the methods and engines that were scored, and which scenes they cannot have."""
+    rows = _record()["rows"]
+    scores = [record_of(each["score"], Score) for each in rows]
     (board,) = board_of(scores)
     shown = board_table(board).only(
-        "place", "method", "number", "interval", "tied", "random", "certified", "engine"
+        "place", "method", "number", "interval", "tied", "had", "random", "certified", "engine"
     )
-    built = scores[0].digests
+    # Rows may be of several days and commits: the page says which are in it.
+    made = {f"{each['made']}, `python docs/tools/{each['command']}`" for each in rows}
+    commits = sorted({each.digests.commit[:12] for each in scores})
+    versions = sorted({each.digests.airlight for each in scores})
+    own = [
+        f"{each.entry.method} with {each.entry.settings}"
+        for each in scores
+        if not each.entry.settings.startswith("default")
+    ]
     said = (
-        f"The built-in methods with their default settings, seed `{board.seed}`, scenes "
-        f"`{board.digest[:12]}`, {record['made']}, airlight {built.airlight}, commit "
-        f"{built.commit[:12]}. The seed is public: the rows say what the numbers of known methods "
+        "The built-in methods with their default settings, and engines with the defaults of [their "
+        f"adapters](adapters/README.md){', '.join(['', *own])}. Seed `{board.seed}`, scenes "
+        f"`{board.digest[:12]}`; {'; '.join(sorted(made))}; airlight {', '.join(versions)}, commit "
+        f"{', '.join(commits)}. The seed is public: the rows say what the numbers of known methods "
         "are."
     )
-    refused = [
-        f"`{each['method']}` has no entry, as it refuses `{each['scene']}`: {each['reason']}."
-        for each in {each["method"]: each for each in record["refused"]}.values()
+    cannot = [
+        f"- {each.entry.method}, {_listed(names)}: {reason}"
+        for each in scores
+        for reason, names in each.cannot.items()
     ]
-    return "\n\n".join([said, markdown(replace(shown, title="", explanation="")).strip(), *refused])
+    # An engine without any scene has no entry.
+    for name, reasons in _record()["none"].items():
+        for reason in dict.fromkeys(reasons.values()):
+            names = [scene for scene, each in reasons.items() if each == reason]
+            cannot.append(f"- `{name}`, which has no entry, {_listed(names)}: {reason}")
+    parts = [said, markdown(replace(shown, title="", explanation="")).strip()]
+    if cannot:
+        parts += ["Scenes that they cannot have, in their words:", "\n".join(cannot)]
+    return "\n\n".join(parts)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names of scenes, those of a kind together: `engine-1, -2, -5`."""
+    kinds: dict[str, list[str]] = {}
+    for name in names:
+        kind, _, number = name.rpartition("-")
+        kinds.setdefault(kind, []).append(f"-{number}")
+    return ", ".join(f"{kind}{', '.join(numbers)}" for kind, numbers in kinds.items())
 
 
 def challenge_spread() -> str:

@@ -23,6 +23,7 @@ would
 
 from dataclasses import dataclass
 from functools import reduce
+from itertools import repeat
 from operator import or_
 from typing import Any
 
@@ -100,11 +101,18 @@ class BoundedRays(LitRays):
         """Return how fast the depth of both paths grows along the ray, bounded media on
         the light's left out [1/m].
         """
-        rate = reduce(dr.maximum, piece.medium.sigma_t)
+        # A channel of which nothing is left on the way to the camera does not count: the panels of
+        # the others may be a thousand times as long.
+        around = self.medium.sigma_t
+        left = [
+            dr.fma(sigma_t, x - piece.begin, before) < optical_reach(type(x))
+            for sigma_t, before in zip(piece.medium.sigma_t, piece.before, strict=True)
+        ]
+        rate = reduce(dr.maximum, map(dr.select, left, piece.medium.sigma_t, repeat(type(x)(0))))
         # The distance to a light at a place grows by 1 m a metre at most, in the medium around. A
         # sun shines through vacuum between the bounded media.
         if self.light.w and not self.medium.clear:
-            rate = rate + reduce(dr.maximum, self.medium.sigma_t)
+            rate = rate + reduce(dr.maximum, map(dr.select, left, around, repeat(type(x)(0))))
         return rate
 
     def depths(self, piece: Piece, x, r, lengths) -> list[Any]:

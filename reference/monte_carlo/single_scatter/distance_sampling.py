@@ -48,6 +48,7 @@ media. E. Veach 1997, Robust Monte Carlo methods for light transport simulation,
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
@@ -229,7 +230,12 @@ def mixture_of(span: Span, sigma_t: "Sequence[mi.Float]") -> Mixture:
     """Return the mixture of both techniques for one common extinction, or one of each channel
     [1/m].
     """
-    flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
+    rates = [mi.Float64(rate) for rate in sigma_t]
+    # Free flights without extinction have no density on an unbounded span: such a channel takes
+    # those of the densest one.
+    densest = reduce(dr.maximum, rates)
+    flown = (dr.select((rate > 0) | (span.length < dr.inf), rate, densest) for rate in rates)
+    flights = tuple(free_flights(span.length, rate) for rate in flown)
     return Mixture(span, equi_angular_range(span), flights)
 
 

@@ -85,6 +85,8 @@ class ModelPart(Part):
     ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
         camera, sampler = self.to_camera(x, ray, sampler, active)
+        if self.terms.least is not None:
+            camera = dr.maximum(camera, self.terms.least)
         light, sampler = self.from_light(point, path, ray, sampler, active)
         return camera * light, sampler
 

@@ -102,12 +102,13 @@ def fog_glow(
         part = _whole_fog(task, sampler, ray, ends, along, active)
         return [1 - dr.exp(-along.camera * mi.Float64(tau)) for tau in part.depth_to(part.end)]
 
-    # The source itself, and the lobes of suns, for which the fog may begin later.
+    # The source itself, and the lobes of suns, for which the fog begins elsewhere.
     total += terms.constant * mi.Spectrum(
         *(mi.Float(dr.minimum(each, terms.most)) for each in covered(ends))
     )
     if terms.lobe is not None:
-        later = replace(ends, near=dr.maximum(ends.near, terms.lobe.start))
+        reached = ends.end > ends.near
+        later = replace(ends, near=dr.select(reached, terms.lobe.start, ends.near))
         here = point_on(ray, ray.origin)
         lobes = dr.zeros(mi.Spectrum, dr.width(active))
         for source in task.sources:

@@ -17,7 +17,7 @@ with `axis-lookup` D/c, the distance whose depth is D, behind the surface. Plane
 NEAR and FAR cut the ray at NEAR/c and FAR/c. A fade ends the light of lamps and suns at END/c. A
 surface is seen through all fog of its ray, also that behind it: its transmittance is
 e^(-a_s tau), with the depth tau from `near` to min(`far`, D'), or e^(-a_s c tau) with depths along
-the axis.
+the axis; behind a constant source it is 1 - cap at least.
 
 **How distances are drawn.** Free flights have the rate A sigma_t, not sigma_t: for A < 1 the
 weights e^(-A tau)/e^(-tau) would grow without bound. A = 0 leaves an even density over a finite
@@ -30,7 +30,8 @@ there are 4e-18 of the light. Ambient light is drawn in the same way.
 
 **Fog that glows.** Ambient light of the radiance B adds int sigma_s B e^(-A tau_c) s dx. A constant
 source C min(1 - e^(-A tau), cap), tau up to the end of the fog, has a closed form, as have the
-lobes of suns, E max(cos, 0)^n (1 - e^(-A tau')), with tau' from max(`near`, START) on.
+lobes of suns, E max(cos, 0)^n (1 - e^(-A tau')), with tau' from START on where the ray reaches
+`near`.
 """
 
 import math
@@ -155,6 +156,8 @@ class RayTerms:
     #: light of suns that arrives through the medium around all others, 0 or 1 in each channel;
     #: None for all of it
     arriving: "mi.Color3f | None"
+    #: the least transmittance to the camera, behind a source that covers no more than its cap
+    least: "mi.Float | None" = None
 
     def weight_at(self, x: "mi.Float64") -> "mi.Float64":
         """Return F q s at distances along the rays [m]."""
@@ -244,6 +247,7 @@ class ModelTerms:
             self.along(cosine, lamp=False),
             camera=self.surface_camera * step,
             light=self.surface_light,
+            least=None if self.model.most == 1 else mi.Float(1 - self.most),
         )
 
     @property

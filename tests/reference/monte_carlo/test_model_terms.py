@@ -237,7 +237,7 @@ def marched(world, reference, steps):
         step = c if model.depth == "axis" else 1
         for body in media:
             airlight[n] += _along(world, reference, media, body, d, c, near, end, step, steps)
-        later = max(near, model.lobe_of.start) if model.lobe_of else near
+        later = model.lobe_of.start if model.lobe_of and end > near else near
         whole = [_total(media, reference.origin, d, first, end) for first in (near, later)]
         if model.constant:
             covered = [1 - np.exp(-model.camera_scale * step * depth) for depth in whole]
@@ -247,6 +247,7 @@ def marched(world, reference, steps):
                 airlight[n] += each.irradiance * towards_sun * covered[1]
         if np.isfinite(surface_at):
             seen = np.exp(-model.surface_paths[0] * step * whole[0])
+            seen = np.maximum(seen, 1 - model.most) if model.constant else seen
             place = reference.origin + surface_at * d
             surface[n] = _reflected(world, reference, media, place) * seen
     return airlight, surface
@@ -482,7 +483,7 @@ CASES = {
     "layers, sun": ("layer-sun", "light-path=0.4 camera-path=0.7 suns=8 fade=2:25"),
     "layers, constant": (
         "layer-sun",
-        "source=constant:0.3,0.2,0.1 cap=0.7 lobe=4:6 ambient=0.1 camera-path=1.3",
+        "source=constant:0.3,0.2,0.1 cap=0.7 lobe=4:6 ends=spheres:7:inf ambient=0.1 camera-path=1.3",
     ),
     "bodies": ("bodies", "light-path=0.4 camera-path=0.6 phase=cornette-shanks"),
     "bodies, no light path": (

@@ -30,6 +30,7 @@ def box(low, high, turn=0.0):
 CLOSE, APART = 1e-3, 2e-2  #: [m]; rays leap 0.9 to 1.3 mm about 10 m
 
 
+@pytest.mark.claim("volpath-gaps")
 @pytest.mark.parametrize("gap", [0.0, CLOSE / 2, APART])
 @pytest.mark.parametrize("turn", [0.0, 0.4])
 def test_walls_that_face_each_other(gap, turn):
@@ -40,6 +41,7 @@ def test_walls_that_face_each_other(gap, turn):
     check(bodies, refused=gap < APART)
 
 
+@pytest.mark.claim("volpath-gaps")
 @pytest.mark.parametrize("gap", [0.0, CLOSE / 2, APART])
 def test_spheres_and_a_ball_on_a_box(gap):
     check(
@@ -69,6 +71,7 @@ def check(bodies, *, refused):
             check_gaps(pair)
 
 
+@pytest.mark.claim("volpath-gaps")
 def test_a_row_of_boxes_is_refused_and_a_single_slab_is_not():
     with pytest.raises(InputError, match=r"'thin-1' and 'thick-1' are 0\.002 m apart"):
         volpath_batch(read_reference(load_scene("step-cloud", (4, 3)).scene), 0, 1)

@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 
 from airlight.analytic.height_fog import HeightFog
+from airlight.analytic.phase import HenyeyGreenstein
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.volpath import volpath_batch
-from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.quadrature.height_fog import HeightField, fog_of
 from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.integrate import Paths, Terms
+from airlight.reference.quadrature.model_terms import route_of
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene.homogeneous_medium import ReferenceMedium
+from airlight.reference.scene.model import Model
 from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.reference.scene.varying import HeightMedium
+from airlight.reference.visibility.planes import rays_at
 from airlight.validation.scenes.loading import load_scene
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
@@ -155,3 +161,68 @@ def test_volpath_agrees_and_injected_faults_are_found(scene):
     assert not any(outside())
     for name, change in FAULTS.items():
         assert any(outside([change])), name
+
+
+RISES = (1.0, 0.3, 1e-3, 1e-9, 0.0, -1e-9, -1e-3, -0.3, -1.0)
+
+
+@pytest.mark.parametrize(("clamped", "constant"), [(False, 0.0), (True, 0.0), (True, 0.02)])
+@pytest.mark.parametrize("camera", [1.0, 0.01])
+@pytest.mark.claim("models", tolerance="1e-9 relative; 3e-4 where a march sums the depth")
+def test_light_paths_of_one_length_under_a_sun(clamped, constant, camera):
+    """Against Gauss's rule on logarithmic panels of the same integral."""
+    layers, g, length = ((0.05, 1.0, 2.0), (0.003, 0.0, 30.0)), 0.4, 7.0
+    medium = HeightMedium(
+        albedo=np.array([0.9, 0.8, 0.7]),
+        phase=HenyeyGreenstein(g),
+        largest=np.full(3, 0.3),
+        plugin=None,
+        layers=layers,
+        constant=constant,
+        clamped=clamped,
+        floor=-np.inf,
+        cap=np.inf,
+        up=np.array([0.0, 0.0, 1.0]),
+    )
+    rise = np.array(RISES)
+    direction = np.stack([np.sqrt(1 - rise**2), 0 * rise, rise], axis=1)
+    towards, origin = np.array([0.48, 0.36, 0.8]), np.array([0.0, 0.0, 1.7])
+    rays, every = rays_at(origin, direction, towards, 0), np.arange(len(rise))
+    lit = every, np.zeros(len(rise)), np.full(len(rise), np.inf)
+    terms = Terms(paths=Paths(np.full(len(rise), camera), 0.0, length))
+    value, error = HeightField(medium).sums(rays, lit, lit[2], terms)
+    # The same integral: 50 decades of metres, in panels of 1 % of a distance.
+    node, weight = np.polynomial.legendre.leggauss(8)
+    edges = np.linspace(np.log(1e-12), np.log(1e12), 5600)
+    half = 0.5 * np.diff(edges)[:, None]
+    u = (edges[:-1, None] + half * (1 + node)).ravel()
+    x, dx = np.exp(u), np.exp(u) * (half * weight).ravel()
+    z = 1.7 + rise[:, None] * x
+    density, depth = np.full(z.shape, constant), constant * np.broadcast_to(x, z.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for sigma_t, base, scale in layers:
+            here = sigma_t * np.exp(-(np.maximum(z - base, 0.0) if clamped else z - base) / scale)
+            k = rise[:, None] * x / scale + 1e-300
+            along = sigma_t * np.exp((base - 1.7) / scale) * x * -np.expm1(-k) / k
+            # Below its base a clamped layer has one density: by the sum of midpoints there.
+            summed = np.cumsum(here * dx, axis=1) - 0.5 * here * dx
+            depth = depth + (np.where(z < base, summed, along) if clamped else along)
+            density = density + here
+        light = np.nan_to_num(density * np.exp(-camera * depth - length * density))
+    cosine = direction @ towards
+    phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5 / (4 * np.pi)
+    expected = (light * dx).sum(axis=1) * phase
+    falling = clamped & (rise < 0)  # through a base, in the sum of midpoints
+    np.testing.assert_allclose(value[~falling, 0], 0.9 * expected[~falling], rtol=1e-9)
+    np.testing.assert_allclose(value[falling, 0], 0.9 * expected[falling], rtol=3e-4)
+    assert (error[:, 0] <= 1e-9 * value[:, 0]).all()
+
+
+def test_a_level_ray_under_a_sun_needs_an_end_where_nothing_attenuates_it(scene):
+    model = Model(camera_path="off", light_path="length:3")
+    reference, none = read_reference(scene(SUN), model), np.array([np.inf])
+    level, rising = np.array([[1.0, 0.0, 0.0]]), np.array([[0.6, 0.0, 0.8]])
+    with pytest.raises(InputError, match="adds light without end; expected an end of the fog"):
+        route_of(replace(reference, direction=level), none)
+    for direction, distance in ((rising, none), (level, np.array([9.0]))):
+        assert route_of(replace(reference, direction=direction), distance).end == distance

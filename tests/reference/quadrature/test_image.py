@@ -126,6 +126,46 @@ def test_the_error_of_a_surface_covers_single_precision(variant, height, most):
     assert image.surface_error.reshape(-1, 3)[~seen].max(initial=0.0) == 0
 
 
+@pytest.mark.claim("lit-surface", tolerance="the estimated error of the surface")
+@pytest.mark.parametrize("away", [2.0, 900.0])
+def test_the_error_of_a_small_ball_covers_the_turn_of_its_normal(variant, away):
+    """A diffuse ball of a hand's breadth in float64, near the origin and far from it.
+
+    Its place is known to a rounding of its coordinates, and over its radius that turns the normal.
+    """
+    radius, centre = 0.06, np.array([away, 0.3, 0.2])
+    camera = mi.ScalarTransform4f().look_at(
+        (centre - [0.3, 0.9, -0.2]).tolist(), centre.tolist(), [0, 0, 1]
+    )
+    plain = tiny_scene()
+    reference, image = reference_of(
+        sensor=plain["sensor"] | {"to_world": camera, "fov": 6.0},
+        ball=plain["ball"] | {"center": centre.tolist(), "radius": radius},
+        lamp=plain["lamp"] | {"position": np.add(centre, [1.1, -1.7, 0.4]).tolist()},
+        floor=None,
+    )
+    light, sigma_t = reference.lights[0], reference.medium.sigma_t[0]
+    seen = np.isfinite(image.distance.ravel())
+    ball = reference.occluders.shapes()[0]
+    centre = np.array(mi.traverse(ball)["to_world"].matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+    direction, to_centre = reference.direction[seen], centre - reference.origin
+    middle = direction @ to_centre
+    miss = np.linalg.norm(to_centre - middle[:, None] * direction, axis=1)
+    x = middle - np.sqrt(np.maximum(radius**2 - miss**2, 0))
+    point = reference.origin + x[:, None] * direction
+    way = light.position - point
+    r = np.linalg.norm(way, axis=1)
+    cosine = np.sum(way * (point - centre), axis=1) / (r * radius)
+    lit = (cosine > 0.05) & (miss < 0.9 * radius)  # beside the edges of the ball and of its light
+    arriving = cosine / r**2 * np.exp(-sigma_t * (x + r))
+    expected = np.array([0.6, 0.5, 0.3]) / np.pi * light.intensity * arriving[:, None]
+    error = image.surface_error.reshape(-1, 3)[seen]
+    assert lit.sum() > 30
+    difference = np.abs(image.surface.reshape(-1, 3)[seen] - expected)
+    assert np.all(difference[lit] <= error[lit])
+    assert np.median((error / expected)[lit]) < 1e-5 * away
+
+
 # Means over the area of pixels --------------------------------------------------------------------
 
 

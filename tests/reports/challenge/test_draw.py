@@ -12,6 +12,7 @@ from airlight.reports.challenge.seed import KINDS, check_seed, seed_of_entry, se
 from tests.helpers.challenge import drawn
 
 
+@pytest.mark.claim("challenge-bytes", tolerance="none: the bytes are equal")
 def test_a_seed_has_its_scenes_and_another_one_others(small):
     from airlight.reports.challenge.draw import draw_scenes, scenes_digest
 

@@ -16,6 +16,7 @@ def exactly(*errors):
     return [SceneError(error, error, error) for error in errors]
 
 
+@pytest.mark.claim("challenge-number")
 def test_the_number_is_the_geometric_mean_of_kinds_that_count_alike():
     errors = {"one": exactly(0.1, 0.4), "two": exactly(0.02)}
     assert combined(errors, DIGEST).number == pytest.approx(math.sqrt(0.2 * 0.02))
@@ -56,6 +57,7 @@ def test_an_image_twice_too_bright_and_a_black_one_have_the_error_one():
         assert found.error == pytest.approx(1, abs=1e-12)
 
 
+@pytest.mark.claim("challenge-number", tolerance="0.90 to 0.97 of 400 challenges")
 def test_the_interval_covers_the_number_of_all_scenes(monkeypatch):
     """Log-normal errors about another mean in each kind: of 400 challenges, 95 % by intent.
 

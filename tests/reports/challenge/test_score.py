@@ -19,6 +19,7 @@ def scored(folder, tmp_path, name="score.json"):
     return (tmp_path / name).read_bytes()
 
 
+@pytest.mark.claim("challenge-bytes", tolerance="none: the bytes are equal")
 def test_the_reference_is_best_and_scoring_twice_gives_the_same_bytes(perfect, tmp_path, capsys):
     entry = perfect("exact")
     first = scored(entry, tmp_path)
@@ -51,6 +52,7 @@ def test_a_changed_pixel_is_another_digest_and_another_number(perfect, tmp_path)
     assert after["number"] > before["number"]
 
 
+@pytest.mark.claim("challenge-whole")
 def test_an_entry_that_lacks_images_is_refused_by_their_names(perfect, capsys):
     entry = perfect("partial")
     (entry / "certified-1.exr").unlink()
@@ -60,6 +62,7 @@ def test_an_entry_that_lacks_images_is_refused_by_their_names(perfect, capsys):
     assert "lacks 2 of 3 images: certified-1.exr, engine-1.exr" in said
 
 
+@pytest.mark.claim("challenge-whole")
 @pytest.mark.parametrize("name", ["random-1.xml", "engine-1.glb", "challenge.json"])
 def test_changed_scenes_are_refused(perfect, capsys, name):
     entry = perfect("changed")
@@ -86,6 +89,7 @@ def test_the_files_that_are_written_have_no_answer_and_are_accepted(perfect, cap
     assert "holds the challenge 7" in capsys.readouterr().err
 
 
+@pytest.mark.claim("challenge-whole")
 def test_the_words_of_an_entry_are_its_seed(perfect, small, tmp_path, capsys):
     from airlight.reports.challenge.seed import seed_of_entry
 

@@ -2,6 +2,7 @@
 """`--model` and `list models`: what is computed, said and refused."""
 
 import json
+import shlex
 from contextlib import contextmanager
 
 import numpy as np
@@ -30,6 +31,7 @@ SUN = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" val
 <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film></sensor>
 <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.1"/><float name="albedo" value="0.83"/></medium>
 <emitter type="directional"><vector name="direction" x="0.3" y="0.2" z="-1"/></emitter></scene>"""
+NAMED = '<default name="airlight-model" value="light-path=off"/>'
 PLAYCANVAS = '<float name="density" value="0.1"/><float name="heightFalloff" value="0.6"/>'
 UNREAL = '<float name="FogDensity" value="2"/><float name="FogHeightFalloff" value="2"/>'
 
@@ -198,6 +200,36 @@ def test_describe_tells_the_model_and_suggests_one(tmp_path, capfd):
     assert data["model"] is None
 
 
+def test_the_command_of_a_description_judges_by_its_model(tmp_path, capfd):
+    """The command that `describe` prints calls the image of the model right."""
+    path, own = tmp_path / "own.xml", tmp_path / "own.exr"
+    path.write_text(FOG.format(NAMED, "playcanvas", PLAYCANVAS))
+
+    def judged(*words):
+        told = printed(capfd, "describe", *words).splitlines()
+        (line,) = (each for each in told if each.startswith("to judge it: airlight "))
+        return shlex.split(line)[4:]
+
+    # Words of the user as they are; a file names its model itself.
+    assert judged("sphere-spot", "--model", WORDS)[3:] == ["--model", WORDS]
+    assert judged("sphere-spot", "--model", "physical")[3:] == ["--model", "physical"]
+    assert judged(str(path))[3:] == []
+    # A scene from Python has words where its name alone would be another model.
+    for scene, model, words in (
+        ("sphere-spot", "godot", model_of("godot").terms),
+        ("sphere-spot", "physical", ""),
+        (path, "physical", "physical"),
+        (path, "light-path=off", "light-path=off"),
+    ):
+        told = airlight.describe(airlight.load_scene(scene, model=model))
+        assert told.asked == words
+    command = judged("open-fog", *SIZE, "--model", WORDS)
+    printed(capfd, "reference", "open-fog", *SIZE, "--model", WORDS, "-o", str(own))
+    command[2] = str(own)
+    told = printed(capfd, *command, "--pixel", "centre")
+    assert "verdict          right" in told
+
+
 def test_a_description_has_the_medium_of_the_scene_and_not_of_the_model():
     plain = airlight.describe("open-fog").to_dict()
     three = airlight.describe("open-fog", model="three").to_dict()
@@ -225,3 +257,16 @@ def test_a_sun_that_physics_drowns_is_described_by_a_model(tmp_path, capfd):
 def test_the_physical_model_is_public():
     assert airlight.Model() == PHYSICAL
     assert airlight.Model(light_path="off").terms == "light-path=off"
+
+
+def test_a_fit_takes_the_model_of_the_option(tmp_path, capfd):
+    own = str(tmp_path / "own.exr")
+    words = ["open-fog", *SIZE, "--model", WORDS, "--change", "medium.sigma_t=0.3"]
+    printed(capfd, "reference", *words, "-o", own)
+    fit = ["compare", "open-fog", own, "--fit", "sigma_t", "--pixel", "centre"]
+    told = json.loads(printed(capfd, *fit, "--model", WORDS, "--json"))["result"]
+    assert told["model"] == {"name": "playcanvas 2.23.3", "terms": model_of(WORDS).terms}
+    assert told["parameters"][0]["value"] == pytest.approx(0.3, rel=1e-4)
+    told = json.loads(printed(capfd, *fit, "--json"))["result"]
+    assert told["model"] is None
+    assert told["parameters"][0]["value"] < 0.15  # physics takes its light path for thinner fog

@@ -54,6 +54,7 @@ def compare_references(name, folder):
     assert np.all(np.abs(before.surface - after.surface) <= known)
 
 
+@pytest.mark.claim("pbrt-round-trip", tolerance="2.4e-4 of the mean, a grazing ray in float32")
 @pytest.mark.parametrize("name", QUICK)
 def test_a_scene_keeps_its_reference(variant, tmp_path, name):
     compare_references(name, tmp_path)
@@ -69,6 +70,7 @@ def test_describe_writes_a_scene_that_compare_takes_for_one(variant, tmp_path):
     assert airlight.compare(path, image).metrics.relative_rmse < 1e-6
 
 
+@pytest.mark.claim("pbrt-round-trip", tolerance="2.4e-4 of the mean, a grazing ray in float32")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in WRITTEN if name not in QUICK])
 def test_every_scene_keeps_its_reference(variant, tmp_path, name):
@@ -82,6 +84,7 @@ def test_what_pbrt_lacks_is_refused_by_name(variant, tmp_path, name):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.claim("pbrt-round-trip")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*REFUSED])
 def test_every_other_scene_is_refused(variant, name):

@@ -118,6 +118,7 @@ def faulty(text, fault):
     return text.replace(before, after)
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit")
 @pytest.mark.parametrize(
     ("language", "real"), [("c", "double"), ("c", "float"), ("js", "double"), ("rust", "double")]
 )
@@ -140,6 +141,7 @@ def test_right_functions_of_all_other_groups_pass(kit, tmp_path, real):
     }
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit")
 @pytest.mark.parametrize(("language", "name", "real"), CASES)
 def test_a_fault_fails(kit, tmp_path, language, name, real):
     text = faulty((kit / NAMES[language]).read_text(), FAULTS[language][name])
@@ -150,6 +152,7 @@ def test_a_fault_fails(kit, tmp_path, language, name, real):
         assert told.count("ratio 12.566") > 150  # 4 pi, on every ray
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit")
 @pytest.mark.parametrize("group", MORE)
 def test_a_fault_fails_its_group_alone(kit, tmp_path, group):
     text = faulty((kit / "example_more.c").read_text(), MORE[group])
@@ -257,6 +260,7 @@ def al_test(text):
     return image[0, 0, :2]
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit, below 1e-4")
 @pytest.mark.parametrize("mirror", ["", SHADER])
 def test_a_right_shader_passes(kit, mirror):
     need_opengl()
@@ -264,6 +268,7 @@ def test_a_right_shader_passes(kit, mirror):
     assert 0 < error < tolerance < 1e-4
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit, below 1e-4")
 @pytest.mark.parametrize("name", FAULTS["glsl"])
 def test_a_shader_with_a_fault_fails(kit, name):
     need_opengl()

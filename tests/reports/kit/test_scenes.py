@@ -45,6 +45,7 @@ def airlight_of(image):
     return np.asarray(image.airlight, dtype=float).reshape(-1, 3)
 
 
+@pytest.mark.claim("kit-scenes", tolerance="the certified bound, and 1e-10 of the value")
 def test_the_second_route_has_the_expected_pixels(folder):
     """The reference reads the Mitsuba file: other shadows and another quadrature, in float64."""
     value = expected(folder)
@@ -62,6 +63,7 @@ def test_a_right_renderer_of_single_precision_passes_the_tolerance(folder):
     assert np.all(np.abs(image - value) < 0.5 * allowed)
 
 
+@pytest.mark.claim("kit-scenes")
 def test_the_numbers_are_the_words_of_the_certified_file(folder):
     certified = json.loads(certified_data().read_text())["scenes"]
     pixels = next(scene for scene in certified if scene["name"] == folder.name)["pixels"]
@@ -92,6 +94,7 @@ def camera_rays(right, up, forward, fov):
     return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
 
 
+@pytest.mark.claim("kit-scenes", tolerance="1e-6, float32 numbers of the file")
 def test_pbrt_files_are_the_scenes(folder):
     path = folder / "scene.pbrt"
     assert path.exists() == (folder.name not in NOT_FOR_PBRT)
@@ -228,6 +231,7 @@ def judged(python, folder):
     return ran.returncode, ran.stdout + ran.stderr
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit")
 @pytest.mark.slow
 def test_cycles_passes(blender, folder):
     status, told = judged(blender, folder)
@@ -235,6 +239,7 @@ def test_cycles_passes(blender, folder):
     assert status == 0
 
 
+@pytest.mark.claim("kit-languages", tolerance="that of the kit")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "before", "after"),

@@ -20,6 +20,9 @@ def once():
     return airlight.reference("step-cloud", size=SIZE).airlight
 
 
+@pytest.mark.claim(
+    "engine-orders", tolerance="0.15 of the light of further orders, 8 batches of 16 paths"
+)
 @pytest.mark.usefixtures("variant")
 @pytest.mark.parametrize(
     ("scene", "excess", "named"),
@@ -40,6 +43,7 @@ def test_further_orders_are_named_where_they_are_as_bright(scene, excess, named)
     assert found is None or found.more == pytest.approx(31, rel=0.15)
 
 
+@pytest.mark.claim("engine-orders")
 @pytest.mark.usefixtures("variant")
 def test_a_comparison_and_a_diagnosis_name_the_orders_and_no_factor(once, tmp_path):
     path = tmp_path / "cloud.exr"

@@ -23,6 +23,7 @@ from airlight.validation.fit.fit import fit_image
 from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
 from airlight.validation.fit.unknowns import Unknown, read_unknowns
 from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.models import model_of
 from tests.helpers.scenes import scene_xml
 
 SIZE = (48, 36)
@@ -271,3 +272,41 @@ def test_mistakes_have_one_line(variant, tmp_path, names, how, words):
     image = Image({"airlight": np.random.default_rng(1).random((36, 48, 3))})
     with pytest.raises(InputError, match=re.escape(words)):
         fit_image(image, load_scene(scene), names, **how)
+
+
+@pytest.mark.claim("fit-exact")
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("hdrp:range=3", ["sigma_t", "albedo", "phase.g"]),  # g of Cornette and Shanks's function
+        ("light-path=off,lit=0.5", ["sigma_t", "intensity", "phase.g"]),  # not linear in the light
+    ],
+)
+def test_the_fog_of_an_engines_equation_is_found(variant, tmp_path, words, names):
+    """A file that names its equation is fitted by it, and the fit says so."""
+    model = model_of(words)
+    foggier = load_scene(scene_file(tmp_path, sigma_t="0.57", albedo="0.71", g="-0.2"), (24, 18))
+    image = Image({"airlight": reference_image(foggier.scene, model=model).airlight})
+    named = f'<default name="airlight-model" value="{words}"/>'
+    path = Path(scene_file(tmp_path))
+    path.write_text(re.sub("(<scene[^>]*>)", rf"\1{named}", path.read_text(), count=1))
+    fit = fit_image(image, load_scene(str(path), (24, 18)), names, pixel="centre")
+    known = {"sigma_t": 0.57, "albedo": 0.71, "phase.g": -0.2, "intensity": 1.0}
+    for parameter in fit.parameters:
+        assert parameter.value == pytest.approx(known[parameter.name], rel=1e-4)
+        assert parameter.low < known[parameter.name] < parameter.high
+    assert fit.model == {"name": model.name, "terms": model.terms}
+    assert fit.lines[0].startswith("model  ")
+
+
+@pytest.mark.parametrize(
+    ("terms", "name", "said"),
+    [
+        ("phase=hg:0.3", "phase.g", "the model has phase=hg:0.3; leave one of them out"),
+        ("lit=0.01", "albedo", "'albedo' is no part of the model, which has a lit density"),
+    ],
+)
+def test_numbers_that_an_equation_does_not_have_are_refused(variant, tmp_path, terms, name, said):
+    loaded = load_scene(scene_file(tmp_path))
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_unknowns([name], read_reference(loaded.scene), {}, model_of(terms))

@@ -210,6 +210,9 @@ def test_clip_planes_are_noted_where_they_cut_mitsubas_own_image(variant, tmp_pa
         "near_clip, 3 m (an optical depth of 0.6); and what is beyond far_clip, 4 m (an optical "
         "depth of 0.8)" in both
     )
+    assert both.endswith("by --model ends=planes:3:4")
+    assert notes(("near_clip", 3))[0].endswith("by --model ends=planes:3:inf")
+    assert notes(("far_clip", 4))[0].endswith("by --model ends=planes:0:4")
     # fog of 10 optical depths: beyond it little is left, not 0
     assert "near_clip" not in notes(("far_clip", 50))[0]
     assert not notes(("far_clip", 100))  # 20 optical depths

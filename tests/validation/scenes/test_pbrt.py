@@ -73,6 +73,7 @@ VIEWS = {
 BALL = 'AttributeBegin Translate 0.9 0.3 1.2 Shape "sphere" "float radius" 0.2 AttributeEnd\n'
 
 
+@pytest.mark.claim("pbrt-read", tolerance="0.6 pixels, as a seen ball is some pixels wide")
 @pytest.mark.parametrize(("size", "window"), [((128, 64), ""), ((64, 128), ""), ((128, 64), "1.5")])
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_place_is_where_pbrt_shows_it(read, name, size, window):
@@ -88,6 +89,7 @@ def test_a_place_is_where_pbrt_shows_it(read, name, size, window):
     np.testing.assert_allclose(seen_at(scene, "sphere-line-8"), expected, atol=0.6)
 
 
+@pytest.mark.claim("pbrt-read")
 def test_numbers_are_those_of_the_file(read):
     """Media, lights and shapes of a right-handed world, whose coordinates stay as they are."""
     world = (
@@ -311,6 +313,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.claim("pbrt-read")
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_not_read_is_refused_by_line(read, name):
     world, words = REFUSED[name]
@@ -318,6 +321,7 @@ def test_what_is_not_read_is_refused_by_line(read, name):
         read(pbrt(world))
 
 
+@pytest.mark.claim("pbrt-read")
 @pytest.mark.parametrize(
     ("text", "words"),
     [

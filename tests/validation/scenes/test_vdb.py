@@ -55,6 +55,7 @@ def load(folder, extinction):
     return load_scene(str(path)).scene
 
 
+@pytest.mark.claim("vdb-grids", tolerance="2e-6, float32 of Mitsuba")
 @needs_tinyvdb
 def test_the_field_is_that_of_openvdb(variant, tmp_path):
     """At random places within, at the faces and beyond, also where a to_world moves the grid."""
@@ -77,6 +78,7 @@ def test_the_field_is_that_of_openvdb(variant, tmp_path):
         assert not expected[~within].any()
 
 
+@pytest.mark.claim("vdb-grids")
 @needs_tinyvdb
 def test_a_grid_of_tinyvdb_has_the_reference_of_the_same_volume(variant, tmp_path):
     import tinyvdb
@@ -144,6 +146,7 @@ def test_a_broken_file_is_refused(variant, tmp_path, data):
         load(tmp_path, vdb_volume("g.vdb"))
 
 
+@pytest.mark.claim("vdb-grids")
 @needs_tinyvdb
 def test_a_grid_of_nanovdb_has_its_values_and_its_place(variant, tmp_path):
     """`tests/data/nanovdb.nvdb.gz` was written by NanoVDB's headers: the same values, one scale."""

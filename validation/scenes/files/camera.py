@@ -15,6 +15,8 @@ import numpy as np
 from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 
+_USUAL_NEAR = 1e-2  # Mitsuba's near plane [m] where the file gives none
+
 
 def check_camera(props: mi.Properties) -> None:
     """Refuse a camera that is no pinhole, by its properties in the file."""
@@ -40,10 +42,10 @@ def clip_notes(scene: mi.Scene) -> list[str]:
     near, far = (float(mi.traverse(sensor)[key]) for key in ("near_clip", "far_clip"))
     # Depths of all shapes along the camera's axis, by the corners of their box.
     box, matrix = scene.bbox(), camera_matrix(sensor)
-    ends = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
-    if not np.all(np.isfinite(ends)):  # an empty scene, or a place that `check_numbers` refuses
-        ends = np.empty((0, 3))
-    corners = np.array(np.meshgrid(*ends.T)).reshape(3, -1).T
+    corners_of_box = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
+    if not np.all(np.isfinite(corners_of_box)):  # empty, or a place that `check_numbers` refuses
+        corners_of_box = np.empty((0, 3))
+    corners = np.array(np.meshgrid(*corners_of_box.T)).reshape(3, -1).T
     depth = (corners - matrix[:3, 3]) @ matrix[:3, 2]
     # Optical depths of a medium around the camera; a box of fog around it ends
     # within the box of all shapes.
@@ -63,16 +65,16 @@ def clip_notes(scene: mi.Scene) -> list[str]:
         unbounded &= sigma_t * far < 17.0
     # The near plane cuts scattered light wherever there is a medium, and shapes wherever they are
     # nearer than it; the far plane cuts the medium only if that is not opaque before it.
-    lacks = []
-    usual_near = 1e-2  # Mitsuba's near plane [m] where the file gives none
-    if near > usual_near and (medium is not None or np.min(depth, initial=np.inf) < near):
-        lacks.append(f"what is nearer than near_clip, {near:g} m{before}")
-    if unbounded or np.max(depth, initial=-np.inf) > far:
-        lacks.append(f"what is beyond far_clip, {far:g} m{beyond}")
+    cuts_near = near > _USUAL_NEAR and (medium is not None or np.min(depth, initial=np.inf) < near)
+    cuts_far = bool(unbounded or np.max(depth, initial=-np.inf) > far)
+    lacks = [f"what is nearer than near_clip, {near:g} m{before}"] if cuts_near else []
+    lacks += [f"what is beyond far_clip, {far:g} m{beyond}"] if cuts_far else []
     if not lacks:
         return []
+    # A model has no fog outside of them; shapes there stay in its image.
+    ends = f"planes:{near if cuts_near else 0.0:g}:{far if cuts_far else np.inf:g}"
     return [
         f"camera '{sensor.id()}': its clip planes are not used; Mitsuba's own image lacks "
-        f"{'; and '.join(lacks)}: to "
-        "compare with it, move them there"
+        f"{'; and '.join(lacks)}: to compare with it, move them there, or leave out the fog there by "
+        f"--model ends={ends}"
     ]

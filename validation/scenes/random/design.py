@@ -117,7 +117,8 @@ def point(seed: int) -> Mapping[str, float]:
     # Always the same scrambled sequence: a seed is the number of a point in it.
     scrambling = np.random.default_rng(2417)
     sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=scrambling)
-    sequence.fast_forward(seed)
+    # Each point follows from its number alone; `fast_forward` draws all points before it.
+    sequence.num_generated = seed
     values = sequence.random(1)[0]
     # Away from 0 and 1: logarithms and inverse functions of coordinates stay finite.
     return dict(

@@ -125,6 +125,19 @@ def along_the_light():
     return under_sun(cube=cube(), ball=fog_sphere()) | {"sensor": sensor | {"to_world": place}}
 
 
+def in_coloured_air():
+    """A box in open air a thousand times as clear in one channel as in another, at equal light."""
+    plain = tiny_scene(size=SMALL, floor=None)
+    sigma_t, fog = [0.1, 0.003, 0.0001], {"type": "ref", "id": "fog"}
+    air = {"sigma_t": {"type": "rgb", "value": sigma_t}, "has_spectral_extinction": True}
+    intensity = {"type": "rgb", "value": [0.5 / value for value in sigma_t]}
+    lamp = {"position": [-2.9, 0.6, 0.5], "intensity": intensity}
+    place = mi.ScalarTransform4f().translate([-0.8, 0.4, 0.7]).rotate([0, 0, 1], 31).scale(0.4)
+    box = {"type": "cube", "to_world": place, "exterior": fog}
+    body = bounded_medium(box, (0.9, 0.5, 0.7), (0.9, 0.4, 0.3))
+    return plain | {"fog": plain["fog"] | air, "lamp": plain["lamp"] | lamp, "ball": body}
+
+
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), np.sin(np.arange(12) * np.pi / 6)], axis=1)
 #: Scenes and the relative RMSE of the airlight, in float64 and float32. Segments are cut where the
 #: edges of a box bend the segment's length, which leaves 1e-5; corners of media are float32
@@ -133,6 +146,7 @@ SCENES = {
     "lamp above": (lambda: under_lamp(0.9, 0.7, 1.9), 3e-5, 3e-5),
     "lamp through one to the other": (lambda: under_lamp(-2.9, 0.6, 0.5), 3e-5, 3e-5),
     "lamp within": (lambda: under_lamp(0.8, 0.6, 0.7), 3e-5, 3e-5),
+    "coloured air": (in_coloured_air, 3e-5, 3e-5),
     "two boxes": (lambda: under_sun(cube=cube(), plank=plank()), 1e-5, 3e-5),
     "box and sphere": (lambda: under_sun(cube=cube(), ball=fog_sphere()), 1e-5, 3e-5),
     "from behind": (

@@ -6,6 +6,7 @@ should; frames try panels.
 import time
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -19,6 +20,7 @@ from airlight.realtime.scene.closed_mesh import (
     mesh_bounds,
     plane_neighbours,
     radial_planes,
+    read_bounds,
 )
 from airlight.realtime.scene.media.light_paths import LightPaths
 from airlight.realtime.scene.media.medium import Homogeneous
@@ -154,3 +156,14 @@ def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():
     # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within
     # 0.2 % (one standard error).
     assert mean_distance(bounds_of_mesh(icosphere(3))) == pytest.approx(1.2, rel=0.01)
+
+
+def test_a_sphere_far_from_the_origin_keeps_its_radius(variant):
+    """Its float32 box has sides that differ by 1e-4 m at 2 km: it was refused as an ellipsoid."""
+    centre, radius = [1999.25, -1400.0, 40.0], 0.600239158
+    sphere = mi.load_dict({"type": "sphere", "center": centre, "radius": radius})
+    bounds, mesh = read_bounds(sphere)
+    assert mesh is None
+    assert bounds.is_sphere
+    assert bounds.centre == pytest.approx(centre, abs=1e-9)
+    assert bounds.radius == pytest.approx(radius, rel=1e-7)
