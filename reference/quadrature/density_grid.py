@@ -263,6 +263,7 @@ class _Integrand:
     factor: Array
     extinction: Array
     same: Index = field(default_factory=lambda: np.zeros(3, np.int64))
+    densest: float = 0.0  #: such fog holds no bodies
 
     def __call__(
         self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array

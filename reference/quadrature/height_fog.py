@@ -222,6 +222,7 @@ class _SunIntegrand:
     factor: Array  # the albedo, (pieces, 3)
     extinction: Array
     same: Index = field(default_factory=lambda: np.zeros(3, np.int64))
+    densest: float = 0.0  #: such fog holds no bodies
 
     @staticmethod
     def of(

@@ -257,6 +257,11 @@ class _Integrand:
             for medium, kinks in zip(reference.media, self.kinks, strict=True)
         ]
 
+    @property
+    def densest(self) -> float:
+        """The largest extinction of the bodies, 0 where there are none [1/m]."""
+        return max((float(each.sigma_t.max()) for each in self.reference.media), default=0.0)
+
     def __call__(
         self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array
     ) -> tuple[Array, Array]:

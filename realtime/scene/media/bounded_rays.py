@@ -219,8 +219,8 @@ class PieceRays(LitRays):
         # The rate of the depths is at most the sum of all their rates; the length of a path in a
         # medium rises steeply where the path grazes a facet, and there the panel is short.
         for path, lines in zip(self.paths, envelopes):
-            steepness, smooth = path.steepness(lines, start.x, start.r)
-            rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
+            growth, smooth = path.growth(lines, start.x, start.r)
+            rate = rate + growth
             bending = dr.maximum(bending, 1 / smooth)
         # Paths along a facet change without limit where they pass its edge: a panel shorter than a
         # rounding error of x would end where it begins.

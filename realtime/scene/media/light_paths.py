@@ -44,6 +44,7 @@ whose second factor is one difference. Before and behind these points q rises li
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -52,7 +53,8 @@ import mitsuba as mi
 from airlight.realtime.numerics.array_types import four_numbers
 from airlight.realtime.scene.closed_mesh import CELLS
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.medium import Homogeneous, Medium
+from airlight.realtime.scene.media.medium import Homogeneous, Medium, optical_reach
+from airlight.realtime.scene.rule_reach import CHANGE
 
 _FAR = 1e30  #: e of no plane
 
@@ -300,16 +302,21 @@ class LightPaths:
             until_low, until_high, after = self._over_planes(state, step, self.active)
         return (until_low, until_high), after
 
-    def steepness(self, envelopes: Envelopes | None, x, r):
-        """Return |d length/dx| at most [1], and the longest panel from x on, as far
-        as this medium says [m].
+    def growth(self, envelopes: Envelopes | None, x, r):
+        """Return how fast the depths of paths in this medium change along the ray at most [1/m],
+        and the longest panel from x on, as far as this medium says [m].
         """
-        Float = type(x)
+        Float, sigma_t = type(x), self.bounded.medium.sigma_t
+        densest, sparsest = reduce(dr.maximum, sigma_t), reduce(dr.minimum, sigma_t)
         if envelopes is None:
-            # The chord of a sphere changes like a root: `_smooth_chord` limits the panel, and 1
-            # stands for the rate.
-            longest = dr.select(self.active, self._smooth_chord(x), dr.inf)
-            return dr.select(self.active, Float(1), 0), longest
+            # The chord of a sphere changes like a root: `_smooth_chord` limits the panel, and
+            # `_turning` stands for the rate. Paths that miss the sphere have no chord until they
+            # graze it, where panels end; and of paths through most of a dense one nothing is left.
+            turning = self._turning(r)
+            longest = self._smooth_chord(x, turning)
+            counts = self.active & ~self._misses(x) & ~self._dark(x, r, longest)
+            rate = dr.select(counts, turning * densest, 0)
+            return rate, dr.select(self.active, longest, dr.inf)
         first, last = envelopes.ends(x)
         meets = self.active & (last > first)
         # `rising` is the rate of the logarithms of 1 + w e_0 and 1 + w e_1 together, and no
@@ -319,9 +326,55 @@ class LightPaths:
         rising = dr.abs(envelopes.least[1]) / (1 + w * last)
         rising += dr.select(first > 0, dr.abs(envelopes.largest[1]) / (1 + w * first), 0)
         rising = dr.select(meets, rising, 0)
-        return dr.select(meets, w + r * rising, 0), (0.5 / rising if w else Float(dr.inf))
+        steepness = dr.select(meets, w + r * rising, 0)
+        # While the length is beyond that of which nothing is left in any channel, a panel may take
+        # half of what is beyond.
+        length = r * ((last - first) / (1 + w * last)) / (1 + w * first)
+        beyond_all = length - optical_reach(Float) / sparsest
+        dark = steepness * (2 * CHANGE / beyond_all)
+        rate = steepness * densest
+        rate = dr.select(beyond_all > 0, dr.minimum(rate, dark), rate)
+        return rate, (0.5 / rising if w else Float(dr.inf))
 
-    def _smooth_chord(self, x):
+    def _turning(self, r):
+        """Return how far a path moves at a sphere where its point moves by 1 m [1].
+
+        The path turns about the light, by 1/|D|. It moves by |M|/|D| at the sphere's centre, and
+        by R/|D| at most in a sphere around the light. Within the medium the point moves itself.
+        """
+        if self.own or not self.w:
+            return type(r)(1)
+        return dr.minimum(dr.maximum(dr.norm(self.toward), self.bounded.radius) / r, 1)
+
+    def _misses(self, x):
+        """Return whether the path from x passes the sphere, beyond a hundredth of its squared
+        radius and the rounding of coordinates: |p x M|^2 > R^2 |D|^2.
+        """
+        radius, place = self.bounded.radius, dr.fma(self.direction, x, self.start)
+        rounding = (2.0**-18) * radius * dr.norm(place)
+        reach = dr.fma(1.01 * radius, radius, rounding)
+        cross = dr.squared_norm(dr.cross(place, self.toward))
+        return cross > reach * dr.squared_norm(self.away(x))
+
+    def _dark(self, x, r, longest):
+        """Return whether the sphere lies between points and the light, and lets nothing through in
+        any channel: nor does it up to `longest`, in which q^2 falls by a fifth at most.
+        """
+        sparsest = reduce(dr.minimum, self.bounded.medium.sigma_t)
+        point, away = dr.fma(self.direction, x, self.start), self.away(x)
+        square, radius = dr.squared_norm(away), self.bounded.radius
+        cross = dr.squared_norm(dr.cross(point, self.toward))
+        half = dr.sqrt(dr.maximum(radius * radius - cross / square, 0))
+        nearest = -dr.dot(point, away) / r
+        between = nearest > half
+        if self.w:
+            between &= nearest + half < r
+        # The least panel of `_smooth_chord` may be longer than the chord keeps its length.
+        kept = longest > 0.0021 * radius / self._turning(r)
+        left = 2 * 0.89  # of half the chord: sqrt(0.8) = 0.894
+        return between & kept & (left * half * sparsest > optical_reach(type(x)))
+
+    def _smooth_chord(self, x, turning):
         """Return the length in which q^2 changes by a fraction of it: q is a root of it [m].
 
         With f = |p x M|^2/|D|^2 it is R^2 - f, and over a length t f changes by
@@ -340,11 +393,12 @@ class LightPaths:
             2 * (dr.dot(cross, turned) + w * distance * dr.dot(away, self.direction)) / square
         )
         bend = dr.abs(dr.squared_norm(turned) - w * distance) / square
-        # The length t at which rate t + bend t^2 is a fifth of q^2, in a form that does not cancel;
-        # from 0.002 to 0.25 of the radius.
+        # The length t at which rate t + bend t^2 is a fifth of q^2, in a form that does not cancel.
+        # In it paths move from 0.002 to 0.25 of the radius.
         change = 0.2 * dr.maximum(radius * radius - distance, 0)
         length = 2 * change / (rate + dr.sqrt(dr.fma(rate, rate, 4 * bend * change)))
-        return dr.select(change > 0, dr.clip(length, 0.002 * radius, 0.25 * radius), dr.inf)
+        unit = radius / turning
+        return dr.select(change > 0, dr.clip(length, 0.002 * unit, 0.25 * unit), dr.inf)
 
     def grazed_at(self) -> tuple[Any, ...]:
         """Return where the points lie whose paths graze a sphere: two distances or
