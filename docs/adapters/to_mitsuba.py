@@ -196,13 +196,14 @@ def read_level(options: Options) -> Level:
     level, failed = Level(options), []
 
     # A render engine is given the scene of a render, any other script that of the viewport.
+    # `bpy` has no types.
     class Reader(bpy.types.RenderEngine):  # type: ignore[misc]
         bl_idname, bl_label = "AIRLIGHT_TO_MITSUBA", "to_mitsuba"
 
         def render(self, depsgraph: Any) -> None:
             try:
                 _read(level, depsgraph)
-            except Exception:
+            except Exception:  # Blender would print it and go on
                 failed.append(traceback.format_exc())
 
     scene = bpy.context.scene

@@ -17,10 +17,9 @@ from itertools import combinations
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from airlight.errors import InputError
-from airlight.reference.scene.convex_bounds import Bounds, Sphere
+from airlight.reference.scene.convex_bounds import Bounds, Sphere, largest_ball
 
 Array = NDArray[np.float64]
 
@@ -60,13 +59,6 @@ def _gap(first: Bounds, second: Bounds) -> float:
         return float((second.normal @ first.centre - second.offset).max()) - first.radius
     if isinstance(second, Sphere):
         return _gap(second, first)
-    # All planes move outwards by t: the least t with which the bodies share a point is half of the
-    # gap.
-    normals = np.concatenate([first.normal, second.normal])
-    least = linprog(
-        [0, 0, 0, 1],
-        A_ub=np.column_stack([normals, -np.ones(len(normals))]),
-        b_ub=np.concatenate([first.offset, second.offset]),
-        bounds=[(None, None)] * 4,
-    )
-    return 2 * float(least.fun)
+    # Where all planes move outwards by half of the gap, the bodies share a point.
+    normal = np.concatenate([first.normal, second.normal])
+    return -2 * largest_ball(normal, np.concatenate([first.offset, second.offset]))

@@ -26,7 +26,7 @@ from airlight.reference.scene.area_light import ReferenceAreaLight
 Array = NDArray[np.float64]
 
 _ASIDE = 1e-6  # of a cell: how far from its ends its density is looked up
-TINY = 1e-300
+TINY = 1e-300  #: a divisor at least, where what is divided is 0 too
 
 
 @dataclass(frozen=True)

@@ -157,6 +157,23 @@ def holds(bounds: Bounds, point: Array) -> bool:
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
+def largest_ball(normal: Array, offset: Array) -> float:
+    """Return the radius of the largest ball in half spaces normal . x <= offset, unit normals,
+    (n, 3), and (n,) [m]; below 0 how far all planes must move outwards to share a point.
+    """
+    from scipy.optimize import linprog  # few scenes need it, and it takes long to import
+
+    # Unknowns are the centre x and the radius t; a ball is within a half space if n . x + t <=
+    # offset. The least -t is wanted.
+    found = linprog(
+        [0, 0, 0, -1],
+        A_ub=np.column_stack([normal, np.ones(len(normal))]),
+        b_ub=offset,
+        bounds=[(None, None)] * 4,
+    )
+    return -float(found.fun) if found.status == 0 else 0.0
+
+
 def in_surface(bounds: Bounds, point: Array) -> bool:
     """Return whether a point, (3,) [m], lies in the surface of bounds, up to float32 rounding."""
     margin = 1e-6 * float(np.abs(point).max())

@@ -51,7 +51,7 @@ _MOST = 5000  # triangles times lights, about 3 s of a reference at 160 x 120
 _LIT = 0.9  # at most, of the points in view: the others are in the shadow of all lights
 _ABOVE = 0.1  # sine of the least elevation of a sun, 6 degrees: below 0 no light of it arrives
 _OPAQUE = 8.0  # optical depth, exp(-8) = 3e-4: a view that is deeper shows nothing
-_POINTS = 10_000  # of the design: SciPy takes 6 us for each point before the one that is drawn
+_POINTS = 10_000  # of the design; another number would draw other scenes for every seed
 
 #: Ranges that differ from those of `ranges.toml`: no bounds, areas, spheres and tabulated phase
 #: functions, which would keep out most engines, and no view that is vacuum or black to the eye.

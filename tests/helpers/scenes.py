@@ -104,3 +104,12 @@ def scene_xml(
 <lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
 <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/></film></sensor>
 <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>{"".join(parts or (LAMP,))}</scene>"""
+
+
+def dense_box(sigma_t: float, size: tuple[int, int]) -> dict[str, Any]:
+    """Return a box in thin fog that light enters through a skin: a metre is `sigma_t` mean free
+    paths.
+    """
+    place = mi.ScalarTransform4f().translate([-0.8, 0.4, 0.7]).rotate([0.2, 0.3, 1], 31).scale(0.5)
+    box = {"type": "cube", "to_world": place, "exterior": {"type": "ref", "id": "fog"}}
+    return tiny_scene(size=size, floor=None, ball=bounded_medium(box, sigma_t, (0.9, 0.4, 0.3)))

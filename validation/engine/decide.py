@@ -43,7 +43,7 @@ import numpy as np
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.prediction import Predictor
 from airlight.validation.engine.search import Explanation, usual_size
-from airlight.validation.engine.verdict import BLOCK
+from airlight.validation.statistics.comparison import block_side
 
 #: Relative error of the fog model itself, in most pixels: of pixel centres the error of its
 #: quadrature, of means over pixels the error of 3 x 3 rays.
@@ -77,7 +77,7 @@ class Blocks:
         # least along the shorter side: a few blocks tell no noise from a gradient. Not all pixels
         # are looked at, so that blocks have different numbers of them, or none.
         height, width = predictor.shape
-        side = max(1, min(BLOCK, min(height, width) // 6))
+        side = block_side(height, width, fewest=6)
         row, column = np.divmod(predictor.pixels, width)
         used, number = np.unique((row // side) * width + column // side, return_inverse=True)
         return cls(number, len(used))

@@ -25,7 +25,7 @@ from airlight.validation.arrays import Array
 from airlight.validation.engine.faults import BRIGHTNESS, FAULTS
 from airlight.validation.engine.observation import stopped
 from airlight.validation.metrics.errors import FLOOR
-from airlight.validation.statistics.comparison import BLOCK, block_sums
+from airlight.validation.statistics.comparison import block_side, block_sums
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
 #: fraction of the mean that the inverse of a curve may leave; `omni-box` by Godot's equation leaves
@@ -148,7 +148,7 @@ def _usual_error(ref: Array, tst: Array) -> float:
 def _usual_block_error(ref: Array, tst: Array) -> float:
     """Return the same of means over blocks of the values that are finite in both images."""
     both = np.isfinite(ref) & np.isfinite(tst)
-    side = min(BLOCK, max(1, min(ref.shape[:2]) // 10))  # ten blocks at least along a side
+    side = block_side(*ref.shape[:2])
     count = block_sums(both.astype(float), side)
     with np.errstate(invalid="ignore"):
         means = [block_sums(np.where(both, each, 0.0), side) / count for each in (ref, tst)]

@@ -23,9 +23,8 @@ from airlight.validation.arrays import Array, Bools
 from airlight.validation.engine.hints import OUTLIERS, Hints, find_hints
 from airlight.validation.engine.observation import relative_errors
 from airlight.validation.metrics.errors import FLOOR
-from airlight.validation.statistics.comparison import block_sums
+from airlight.validation.statistics.comparison import block_side, block_sums
 
-BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
 RIGHT = 0.01  #: largest relative error of an image that is called right
 
 
@@ -65,8 +64,7 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
     the image as a whole; `failures`: why it must be called wrong anyway: values that are not
     finite, or negative.
     """
-    # Ten blocks at least along the shorter side of the image.
-    side = min(BLOCK, max(1, min(reference.shape[:2]) // 10))
+    side = block_side(*reference.shape[:2])
     error, noise = block_errors(reference, image, side)
     reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
     # A factor other than one, or an image without light, counts only where nothing else is wrong.

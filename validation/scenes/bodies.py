@@ -27,6 +27,7 @@ from airlight.realtime.scene.closed_mesh import (
     winding_number,
 )
 from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.reference.scene.convex_bounds import largest_ball
 from airlight.reference.scene.shapes import distance_to_triangles
 from airlight.validation.arrays import Array, Bools, Index
 
@@ -91,22 +92,9 @@ def _overlap(first: Body, second: Body) -> bool:
 
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:
-    """Return the radius of the largest sphere in two convex meshes: the largest t
-    under n . x + t <= offset.
-    """
-    from scipy.optimize import linprog
-
-    # Unknowns are the centre x and the radius t; a point is t inside a half space of unit normal n
-    # if n . x + t <= offset. Minimising -t finds the largest sphere; no solution means no common
-    # point.
-    planes = np.concatenate([first.normals, second.normals])
-    largest = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([first.offsets, second.offsets]),
-        bounds=[(None, None)] * 4,
-    )
-    return -float(largest.fun) if largest.status == 0 else 0.0
+    """Return the radius of the largest sphere in two convex meshes."""
+    normals = np.concatenate([first.normals, second.normals])
+    return largest_ball(normals, np.concatenate([first.offsets, second.offsets]))
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:

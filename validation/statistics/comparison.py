@@ -240,6 +240,13 @@ def _block_tests(expected: _Side, tested: _Side) -> dict[str, int]:
     return {"blocks": z.size, "rejected_blocks": int((p < sidak(LEVEL, z.size)).sum())}
 
 
+def block_side(height: int, width: int, fewest: int = 10) -> int:
+    """Return the side of a block [pixels]: `fewest` blocks at least along the shorter side of an
+    image, where it has as many pixels.
+    """
+    return min(BLOCK, max(1, min(height, width) // fewest))
+
+
 def block_sums(values: Array, side: int = BLOCK) -> Array:
     """Return the sums over square blocks, smaller ones at the far edges:
     (rows, columns, channels).

@@ -136,14 +136,7 @@ class LightPaths:
             # A sphere: the path is nearest to the centre at b, q is half of its chord, and the path
             # lies in the medium from b - q to b + q, as far as it is between the point and the
             # light.
-            point, away = dr.fma(self.direction, x, self.start), self.away(x)
-            square = dr.squared_norm(away)
-            nearest = -dr.dot(point, away) / r
-            half = (
-                dr.square(self.bounded.radius)
-                - dr.squared_norm(dr.cross(point, self.toward)) / square
-            )
-            half = dr.sqrt(dr.maximum(half, 0))
+            nearest, half = self._chord(x, r)
             last = dr.minimum(nearest + half, r) if self.w else nearest + half
             length = dr.maximum(last - dr.maximum(nearest - half, 0), 0)
         else:
@@ -153,6 +146,15 @@ class LightPaths:
             if self.w:
                 length = r * (length / (1 + last)) / (1 + first)
         return dr.select(self.active, length, 0)
+
+    def _chord(self, x, r):
+        """Return b and q of a sphere for the paths to x [m], q = 0 where they miss it."""
+        point, away = dr.fma(self.direction, x, self.start), self.away(x)
+        square = dr.squared_norm(away)
+        half = (
+            dr.square(self.bounded.radius) - dr.squared_norm(dr.cross(point, self.toward)) / square
+        )
+        return -dr.dot(point, away) / r, dr.sqrt(dr.maximum(half, 0))
 
     def length_at(self, x, r):
         """Return `length` for points by themselves."""
@@ -361,16 +363,12 @@ class LightPaths:
         any channel: nor does it up to `longest`, in which q^2 falls by a fifth at most.
         """
         sparsest = reduce(dr.minimum, self.bounded.medium.sigma_t)
-        point, away = dr.fma(self.direction, x, self.start), self.away(x)
-        square, radius = dr.squared_norm(away), self.bounded.radius
-        cross = dr.squared_norm(dr.cross(point, self.toward))
-        half = dr.sqrt(dr.maximum(radius * radius - cross / square, 0))
-        nearest = -dr.dot(point, away) / r
+        nearest, half = self._chord(x, r)
         between = nearest > half
         if self.w:
             between &= nearest + half < r
         # The least panel of `_smooth_chord` may be longer than the chord keeps its length.
-        kept = longest > 0.0021 * radius / self._turning(r)
+        kept = longest > 0.0021 * self.bounded.radius / self._turning(r)
         left = 2 * 0.89  # of half the chord: sqrt(0.8) = 0.894
         return between & kept & (left * half * sparsest > optical_reach(type(x)))
 

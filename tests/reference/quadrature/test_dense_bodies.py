@@ -7,15 +7,7 @@ import pytest
 
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
-from tests.helpers.scenes import bounded_medium, tiny_scene
-
-
-def scene(sigma_t):
-    """A box in thin fog, seen from its lit side by the ray of row 1, column 1."""
-    place = mi.ScalarTransform4f().translate([-0.8, 0.4, 0.7]).rotate([0.2, 0.3, 1], 31).scale(0.5)
-    box = {"type": "cube", "to_world": place, "exterior": {"type": "ref", "id": "fog"}}
-    body = bounded_medium(box, sigma_t, (0.9, 0.4, 0.3))
-    return mi.load_dict(tiny_scene(size=(8, 6), floor=None, ball=body))
+from tests.helpers.scenes import dense_box
 
 
 def crossings(bounds, place, way):
@@ -50,7 +42,8 @@ def plain_sum(read, ray, edges):
 @pytest.mark.parametrize("sigma_t", [400.0, 1e4, 1e6])
 def test_light_in_the_skin_of_a_dense_body_is_not_missed(variant, sigma_t):
     """With 1e4 a third of the light of this ray was missed, with a stated error of 1e-14."""
-    loaded, ray = scene(sigma_t), 9
+    # The ray of row 1, column 1 meets the lit side of the box.
+    loaded, ray = mi.load_dict(dense_box(sigma_t, (8, 6))), 9
     read = read_reference(loaded)
     _, enter = plain_sum(read, ray, np.array([0.0, 1.0]))
     # Before the body, and 40 mean free paths into it; nothing comes back from behind that.

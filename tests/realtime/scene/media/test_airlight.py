@@ -20,7 +20,7 @@ from airlight.validation.scenes.parts import medium_boundary
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import airlight_sum, frames
 from tests.helpers.frames import read, relative_rmse
-from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, dense_box, tiny_scene
 from tests.helpers.sunlit import ALONG, CUBE_AT, cube, fog_sphere, plank, rays, sun, unit
 
 SMALL = (8, 6)
@@ -145,13 +145,6 @@ def dense_in_thin(centre, radius, sigma_t):
     return tiny_scene(size=SMALL, floor=None, ball=ball)
 
 
-def dense_box():
-    """A box of 10 000 mean free paths: light enters it through a skin of a tenth of a millimetre."""
-    place = mi.ScalarTransform4f().translate([-0.8, 0.4, 0.7]).rotate([0.2, 0.3, 1], 31).scale(0.5)
-    box = {"type": "cube", "to_world": place, "exterior": {"type": "ref", "id": "fog"}}
-    return tiny_scene(size=SMALL, floor=None, ball=bounded_medium(box, 1e4, (0.9, 0.4, 0.3)))
-
-
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), np.sin(np.arange(12) * np.pi / 6)], axis=1)
 #: Scenes and the relative RMSE of the airlight, in float64 and float32. Segments are cut where the
 #: edges of a box bend the segment's length, which leaves 1e-5; corners of media are float32
@@ -162,7 +155,11 @@ SCENES = {
     "lamp within": (lambda: under_lamp(0.8, 0.6, 0.7), 3e-5, 3e-5),
     "coloured air": (in_coloured_air, 3e-5, 3e-5),
     "dense in thin": (lambda: dense_in_thin(SPHERE_AT, RADIUS, 80.0), 3e-5, 3e-5),
-    "dense box": (dense_box, 3e-5, 1e-4),  # a skin of 24 roundings of a float32 distance
+    "dense box": (
+        lambda: dense_box(1e4, SMALL),
+        3e-5,
+        1e-4,
+    ),  # a skin of 24 roundings of a float32 distance
     "denser in thin": (lambda: dense_in_thin((2.0, 6.0, 1.0), 1.5, 400.0), 3e-5, 3e-5),
     "two boxes": (lambda: under_sun(cube=cube(), plank=plank()), 1e-5, 3e-5),
     "box and sphere": (lambda: under_sun(cube=cube(), ball=fog_sphere()), 1e-5, 3e-5),
