@@ -4,7 +4,8 @@
 Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact
 geometry and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the
 same integral as an integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path
-tracer, independent of this project.
+tracer, independent of this project. In clouds, where light scatters many times,
+`monte_carlo.cloud_paths` takes their place.
 
 None of the three imports another. They share the reading of the scene (`scene`: coefficients,
 lights, the rays through pixel centres, as Mitsuba gives them), the class of errors for the user,

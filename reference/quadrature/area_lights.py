@@ -361,6 +361,7 @@ class _View:
         end = self.beam.distance[active]
         point = reference.origin + end[:, None] * reference.direction[active]
         away = point - light.centre
+        metre = self.beam.known().shapes.metre(reference.origin, light.centre)
         # Only points before the emitting side have sections. A point closer to a sphere than 1e-5
         # of the radius touches it.
         if light.kind == "sphere":
@@ -368,7 +369,8 @@ class _View:
         elif light.kind == "mesh":
             sees = np.ones(len(away), bool)  # the samples say it, triangle by triangle
         else:
-            sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
+            largest = max(metre, float(np.abs(light.centre).max()))
+            sees = away @ light.normal > IN_PLANE * largest
         seeing = np.flatnonzero(sees)
         # For its section a surface point is the light: what can stand between is looked for about a
         # ball that holds all of these points.
@@ -380,11 +382,11 @@ class _View:
             rows = seeing[first : first + step]
             square = self.points[rows]
             sections = sections_for_points(light, point[rows], square, self.turn, self.even)
-            # Sections are looked at from a little before the surface, 1e-6 of the way: the surface
-            # must not hide the light from itself.
+            # Sections are looked at from a little before the surface, 1e-6 of the way and of a
+            # metre or a smaller scene: the surface must not hide the light from itself.
             eye = (
                 reference.origin
-                + (end - 1e-6 * (1 + end))[rows, None] * reference.direction[active[rows]]
+                + (end - 1e-6 * (metre + end))[rows, None] * reference.direction[active[rows]]
             )
             eye = np.repeat(eye, each, axis=0)
             samples = seen_samples(

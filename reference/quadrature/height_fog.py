@@ -154,8 +154,8 @@ def _of_places(
             depth = depth + paths.length * fog.density(z)
         with np.errstate(over="ignore"):
             strip = np.exp(fog.log_density(z) - depth) * medium.phase(-s / r) / r
-        if law is not None:
-            strip = strip * law(r)
+        if weight is not None:  # of a spot, a fade or a law; a fade is above 1 before it begins
+            strip = strip * weight((rays.foot[ray] + s)[:, None], np.arange(len(ray)))[:, 0]
         error = error + terms.edge * np.where(np.isfinite(x), strip, 0.0)
     return value, error
 

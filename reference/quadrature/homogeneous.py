@@ -259,8 +259,12 @@ class _Integrand:
 
     @property
     def densest(self) -> float:
-        """The largest extinction of the bodies, 0 where there are none [1/m]."""
-        return max((float(each.sigma_t.max()) for each in self.reference.media), default=0.0)
+        """The largest extinction of the bodies, 0 where there are none [1/m]; under a directional
+        light, whose panels are even in the distance, also that of the medium around them.
+        """
+        around = () if self.own.w else (self.reference.medium,)
+        media = (*self.reference.media, *around)
+        return max((float(each.sigma_t.max()) for each in media), default=0.0)
 
     def __call__(
         self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array

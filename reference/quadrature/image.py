@@ -102,6 +102,8 @@ class ReferenceImage:
     #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
     airlight_se: Array | None = None
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
+    #: of `emitted` as a mean over pixels [W/(m^2 sr)]; None at centres, where that is exact
+    emitted_se: Array | None = None
     #: means over the image of what area lights add to airlight and surface, by replicate of their
     #: points, (2, replicates, 3) [W/(m^2 sr)]
     replicate_means: Array | None = None
@@ -417,11 +419,13 @@ def _image(
     )
     if replicates is None:
         return image
-    by_chance = standard_error(replicates[:, :6]).reshape(*shape, 6)
+    by_chance = standard_error(replicates).reshape(*shape, -1)
     return replace(
         image,
         airlight_se=by_chance[..., :3],
-        surface_se=by_chance[..., 3:],
+        surface_se=by_chance[..., 3:6],
+        # Replicates of positions have nine columns as well, those of light samples six.
+        emitted_se=by_chance[..., 6:] if by_chance.shape[-1] > 6 else None,
         replicate_means=replicates[:, :6].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2),
     )
 

@@ -95,7 +95,9 @@ TERMS = Terms()
 
 def strongest(medium: ReferenceMedium | VaryingMedium) -> Array:
     """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
-    return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
+    # A table has its largest value at one of its entries.
+    cosines = np.concatenate([np.linspace(-1, 1, 1001), medium.phase.kinks])
+    return medium.albedo * medium.largest * float(medium.phase(cosines).max())
 
 
 def sums_of(owner: Index, values: Array, count: int) -> Array:

@@ -19,6 +19,7 @@ from airlight.reference.quadrature.model_terms import (
     route_of,
     strength_of,
 )
+from airlight.reference.scene.convex_bounds import furthest
 from airlight.reference.scene.directional_light import DirectionalLight
 from airlight.reference.scene.point_light import ReferenceLight
 from airlight.reference.scene.read import ReferenceScene
@@ -122,9 +123,11 @@ def _sun_sums(
 ) -> tuple[Array, Array]:
     rays, lit = found.rays, found.lit
     _, _, high = stretches = sun_stretches(reference, found)
-    # The effect on a ray of the uncertainty of coordinates, through an edge or a
-    # kink; at most all of the ray.
-    scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
+    # The effect on a ray of the uncertainty of coordinates, of shapes, lit parts and bodies, through
+    # an edge or a kink; at most all of the ray.
+    bodies = [furthest(medium.bounds, reference.origin) for medium in reference.media]
+    far = max(lit.high.max(initial=0.0), *bodies, 0.0)
+    scale = np.maximum(coordinates(rays, found.shapes), far / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
     rounding = np.finfo(float).eps * scale
     terms = Terms(fade_along(reference), None, route.paths, edge=edge, rounding=rounding)
@@ -155,10 +158,12 @@ def lit_rays(
         )
         shapes = read_shapes(reference.occluders) if shapes is None else shapes
         # No shadow falls on a ray where it has left the light's cylinder about all shapes. `height`
-        # is the sine between ray and sun. Along rays with a sine below 1e-4 shadows are looked for
-        # as far as at a sine of 1e-4.
-        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / 1e-4)
-        last = np.minimum(field_of(reference).leave(reference.origin, reference.direction), clear)
+        # is the sine between ray and sun. Along rays without an end shadows are looked for up to
+        # 1e4 times as far as shapes reach, and 1e4 m at least.
+        clear = coordinates(rays, shapes)
+        leave = field_of(reference).leave(reference.origin, reference.direction)
+        most = np.where(np.isinf(leave), 1e4 * np.maximum(clear * rays.height, 1.0), np.inf)
+        last = np.minimum(np.minimum(leave, clear), most)
         far = np.where(np.isfinite(distance), distance, last)
         ends = np.zeros_like(far), far
     else:
@@ -205,11 +210,14 @@ def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> 
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one,
     and the phase function at most its largest value. For a directional light it is exp(-tau) p, in
-    the distance. A distance law has its largest r^2 f(r).
+    the distance. A distance law has its largest r^2 f(r), a fade is largest at the camera.
     """
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt
     field = field_of(of_lamps(reference) if rays.w else reference)
     part = part / rays.height[ray] * largest_law(reference, rays)[ray] if rays.w else part
+    if reference.model.fade_of is not None:
+        full, end = reference.model.fade_of
+        part = part * (end / (end - full))
     np.add.at(worth, ray, part[:, None] * field.strongest / (4 * np.pi))
     return worth

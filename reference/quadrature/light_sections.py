@@ -198,7 +198,8 @@ def _before_triangles(chosen: Choice, eye: Array, length: float) -> Sections:
     above = np.sum(way * chosen.normal, axis=1)
     # A point in the plane of a triangle, to rounding, sees nothing of it, and would find a section
     # of any visibility.
-    sees = above > IN_PLANE * np.maximum(1.0, np.abs(start).max(axis=1, initial=0.0))
+    largest = np.maximum(np.abs(start), np.abs(eye)).max(axis=1, initial=0.0)
+    sees = above > IN_PLANE * largest
     weight = np.where(
         sees, chosen.area * above / np.linalg.norm(way, axis=1) ** 3 / chosen.chance, 0.0
     )

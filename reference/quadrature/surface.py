@@ -18,6 +18,9 @@ it are the direction to a light at the distance r, and the normal of a sphere of
 
 The error is the difference that a turn of this direction by e towards the normal makes, which is
 large at grazing incidence and in a sharp lobe, and e itself, and 16 roundings, times the radiance.
+In the soft edge of a spot Mitsuba takes the angle a to its axis from a cosine, known to 2^-22: with
+2^-22/sin(a) and the part of e without k, over the width of the edge, it is a part of the light that
+the spot has on its axis.
 It is no part of it which point a ray meets, which is Mitsuba's, and whether that point is lit,
 which the lit intervals of the ray say.
 
@@ -53,7 +56,7 @@ from airlight.reference.scene.device import as_rows, on_device, vectors
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional
 from airlight.reference.scene.point_light import ReferenceLight
 from airlight.reference.scene.read import ReferenceScene, has_mirrors
-from airlight.reference.scene.shape_roles import scene_from
+from airlight.reference.scene.shape_roles import metre_of, scene_from
 from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
@@ -136,8 +139,9 @@ def lit_surface(
             way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), UNBOUNDED)
         else:
             way = light.position - point
-            r = np.linalg.norm(way, axis=1)
-            way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
+            distance = np.linalg.norm(way, axis=1)
+            way = way / np.maximum(distance, np.finfo(float).tiny)[:, None]
+            r = shadow_scale * distance
         # I / r^2 of this emitter, or its irradiance, without visibility: the lit intervals say
         # that.
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
@@ -159,6 +163,10 @@ def lit_surface(
             doubt += (turn + 16 * 2.0**-24)[:, None] * np.abs(radiance)
         # Where the turn gives no number, the radiance may be wrong altogether.
         doubt = np.where(np.isfinite(doubt), doubt, np.abs(radiance))
+        if isinstance(light, ReferenceLight) and light.axis is not None and light.is_soft:
+            shift = 2.0**-22 * (1 + size / np.maximum(distance, nearest))
+            edge = _edge_doubt(light, light.axis, way, shift) / np.maximum(distance, nearest) ** 2
+            doubt += edge[:, None] * np.abs(as_rows(reflected)) * light.intensity
         # A directional light's segment goes to the end of all floats: only bounded media can be on
         # it.
         depth = to_camera
@@ -172,6 +180,19 @@ def lit_surface(
         total += np.where(lit, radiance * transmittance, 0.0)
         error += np.where(lit, doubt * transmittance, 0.0)
     return total, error
+
+
+def _edge_doubt(light: ReferenceLight, axis: Array, towards: Array, shift: Array) -> Array:
+    """Return how far Mitsuba's soft edge of a spot may be off in single precision, (rays,) [1].
+
+    `axis`: of the light; `towards`: unit directions to it, (rays, 3); `shift`: the uncertainty of
+    their angles, (rays,) [rad].
+    """
+    angle = np.arccos(np.clip(-(towards @ axis), -1.0, 1.0))
+    # On the axis the angle of a cosine that is known to 2^-22 is known to 2^-11.
+    shift = shift + 2.0**-22 / np.maximum(np.sin(angle), 2.0**-11)
+    off = np.minimum(shift / (light.cutoff - light.beam), 1.0)
+    return np.where(angle > light.beam - shift, off, 0.0)
 
 
 def _curvature(interaction: "mi.SurfaceInteraction3f") -> Array:
@@ -210,7 +231,7 @@ def mirrored_light(reference: ReferenceScene, hits: SurfaceHits) -> Array:
     far = hits.distance[rows]
     point = origin + far[:, None] * direction
     # Rays start a step along their way, a thousand roundings, so as not to meet the mirror itself.
-    step = 1e-4 * (_metre(reference.occluders) + np.abs(point).max(axis=1))
+    step = 1e-4 * (metre_of(reference.occluders) + np.abs(point).max(axis=1))
     start = point + step[:, None] * onwards
     ray = mi.Ray3f(vectors(mi.Point3f, start), vectors(mi.Vector3f, onwards))
     next_surface = step + np.array(reference.occluders.ray_intersect(ray).t, dtype=np.float64)
@@ -261,12 +282,6 @@ def emitted_light(reference: ReferenceScene, distance: Array, route: Route | Non
     return total
 
 
-def _metre(scene: "mi.Scene") -> float:
-    """Return 1 m, or the size of a smaller scene, for steps of rays off surfaces [m]."""
-    box = scene.bbox()
-    return min(1.0, float(np.linalg.norm(np.ravel(box.max) - np.ravel(box.min))))
-
-
 def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
     """Yield where rays meet a mesh from the side that emits, crossing after
     crossing, (rays,) [m]; else NaN.
@@ -286,7 +301,7 @@ def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Ite
         walking &= not light.opaque
         # The next crossing is looked for 1e-5 of the distance and 1e-5 m beyond this one, which
         # float32 rays would otherwise meet again.
-        start = np.where(walking, at * (1 + 1e-5) + 1e-5 * _metre(mesh), start)
+        start = np.where(walking, at * (1 + 1e-5) + 1e-5 * metre_of(mesh), start)
 
 
 def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:

@@ -157,6 +157,13 @@ def holds(bounds: Bounds, point: Array) -> bool:
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
+def furthest(bounds: Bounds, point: Array) -> float:
+    """Return how far from a point, (3,) [m], bounds reach [m]."""
+    if isinstance(bounds, Sphere):
+        return float(np.linalg.norm(bounds.centre - point)) + bounds.radius
+    return float(np.linalg.norm(bounds.edge.reshape(-1, 3) - point, axis=1).max(initial=0.0))
+
+
 def largest_ball(normal: Array, offset: Array) -> float:
     """Return the radius of the largest ball in half spaces normal . x <= offset, unit normals,
     (n, 3), and (n,) [m]; below 0 how far all planes must move outwards to share a point.

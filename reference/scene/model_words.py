@@ -27,7 +27,7 @@ def wrong(term: str, value: str, expected: str) -> InputError:
 
 def _numbers(term: str, cells: list[str], value: str, expected: str) -> list[float]:
     try:
-        numbers = [float(cell) for cell in cells]
+        numbers = [float(cell) + 0.0 for cell in cells]  # -0 is 0
     except ValueError:
         raise wrong(term, value, expected) from None
     if any(math.isnan(number) or number < 0 for number in numbers):
@@ -97,6 +97,14 @@ def _choice(
         return ":".join([kind, *(_text(number) for number in numbers if number is not None)])
 
     return read
+
+
+def _range(term: str, value: str) -> str:
+    word = _choice(_WINDOWS, "none, or quartic:R, fourth:R, square:R, linear:R or cut:R")(
+        term, value
+    )
+    # Lamps that shine without an end have no range.
+    return "none" if word.endswith(":inf") else word
 
 
 def _law(term: str, value: str) -> str:
@@ -177,6 +185,11 @@ def _source(term: str, value: str) -> str:
     return f"constant:{_colour(term, rest, expected)}"
 
 
+def _cap(term: str, value: str) -> str:
+    word = _number("none", 0.0, 1.0, "none, or a number from 0 to 1")(term, value)
+    return "none" if word == "1" else word  # all that a source can cover
+
+
 def _ambient(term: str, value: str) -> str:
     word = value.strip().lower()
     if word == "none":
@@ -202,8 +215,7 @@ def _number(none: str, least: float, most: float, expected: str) -> Callable[[st
         (number,) = _numbers(term, [value], value, expected)
         if not least <= number <= most or math.isinf(number):
             raise wrong(term, value, expected)
-        # The most that a source can cover is no cap.
-        return none if number == most else _text(number)
+        return _text(number)
 
     return read
 
@@ -234,14 +246,14 @@ READERS: Mapping[str, Callable[[str, str], str]] = {
     "light_path": _path(length=True, most=1.0),
     "camera_path": _path(length=False, most=math.inf),
     "law": _law,
-    "range": _choice(_WINDOWS, "none, or quartic:R, fourth:R, square:R, linear:R or cut:R"),
+    "range": _range,
     "spot": _choice(_EDGES, "angle, cosine-squared, cosine-smooth or rim:k"),
     "phase": _phase,
     "depth": _choice(_DEPTHS, "distance, axis, axis-ends or axis-lookup"),
     "ends": _ends,
     "fade": _fade,
     "source": _source,
-    "cap": _number("none", 0.0, 1.0, "none, or a number from 0 to 1"),
+    "cap": _cap,
     "lobe": _lobe,
     "ambient": _ambient,
     "lit": _number("off", 1e-300, 1e300, "off, or a number above 0"),

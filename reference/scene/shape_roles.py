@@ -2,6 +2,7 @@
 """The shapes of a scene: opaque ones, boundaries of media, and scenes of some of them."""
 
 import mitsuba as mi
+import numpy as np
 
 from airlight.errors import InputError
 
@@ -34,6 +35,14 @@ def sorted_shapes(scene: "mi.Scene") -> "tuple[list[mi.Shape], list[mi.Shape]]":
                 "bounds"
             )
     return opaque, boundaries
+
+
+def metre_of(scene: "mi.Scene") -> float:
+    """Return 1 m, or the size of a smaller scene, for steps of rays off surfaces [m]; 1 m without
+    shapes.
+    """
+    box = scene.bbox()
+    return min(1.0, float(np.linalg.norm(np.ravel(box.max) - np.ravel(box.min))))
 
 
 def scene_of(shapes: "list[mi.Shape]", whole: "mi.Scene") -> "mi.Scene":

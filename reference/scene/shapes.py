@@ -8,6 +8,7 @@ Shadows do not depend on the side to which normals point.
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import mitsuba as mi
 import numpy as np
@@ -46,6 +47,29 @@ class Shapes:
     def count(self) -> int:
         """How many triangles, spheres and disks there are."""
         return len(self.triangles) + len(self.radius) + len(self.disks.radius)
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """The lowest and the highest corner of a box around all shapes, (3,) each [m]; infinite
+        the wrong way round without shapes.
+        """
+        points = np.concatenate(
+            [
+                self.triangles.reshape(-1, 3),
+                *(self.centre + sign * self.radius[:, None] for sign in (-1, 1)),
+                *(self.disks.centre + sign * self.disks.radius[:, None] for sign in (-1, 1)),
+            ]
+        )
+        return points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+
+    def metre(self, *points: Array) -> float:
+        """Return 1 m, or the size of a smaller scene of these shapes and of points, (n, 3) or (3,)
+        [m]: what lengths of rounding are parts of. 1 m without shapes.
+        """
+        if not self.count:
+            return 1.0
+        every = np.concatenate([*self.box, *(np.ravel(each) for each in points)]).reshape(-1, 3)
+        return min(1.0, float(np.linalg.norm(np.ptp(every, axis=0))))
 
 
 def read_shapes(scene: "mi.Scene") -> Shapes:

@@ -11,6 +11,7 @@ by mistake loses nothing.
 
 import hashlib
 import logging
+import math
 import os
 import random
 import re
@@ -68,14 +69,16 @@ def cache_limit() -> int:
     text = os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip()
     if not text:
         return DEFAULT_LIMIT
-    size = _SIZE.fullmatch(text)
-    if size is None:
-        raise InputError(
-            f"AIRLIGHT_CACHE_SIZE: got {text!r}, expected a size such as 500MB, 4GiB or a number "
-            "of bytes"
-        )
-    number, prefix, binary = size.groups()
-    return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " "))
+    if size := _SIZE.fullmatch(text):
+        number, prefix, binary = size.groups()
+        unit = (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " ")
+        if math.isfinite(limit := float(number) * unit):
+            return int(limit)
+    given = text if len(text) < 40 else f"{text[:40]}.."
+    raise InputError(
+        f"AIRLIGHT_CACHE_SIZE: got {given!r}, expected a size such as 500MB, 4GiB or a number of "
+        "bytes"
+    )
 
 
 def load_arrays(key: str, names: Sequence[str] | None = None) -> Arrays | None:

@@ -65,6 +65,7 @@ class LitIntervals:
     #: undecided parts of rays: numbers of the rays, and sizes of the parts, angles at the light
     #: [rad] or lengths [m]
     doubt: tuple[Index, Array] = field(default_factory=lambda: (np.empty(0, np.int64), np.empty(0)))
+    metre: float = 1.0  #: 1 m, or the size of a smaller scene [m]
 
 
 def certified(
@@ -137,7 +138,10 @@ def certified(
     clear = (
         start
         if normal is None
-        else start + 1e-5 * (1 + np.abs(start).max(axis=1))[:, None] * normal[ray]
+        else start
+        + 1e-5
+        * (shapes.metre(rays.origin, start) + np.abs(start).max(axis=1))[:, None]
+        * normal[ray]
     )
     unblocked = _cast(occluders, clear, target)
     wrong = np.flatnonzero(
@@ -152,10 +156,9 @@ def certified(
     report = RandomChecks(
         len(ray), len(wrong), len(wrong) - len(undecided), len(undecided), len(wrong) / len(ray)
     )
-    # A place in doubt stands for its stratum.
-    return replace(
-        lit, random_checks=report, doubt=(ray[undecided], width[ray[undecided]] / checks)
-    )
+    # A place in doubt stands for its stratum, and its ray for all those of which it is checked.
+    part = width[ray[undecided]] * every / checks
+    return replace(lit, random_checks=report, doubt=(ray[undecided], part))
 
 
 def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
@@ -176,18 +179,10 @@ def coordinates(rays: Rays, shapes: Shapes) -> Array:
 
 
 def _reach(rays: Rays, shapes: Shapes) -> float:
-    points = np.concatenate(
-        [
-            shapes.triangles.reshape(-1, 3),
-            _box(shapes.centre, shapes.radius),
-            _box(shapes.disks.centre, shapes.disks.radius),
-        ]
-    )
-    return 1.0 + float(np.linalg.norm(np.abs(points - rays.origin).max(axis=0, initial=0.0)))
-
-
-def _box(centre: Array, radius: Array) -> Array:
-    return np.concatenate([centre - radius[:, None], centre + radius[:, None]])
+    if not shapes.count:
+        return 1.0
+    furthest = np.max([np.abs(corner - rays.origin) for corner in shapes.box], axis=0)
+    return shapes.metre(rays.origin) + float(np.linalg.norm(furthest))
 
 
 def _segments(rays: Rays, ray: Index, x: Array, shapes: Shapes) -> tuple[Array, Array]:

@@ -26,8 +26,8 @@ Index = NDArray[np.int64]
 #: of the largest coordinate: what is closer to the plane of a light counts
 #: as in it; float32 corners
 IN_PLANE = 1e-7
-# of a distance: an interval that ends this close to the surface, met in
-# float32 if need be, reaches it
+# of a distance, and of a metre or a smaller scene: an interval that ends this close to the surface,
+# met in float32 if need be, reaches it
 _END = 1e-6
 
 
@@ -75,7 +75,7 @@ def before_light(
     occluders = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
         largest = max(
-            1.0,
+            occluders.metre(light.centre, reference.origin),
             float(np.abs(occluders.triangles).max(initial=0)),
             float(np.abs(light.centre).max()),
         )
@@ -110,9 +110,13 @@ def lit_intervals(
     low, high = _inside(rays, ends, occluders)
     ray, x0, x1 = lit_parts(rays, (low, high), occluders.near, occluders.shapes, of)
     # An end of a lit interval is an edge between light and shadow unless it is an end of the range.
-    inner = x0 > ends[0][ray] + _END * (1 + np.abs(x0)), x1 * (1 + _END) + _END < ends[1][ray]
+    metre = occluders.shapes.metre(rays.origin, *([rays.position] if rays.w else ()))
+    inner = (
+        x0 > ends[0][ray] + _END * (metre + np.abs(x0)),
+        x1 * (1 + _END) + _END * metre < ends[1][ray],
+    )
     transitions = int(inner[0].sum() + inner[1].sum())
-    lit = LitIntervals(ray, x0, x1, transitions)
+    lit = LitIntervals(ray, x0, x1, transitions, metre=metre)
     # Without shapes no edge is uncertain.
     if not occluders.shapes.count:
         lit = replace(lit, edge=0.0)
@@ -152,4 +156,4 @@ def reaches(lit: LitIntervals, distance: Array) -> NDArray[np.bool_]:
     # The end of each ray's last interval; rays without an interval stay at -inf.
     last = np.full(len(distance), -np.inf)
     np.maximum.at(last, lit.ray, lit.high)
-    return last * (1 + _END) + _END >= distance
+    return last * (1 + _END) + _END * lit.metre >= distance

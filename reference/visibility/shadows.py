@@ -54,7 +54,9 @@ Interval: TypeAlias = "tuple[mi.Float64, mi.Float64]"
 #: a point of the plane of ray and light, (z, y) [m]
 PlanePoint: TypeAlias = "tuple[mi.Float64, mi.Float64]"
 
-_MERGE = 1e-12  # gaps between shadows below this fraction of 1 + |x| are rounding
+# gaps between shadows below this fraction of |x| and a metre, or of |x| and a smaller scene, are
+# rounding
+_MERGE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class _Lanes:
     foot: "mi.Float64"  #: z_P: z of the light [m], or the cosine
     height: "mi.Float64"  #: y_P: y of the light [m], or the sine
     w: "mi.Float64"  #: 1: the light is a place, 0: a direction
+    metre: "mi.Float64"  #: 1 m, or the size of a smaller scene [m]
 
     def project(self, z: "mi.Float64", y: "mi.Float64") -> "mi.Float64":
         """Return x, the image on the ray of a point of the plane [m]."""
@@ -93,6 +96,7 @@ class _Shadows:
     high: "mi.Float64"  #: where it ends [m]
     count: "mi.UInt32"  #: how many there are, by lane
     stride: "mi.UInt32"  #: how many lanes there are
+    metre: "mi.Float64"  #: 1 m, or the size of a smaller scene [m]
 
 
 def lit_parts(
@@ -129,6 +133,7 @@ def lit_parts(
     # lane also has slots for 16 lit parts; a block in which a ray has more is computed again with
     # enough of them.
     room = max(1, longest)
+    metre = shapes.metre(rays.origin, *([rays.position] if rays.w else ()))
     parts, slots, first = [], 16, 0
     while first < len(of):
         block = slice(first, min(len(of), first + max(1, (1 << 23) // room)))
@@ -136,6 +141,7 @@ def lit_parts(
             rays[block],
             (ends[0][block], ends[1][block]),
             [replace(each, begin=each.begin[block], end=each.end[block]) for each in solids],
+            metre,
             room,
             slots,
         )
@@ -153,20 +159,28 @@ def lit_parts(
 
 
 def _lit_parts_of_block(
-    rays: Rays, ends: tuple[Array, Array], solids: list[_Solids], room: int, slots: int
+    rays: Rays,
+    ends: tuple[Array, Array],
+    solids: list[_Solids],
+    metre: float,
+    room: int,
+    slots: int,
 ) -> tuple[Index, Array, Array]:
     """Return how many lit parts each ray has, (rays,), and where they begin and end [m],
-    (rays * slots,), for at most `room` shadows on a ray and `slots` parts of it.
+    (rays * slots,), for at most `room` shadows on a ray and `slots` parts of it; `metre`: 1 m, or
+    the size of a smaller scene [m].
     """
     count = len(rays.foot)
     low, high = on_device(mi.Float64, ends[0]), on_device(mi.Float64, np.maximum(*ends))
     w, most, stride = mi.Float64(float(rays.w)), mi.UInt32(slots), mi.UInt32(count)
+    size = mi.Float64(metre)
     # Opaque numbers are inputs of the compiled loops: one kernel serves all lights and sizes.
-    dr.make_opaque(w, most, stride)
+    dr.make_opaque(w, most, stride, size)
     origin = vectors(mi.Vector3d, np.broadcast_to(rays.origin, (count, 3)))
     direction, across = vectors(mi.Vector3d, rays.direction), vectors(mi.Vector3d, -rays.normal)
     foot, height = on_device(mi.Float64, rays.foot), on_device(mi.Float64, rays.height)
-    lanes = _Lanes(origin, direction, across, dr.cross(direction, across), foot, height, w)
+    normal = dr.cross(direction, across)
+    lanes = _Lanes(origin, direction, across, normal, foot, height, w, size)
     shadows = _shadows(lanes, solids, (low, high), stride, room)
     # The lit rest of each lane, into its own slots.
     begins, ends_of_parts = (dr.zeros(mi.Float64, count * slots) for _ in range(2))
@@ -210,8 +224,8 @@ def _shadows(
             number = dr.gather(mi.UInt32, solids.numbers, j)
             begin, end = solids.shadow(lanes, solids.values, number)
             casts = (begin < end) & (begin < high) & (end > low)
-            touches = (begin <= last_end + _MERGE * (1 + dr.abs(last_end))) & (
-                last_begin <= end + _MERGE * (1 + dr.abs(end))
+            touches = (begin <= last_end + _MERGE * (lanes.metre + dr.abs(last_end))) & (
+                last_begin <= end + _MERGE * (lanes.metre + dr.abs(end))
             )
             apart = casts & ~touches & (last_begin < last_end)
             store(stored, last_begin, last_end, apart)
@@ -232,7 +246,7 @@ def _shadows(
     store(stored, last_begin, last_end, casts)
     stored += dr.select(casts, mi.UInt32(1), mi.UInt32(0))
     dr.eval(stored, lows, highs)
-    return _Shadows(lows, highs, stored, stride)
+    return _Shadows(lows, highs, stored, stride, lanes.metre)
 
 
 def _lit_rest(
@@ -259,7 +273,7 @@ def _lit_rest(
             )
             # A shadow that begins before t and ends behind it moves t to its end; of the shadows
             # that begin behind t the first one limits the lit part.
-            limit = t + _MERGE * (1 + dr.abs(t))
+            limit = t + _MERGE * (shadows.metre + dr.abs(t))
             covers = (begin <= limit) & (end > t)
             after = dr.select(begin > limit, dr.minimum(after, begin), after)
             return j + 1, dr.select(covers, end, t), after, moved | covers
@@ -272,7 +286,7 @@ def _lit_rest(
         # Only in a turn that did not move t all shadows were compared with the final t: the ray is
         # lit up to `after`. Gaps of the size of rounding are passed over without a lit part.
         lit = ~moved & (t < high)
-        wide = lit & (after - t > _MERGE * (1 + dr.abs(t)))
+        wide = lit & (after - t > _MERGE * (shadows.metre + dr.abs(t)))
         has_slot = wide & (used < slots)
         dr.scatter(begins, t, first_slot + used, has_slot)
         dr.scatter(ends, after, first_slot + used, has_slot)

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from airlight.reference.scene.shape_roles import metre_of
+
 _SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
 
 
@@ -32,6 +34,14 @@ class Surroundings:
     scene: "mi.Scene"  #: of opaque shapes alone where nothing bounds a medium
     surfaces: bool  #: whether there are shapes
     bounded: bool  #: whether some of them are boundaries of media
+    metre: "mi.Float"  #: 1 m, or the size of a smaller scene [m]
+
+    @staticmethod
+    def of(scene: "mi.Scene", bounded: bool) -> "Surroundings":
+        """Return the shapes of a scene."""
+        return Surroundings(
+            scene, bool(scene.shapes()), bounded, dr.opaque(mi.Float, metre_of(scene))
+        )
 
 
 @dataclass(frozen=True)
@@ -56,10 +66,11 @@ def is_boundary(interaction: "mi.SurfaceInteraction3f", active: "mi.Bool") -> "m
     return active & mi.has_flag(interaction.bsdf().flags(), mi.BSDFFlags.Null)
 
 
-def step_beyond(point: "mi.Point3f") -> "mi.Float":
-    """Return how far beyond a boundary at `point` a ray goes on [m]."""
-    # 2e-6 of the largest coordinate; media that are thinner are not seen.
-    return 2e-6 * (1 + dr.max(dr.abs(point)))
+def step_beyond(point: "mi.Point3f", metre: "mi.Float") -> "mi.Float":
+    """Return how far beyond a boundary at `point` a ray goes on [m]; `metre`: see `Surroundings`."""
+    # 2e-6 of the largest coordinate, and of a metre or a smaller scene, so that a step at the origin
+    # has a length; media that are thinner are not seen.
+    return 2e-6 * (metre + dr.max(dr.abs(point)))
 
 
 def medium_at(
@@ -86,7 +97,7 @@ def medium_at(
         # point.
         at_boundary = met & hit.is_medium_transition()
         medium = dr.select(at_boundary, hit.target_medium(-direction), medium)
-        done = dr.select(met, done + hit.t + step_beyond(hit.p), done)
+        done = dr.select(met, done + hit.t + step_beyond(hit.p, around.metre), done)
         return met & ~at_boundary & (done < distance), done, medium
 
     state = (
@@ -153,7 +164,7 @@ def transmittance(
         depth = dr.select(changes, depth + sigma_t * (crossing - boundary), depth)
         boundary = dr.select(changes, crossing, boundary)
         medium = dr.select(changes, hit.target_medium(direction), medium)
-        done = dr.select(passed, crossing + step_beyond(hit.p), done)
+        done = dr.select(passed, crossing + step_beyond(hit.p, around.metre), done)
         return passed & (done < distance), lit, done, boundary, medium, depth
 
     zero = dr.zeros(mi.Float, dr.width(distance))

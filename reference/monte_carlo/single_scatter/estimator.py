@@ -143,7 +143,7 @@ def _through_media(task: Task, sampler: "mi.Sampler", ray: Ray, active: "mi.Bool
         depth = dr.select(passed, depth + sigma_t * (end - start), depth)
         changes = passed & hit.is_medium_transition()
         medium = dr.select(changes, hit.target_medium(ray.direction), medium)
-        done = dr.select(passed, end + step_beyond(hit.p), done)
+        done = dr.select(passed, end + step_beyond(hit.p, task.around.metre), done)
         start = dr.select(passed, end, start)
         return passed, sampler, done, start, depth, medium, airlight + sent, surface + reflected
 

@@ -89,7 +89,7 @@ def _task(reference: ReferenceScene, samples: int) -> Task:
     scene = reference.scene if bounded else reference.occluders
     camera = reference.scene.sensors()[0].get_medium()
     return Task(
-        Surroundings(scene, bool(scene.shapes()), bounded),
+        Surroundings.of(scene, bounded),
         sources_of(reference),
         samples,
         mirrors=reference.is_sampled and has_mirrors(reference),

@@ -237,7 +237,7 @@ def _through_media(
         passed = met & (mi.Float64(end) < ends.end)
         changes = passed & hit.is_medium_transition()
         medium = dr.select(changes, hit.target_medium(ray.direction), medium)
-        done = dr.select(passed, end + step_beyond(hit.p), done)
+        done = dr.select(passed, end + step_beyond(hit.p, task.around.metre), done)
         start = dr.select(passed, end, start)
         return passed, sampler, done, start, depth, medium, total + sent
 

@@ -279,7 +279,7 @@ def terms_of(reference: ReferenceScene) -> ModelTerms | None:
     return ModelTerms(
         model,
         axis=mi.Vector3d(*(number(each) for each in reference.axis.tolist())),
-        opaque=Surroundings(reference.occluders, bool(reference.occluders.shapes()), False),
+        opaque=Surroundings.of(reference.occluders, False),
         scattering=scattering_of(reference),
         arriving=colour(np.where(drowned, 0.0, 1.0)) if drowned.any() else None,
         camera=number(model.camera_scale),

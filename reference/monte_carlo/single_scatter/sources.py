@@ -156,7 +156,7 @@ class _Near(ABC):
         """Return the paths along ways from the light [m]."""
         begin = mi.Point3f(light.position)
         # They start a hair before the surface of the light, if it has one, so as not to meet it.
-        hair = mi.Vector3f(light.normal) * step_beyond(begin)
+        hair = mi.Vector3f(light.normal) * step_beyond(begin, dr.minimum(dr.norm(way), 1))
         way = way - hair
         length = dr.norm(way)
         return Path(begin + hair, way / length, length, medium=self.medium)

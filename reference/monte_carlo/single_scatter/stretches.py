@@ -56,11 +56,13 @@ class Path:
         """Return the origins [m], unit directions and lengths [m] of shadow rays.
 
         Those of a light infinitely far away start at the points, since rays from afar lose digits:
-        a ball of 1 m, met from 200 m away, would shadow a third of itself.
+        a ball of 1 m, met from 200 m away, would shadow a third of itself. They have no end: a
+        density grid may reach beyond all shapes, and Mitsuba does not know the box of rectangles
+        alone.
         """
         if self.end is None:
             return self.begin, self.away, self.length
-        return self.end, -self.away, self.length
+        return self.end, -self.away, mi.Float(dr.largest(mi.Float))
 
 
 @dataclass(frozen=True)

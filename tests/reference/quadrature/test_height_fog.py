@@ -226,3 +226,20 @@ def test_a_level_ray_under_a_sun_needs_an_end_where_nothing_attenuates_it(scene)
         route_of(replace(reference, direction=level), none)
     for direction, distance in ((rising, none), (level, np.array([9.0]))):
         assert route_of(replace(reference, direction=direction), distance).end == distance
+
+
+def test_an_uncertain_edge_is_worth_what_the_light_sends_there(scene):
+    """A profile of 10, as a fade has before it begins, makes the effect of an edge ten times as
+    large.
+    """
+    reference = read_reference(scene(LAMP))
+    rays = rays_at(reference.origin, reference.direction[:4], reference.lights[0].position)
+    lit = np.arange(4), np.full(4, 0.5), np.full(4, 2.5)
+    field, far = HeightField(reference.medium), np.full(4, np.inf)
+    errors = [
+        field.sums(rays, lit, far, Terms(profile, edge=edge))[1]
+        for profile in (None, lambda x, ray: np.full_like(x, 10.0))
+        for edge in (0.0, 1e-3)
+    ]
+    assert (errors[1] > 100 * errors[0]).all()
+    assert errors[3] - errors[2] == pytest.approx(10 * (errors[1] - errors[0]), rel=1e-6)

@@ -8,9 +8,12 @@ import pytest
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.light_airlight import worth_of_doubt
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.model import Model
 from airlight.reference.scene.read import read_reference
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.planes import rays_at
 from airlight.validation.scenes.loading import load_scene
 from tests.helpers.model_march import marched
 from tests.helpers.scenes import tiny_scene
@@ -310,3 +313,40 @@ def test_a_lobe_begins_at_its_own_start(variant, estimator, near, length):
     found = layers_of(estimator, scene, **terms, light_path="off")[0]
     assert cosine.max() > 0.5
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("other", [1e-3, 1e-8])
+def test_channels_of_very_different_extinction_each_have_their_light_of_a_sun(variant, other):
+    """Without the light's path int sigma_t exp(-sigma_t x) dx = 1 in every channel: dense fog is
+    not missed by panels that thin fog makes long.
+    """
+    fog = tiny_scene()["fog"] | {
+        "sigma_t": {"type": "rgb", "value": [1.0, other, other]},
+        "has_spectral_extinction": True,
+    }
+    sun = {"type": "directional", "direction": [-0.3, 0.5, -0.7], "irradiance": 4.0}
+    scene = tiny_scene(size=(3, 2), fog=fog, lamp=sun, ball=None, floor=None)
+    image = quadrature_image(read_reference(mi.load_dict(scene), Model(light_path="off")))
+    expected = np.array([0.9, 0.8, 0.7]) * 4.0 / (4 * np.pi)
+    assert image.airlight == pytest.approx(np.broadcast_to(expected, (2, 3, 3)), rel=1e-6)
+
+
+def test_a_fade_that_begins_above_1_makes_doubt_worth_more(variant):
+    """A fade from 9 m to 10 m is 10 at the camera: so is the most that a part in doubt can send."""
+    reference = read_reference(mi.load_dict(tiny_scene()), Model(fade="9:10"))
+    light = reference.lights[0]
+    rays = rays_at(reference.origin, reference.direction, light.position)
+    lit = LitIntervals(
+        np.array([5]), np.zeros(1), np.ones(1), doubt=(np.array([5]), np.array([1e-3]))
+    )
+    physical = worth_of_doubt(read_reference(mi.load_dict(tiny_scene())), rays, lit)
+    assert worth_of_doubt(reference, rays, lit) == pytest.approx(10 * physical)
+
+
+def test_numbers_without_a_meaning_are_read_as_what_they_are():
+    assert Model(range="cut:inf").is_physical
+    assert Model(lamps="-0", ambient="-0").terms == "lamps=0"
+    assert Model(lamps="1e300", suns="1.0").factors == (1e300, 1.0, 1.0)
+    # Without a range light that falls as 1/r adds up without end.
+    with pytest.raises(InputError, match="it has no sum"):
+        Model(law="power:1", light_path="off", camera_path="off", range="cut:inf")

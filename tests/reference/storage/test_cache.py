@@ -17,6 +17,7 @@ from airlight.reference.storage.cache import (
     DEFAULT_LIMIT,
     cache_entries,
     cache_folder,
+    cache_limit,
     clear_cache,
     drop_arrays,
     is_stored,
@@ -207,6 +208,19 @@ SIZES = {
     "500 mib": 500 * 2**20,
     "1.5G": 1_500_000_000,
 }
+
+
+@pytest.mark.parametrize("words", SIZES)
+def test_a_size_is_bytes_or_a_number_with_a_unit(monkeypatch, words):
+    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", words)
+    assert cache_limit() == SIZES[words]
+
+
+@pytest.mark.parametrize("words", ["-1", "1e9", "inf", "2 XB", "9" * 400, "9" * 308 + "T"])
+def test_other_sizes_are_refused(monkeypatch, words):
+    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", words)
+    with pytest.raises(InputError, match="expected a size such as 500MB"):
+        cache_limit()
 
 
 def key(kind, number):

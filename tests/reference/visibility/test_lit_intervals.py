@@ -194,6 +194,18 @@ def test_the_certificate_is_clean_and_notices_a_fault(variant):
     )
     assert checked.random_checks.left > 20
     assert len(checked.doubt[0]) == checked.random_checks.left
+    # Where a third of the rays is checked, what is in doubt stands for the others too.
+    some = certified(
+        wrong,
+        rays,
+        ends,
+        occluders=reference.occluders,
+        shapes=known.shapes,
+        checks=16,
+        every=3,
+    )
+    assert some.random_checks.left < 0.5 * checked.random_checks.left
+    assert some.doubt[1].sum() == pytest.approx(checked.doubt[1].sum(), rel=0.45)
 
 
 @pytest.mark.claim("shadow-ray-certificate")

@@ -93,7 +93,7 @@ def scenes():
         },
         "two clouds, a ground and a block inside": {
             "low": ball((2.1,) * 3, (1.0,) * 3, {"type": "rayleigh"}, (0.9, 0.3, -0.4), 0.8),
-            "high": ball((1.1,) * 3, (0.97, 0.9, 0.8), table, (-0.6, 0.2, 0.7), 1.1),
+            "high": ball((1.1,) * 3, (0.97, 0.9, 0.8), table, (-0.7, 0.2, 0.8), 1.1),
             "ground": ground,
             "sky": sky((0.2, 0.3, 0.4)),
         },

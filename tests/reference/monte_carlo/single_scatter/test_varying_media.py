@@ -22,6 +22,10 @@ BULB = """<shape type="sphere" id="bulb"><float name="radius" value="0.5"/><poin
     <emitter type="area"><rgb name="radiance" value="5, 4, 3"/></emitter></shape>"""
 BALL = """<shape type="sphere" id="drop"><float name="radius" value="1.7"/><bsdf type="null"/>
     <ref name="interior" id="fog"/></shape>"""
+DROP = """<shape type="sphere" id="drop"><float name="radius" value="0.2"/>
+    <point name="center" x="-2.3" y="0.3" z="2"/></shape>"""
+BEHIND = """<emitter type="directional" id="sun"><vector name="direction" x="-0.9" y="0.1" z="-0.2"/>
+    <rgb name="irradiance" value="3, 2.6, 2.1"/></emitter>"""
 STONE = '<shape type="cube" id="stone"><transform name="to_world"><scale value="0.4"/></transform></shape>'
 
 
@@ -74,6 +78,20 @@ def test_a_panel_in_height_fog(variant, tmp_path):
     optical depths of their own.
     """
     compare(tmp_path, "height fog", PANEL, ((single_scatter_batch, 12, 5e-3),), samples=128)
+
+
+def test_a_grid_may_reach_beyond_all_shapes(variant, tmp_path):
+    """Ways to a sun ended where Mitsuba's emitter ends them, twice the radius of all shapes away:
+    about a drop on this side of a grid that is lit from behind there was too much light.
+    """
+    path = tmp_path / "scene.xml"
+    path.write_text(
+        grid_xml(volume(path.with_suffix(".vol"), ROUGH), BEHIND, size=(8, 6), shapes=DROP)
+    )
+    reference = read_reference(load_scene(str(path)).scene)
+    known = quadrature_image(reference, checks=0).airlight.mean()
+    means = [single_scatter_batch(reference, seed, 128).mean[0].mean() for seed in range(8)]
+    assert np.mean(means) == pytest.approx(known, rel=0.03)  # of 0.5 % by the samples
 
 
 def compare(tmp_path, medium, light, traces, *, samples):
