@@ -193,6 +193,8 @@ class HeightFog:
                     from_z = np.maximum(z, min(layer.base, self.cap))
                 # int_{from_z}^{cap} exp(-(z - z_i)/H) dz = H exp(up) (1 - exp(-(cap - from_z)/H)).
                 up = (layer.base - from_z) / layer.scale_height
+                # A clamped layer is at most as dense as at its base, which may lie above the cap.
+                up = np.minimum(up, 0) if self.clamped else up
                 shallow = -np.expm1((from_z - self.cap) / layer.scale_height)
                 total = total + layer.sigma_t * (below + layer.scale_height * np.exp(up) * shallow)
         return np.asarray(total)

@@ -52,7 +52,7 @@ from airlight.realtime.numerics.noise import Noise, blue_mask
 from airlight.realtime.numerics.recorded import Frozen, refusals
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.camera import TILE, tiled_pixels
-from airlight.realtime.scene.light_table import LightTable, sampled_lights, structure
+from airlight.realtime.scene.light_table import LightTable, by_tables, sampled_lights, structure
 from airlight.realtime.scene.read_scene import Scene
 
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
@@ -94,7 +94,9 @@ class FrameRenderer:
 
     @cached_property
     def lit(self) -> Scene:
-        """The scene as it is now, with the samples of its area lights, made once for a frame."""
+        """The scene as it is now, with the samples of its area lights and all lights in the order
+        of tables, made once for a frame.
+        """
         return _with_samples(self.scene, self.light_samples)
 
     @cached_property
@@ -189,9 +191,12 @@ def frame_renderer(
 
 
 def _with_samples(scene: Scene, samples: LightSamples) -> Scene:
-    """Return a scene that has, behind its lights, the samples of its area lights."""
+    """Return a scene that has, behind its lights, the samples of its area lights: all
+    in the order of `View.lights`, as the states that a method prepares of them.
+    """
     lights, tables = sampled_lights(scene.area_lights, samples, type(scene.camera.origin.x))
-    return replace(scene, lights=scene.lights + lights, sample_tables=tables)
+    # Samples come area light by area light, so that they are in that order.
+    return replace(scene, lights=by_tables(scene.lights) + lights, sample_tables=tables)
 
 
 def _by_rays(method: Method) -> bool:
@@ -245,7 +250,8 @@ def _stages(scene: Scene, method: Method, *, extra_layers: bool) -> Stages:
 
     large = scene.camera.width * scene.camera.height > _LARGE
     frozen = method.frozen and (_by_rays(method) or not large)
-    return Stages(method.preparation(scene), surface, shade, Frozen(run) if frozen else run)
+    ordered = replace(scene, lights=by_tables(scene.lights))  # as in the scenes of frames
+    return Stages(method.preparation(ordered), surface, shade, Frozen(run) if frozen else run)
 
 
 def _composed(layers: Layers, lit: PerRay | None, *, first: bool, changed: bool):

@@ -59,7 +59,9 @@ def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
     """
     if not any(light.kind == "sphere" for light in scene.area_lights):
         return None
-    if method.at_once or not method.uses_kernel or not isinstance(scene.medium, Homogeneous):
+    # Bodies of fog are on one side of a ray or the other: half of the azimuths would not do.
+    even = type(scene.medium) is Homogeneous
+    if method.at_once or not method.uses_kernel or not even:
         return None
     features = scene.features
 

@@ -310,6 +310,7 @@ def _by_extinction(geometry: RayGeometry, segment, extinctions, phase: Phase, li
     if (
         not single
         or light.varies
+        or phase.edge is not None
         or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase)
     ):
         return _over_subsegments(geometry, segment, extinctions, phase, light)
@@ -362,11 +363,16 @@ def path_over_height(s, r, h):
 
 
 def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
-    """Return J for each extinction, by panels, over the pieces where the light is smooth [1/m]."""
-    parts = [
-        _subsegment(geometry, a, b, extinctions, phase, light)
-        for a, b in geometry.smooth_subsegments(light, *segment)
-    ]
+    """Return J for each extinction, by panels, over the pieces where light and phase function
+    are smooth [1/m].
+    """
+    pieces = geometry.smooth_subsegments(light, *segment)
+    if phase.edge is not None:
+        # s = h (E - 1/E)/2, as in `falloff_by_path`.
+        edge = dr.fma(0.5 * (phase.edge - 1 / phase.edge), geometry.height, geometry.foot)
+        cuts = [(a, dr.clip(edge, a, b), b) for a, b in pieces]
+        pieces = [piece for a, cut, b in cuts for piece in ((a, cut), (cut, b))]
+    parts = [_subsegment(geometry, a, b, extinctions, phase, light) for a, b in pieces]
     return [sum(values) for values in zip(*parts)]
 
 

@@ -150,8 +150,9 @@ def quadrature(
 ):
     """Return the airlight integral J by one Gauss-Legendre rule in v = asinh E, d = 1 [1/m].
 
-    The segment is split at the foot (E = 1), where forward lobes end, unless the phase function is
-    isotropic, and at the cone of the beam where a spot falls off between beam and cut-off.
+    The segment is split at the cone of the beam where a spot falls off between beam and cut-off; in
+    the light of others at the foot (E = 1), where forward lobes end, unless the phase function is
+    isotropic or the light is a sample of an area.
 
     Valid for any ray that does not pass through the light, any extinction, vacuum included, and
     `x1` infinite. With 16 nodes and an isotropic phase function the relative error in float32 stays

@@ -35,6 +35,10 @@ from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.light_table import light_choice
 from airlight.realtime.scene.lights import Light
 
+#: The largest fraction of the power: 1, to which float32 rounds, would draw the last light of a
+#: table, dark or not.
+_BELOW_ONE = 1 - 2.0**-24
+
 
 @dataclass(frozen=True)
 class EquiAngular(Method):
@@ -81,7 +85,7 @@ class EquiAngular(Method):
             def sample(at: Any, fraction: Any, table: Any = table, by_power: Any = by_power) -> Any:
                 if by_power is None:  # a light at infinity is a table by itself
                     return _sample(view, table.rows, at)
-                number, probability = by_power.pick(fraction)
+                number, probability = by_power.pick(dr.minimum(fraction, _BELOW_ONE))
                 return _sample(view, table[number], at) / probability
 
             total += self._mean(sample, place, choice, total)

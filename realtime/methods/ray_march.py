@@ -98,6 +98,12 @@ class RayMarch(Method):
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
 
     def _check_together(self) -> None:
+        # The depth of a run of lit steps is the kernel's.
+        if self.depth == "running" and self.sum == "transitions":
+            raise InputError(
+                "depth: got running with sum=transitions, whose integrals have the exact depth; "
+                "expected sum=steps with it"
+            )
         if self.jitter != "none" and self.sum == "transitions":
             raise InputError(
                 f"jitter: got {self.jitter} with sum=transitions, expected sum=steps: a mean of "

@@ -9,7 +9,7 @@ colour C, blended by an amount F of fog, without phase function, paths from ligh
 
 Ls the radiance of a uniform sky and E_k the irradiances of suns. Artists choose C. Here the mean of
 q over the sphere is 1, so that no more light is scattered than there is. Local lights have no term
-in these forms.
+in these forms, and are refused.
 
 - `wenzel`: q = 1. Wenzel 2006 and 2007: the optical depth of an exponential layer in
   closed form, and one colour.
@@ -30,6 +30,7 @@ import drjit as dr
 
 from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.numerics.functions import exp_expm1_bounded
 from airlight.realtime.parameters import parameter
 
 _EXPONENTS = {"wenzel": 0, "quilez": 8, "unreal": 4}  # of the cosine about a sun
@@ -78,12 +79,12 @@ class Unshadowed(Method):
         return self.form != "airlight"
 
     def check(self, scene):
-        """Refuse a fog colour where only local lights are."""
-        if self.form != "airlight" and all(light.w for light in scene.lights):
+        """Refuse a fog colour of local lights."""
+        local = next((light for light in scene.lights if light.w), None)
+        if self.form != "airlight" and local is not None:
             raise InputError(
                 f"form={self.form}: a fog colour has no term for local lights, and the scene has "
-                "no sun; expected a "
-                "'directional' light, or form=airlight"
+                f"one of kind '{local.kind}'; expected 'directional' lights alone, or form=airlight"
             )
 
     def preparation(self, scene):
@@ -115,10 +116,10 @@ class Unshadowed(Method):
         if self.form != "quilez":
             return radiance
         # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel.
-        # Up to tau = 1e-3, where the divisor cancels, the first terms of the quotient's series.
+        # The limit at tau = 0 is 1.
         depths = medium.optical_depth(view, 0, end)
         corrections = [
-            dr.select(tau > 1e-3, dr.minimum(tau, 1) / (1 - dr.exp(-tau)), dr.fma(0.5, tau, 1))
+            dr.select(tau > 0, dr.minimum(tau, 1) / -exp_expm1_bounded(-tau)[1], 1)
             for tau in depths
         ]
         return radiance * medium.colour(corrections)

@@ -38,6 +38,7 @@ from airlight.realtime.scene.light_table import lights_apart
 
 _WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
+_BESIDE = "__airlight_beside__"  # in a module that lies beside a file of the user's: the folder
 
 
 def user_method(name: str) -> type[Method]:
@@ -278,32 +279,72 @@ def _from_path(module_name: str, what: str) -> ModuleType:
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
-    """Import a file under a name of its own, again if it has changed since, as in a notebook."""
+    """Import a file under a name of its own, again if it or a module that it imported from its
+    folder has changed since, as in a notebook.
+    """
     if not path.is_file():
         raise InputError(f"{what}: there is no file {path}; {_WANTED}")
-    # A file is loaded again when its time or size has changed: in a notebook the author edits it
-    # between frames.
+    # A file is loaded again when its time or size has changed, or that of a neighbour: in a
+    # notebook the author edits them between frames.
     place = path.resolve()
-    status = place.stat()
-    stamp = (status.st_mtime_ns, status.st_size)
     key = f"airlight_own_{place.stem}_{abs(hash(str(place))):x}"
     loaded = sys.modules.get(key)
-    if loaded is not None and loaded.__dict__.get("__airlight_stamp__") == stamp:
+    known: dict[Path, Any] = {} if loaded is None else loaded.__dict__["__airlight_stamps__"]
+    if loaded is not None and known and all(_stamp(file) == known[file] for file in known):
         return loaded
     spec = importlib.util.spec_from_file_location(key, place)
     if spec is None or spec.loader is None:
         raise InputError(f"{what}: {path} is not a Python file; {_WANTED}")
     module = importlib.util.module_from_spec(spec)
     # In `sys.modules` before it runs, as imports do; a file that fails leaves nothing there.
-    module.__dict__["__airlight_stamp__"] = stamp
+    stamps = {place: _stamp(place)}
+    module.__dict__["__airlight_stamps__"] = stamps
     sys.modules[key] = module
+    _forget_neighbours(place.parent)
+    before = set(sys.modules)
     try:
         with _imports_from(str(place.parent)):  # its neighbours are there for it, as if it were run
             spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[key]
         raise
+    finally:
+        stamps |= {file: _stamp(file) for file in _marked_neighbours(place.parent, before)}
     return module
+
+
+def _stamp(file: Path) -> tuple[int, int] | None:
+    """Return what changes with a file; None for one that is gone."""
+    try:
+        status = file.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
+def _marked_neighbours(folder: Path, before: set[str]) -> list[Path]:
+    """Mark the modules that were imported from a folder since, and return their files."""
+    files = []
+    for name in set(sys.modules) - before:
+        own = getattr(sys.modules[name], "__dict__", {})
+        file, stem = own.get("__file__"), folder.joinpath(*name.split("."))
+        if file in (f"{stem}.py", str(stem / "__init__.py")):
+            own[_BESIDE] = str(folder)
+            files.append(Path(file))
+    return files
+
+
+def _forget_neighbours(folder: Path) -> None:
+    """Drop the marked modules of a folder, which may have changed, and those of other folders
+    that stand for a module of this one.
+    """
+    for name, module in list(sys.modules.items()):
+        beside = getattr(module, "__dict__", {}).get(_BESIDE)
+        own = folder / name.partition(".")[0]
+        if beside is not None and (
+            beside == str(folder) or Path(f"{own}.py").is_file() or (own / "__init__.py").is_file()
+        ):
+            del sys.modules[name]
 
 
 def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str, Any]]:

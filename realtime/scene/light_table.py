@@ -173,6 +173,11 @@ def alike(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
     return list(map(tuple, several.values()))
 
 
+def by_tables(lights: Sequence[Light]) -> tuple[Light, ...]:
+    """Return lights in the order of their tables, in which `View.lights` has them."""
+    return tuple(light for group in alike(lights) for light in group)
+
+
 def lights_apart(tables: Iterable[LightTable], *, by_source: bool) -> Iterator[LightTable]:
     """Yield each light as a table by itself; `by_source`: the samples of an area light together."""
     for table in tables:

@@ -37,6 +37,7 @@ class Phase:
     polynomial: ClassVar[tuple[float, ...] | None] = None
     #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
     scale: ClassVar[float] = 1.0
+    edge: ClassVar[float | None] = None  #: the E at which it jumps; None: nowhere
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value [1] from `down`, sin^2, and `up`, cos^2 of half the
@@ -408,6 +409,7 @@ class ModifiedMie(Mie):
     left: float = 1.0  #: fraction of the light beyond five degrees
 
     name = "mie-modified"
+    edge: ClassVar[float] = math.tan(math.radians(0.5 * CUT))
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
@@ -497,8 +499,9 @@ def tabulated(values) -> Tabulated:
     below = host < 0.5 * host[-1]
     cosine = np.linspace(-1.0, 1.0, len(host))[np.flatnonzero(below)[-1]] if below.any() else -1.0
     lobe = min(math.sqrt((1 - cosine) / max(1 + cosine, 1e-6)), 1.0)
-    # Rules may leave 1e-3: a table leaves more between its entries.
-    eager = Tabulated(ArrayXf64(host))
+    # Rules may leave 1e-3: a table leaves more between its entries. Where it has next to nothing,
+    # they may leave 1e-3 of the mean, 1: the end of a lobe in a panel would have no relative error.
+    eager = Tabulated(ArrayXf64(host + (host.min() < 1e-2)))
     return Tabulated(values, lobe, reach_of(eager.evaluate_half, (lobe, 1.0), 1e-3))
 
 
@@ -510,7 +513,7 @@ def _droplets(
     table = droplet_table(radius, gamma, wavelength)
     eager, entries = Mie(ArrayXf64(table.entries), table.peak), Float(table.entries)
     modified = name == ModifiedMie.name
-    lobe = math.tan(math.radians(0.5 * CUT)) if modified else table.peak
+    lobe = ModifiedMie.edge if modified else table.peak
     reach = reach_of(eager.evaluate_half, (lobe, 1.0), 1e-5)
     if modified:
         return ModifiedMie(entries, lobe, reach, 1 - fraction_cut(radius, gamma, wavelength))

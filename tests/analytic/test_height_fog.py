@@ -189,6 +189,12 @@ def test_a_high_cap_an_empty_layer_and_a_low_clamp_change_nothing():
             assert close(replace(ray, fog=same).airlight(), value, 3e-9)
 
 
+def test_a_base_above_the_cap_is_a_constant_up_to_it():
+    far, none = HeightFog((Layer(0.01, 150.0, 0.05),), 0.0, True, 0.0, 100.0), HeightFog((), 0.01)
+    heights = np.array([-3.0, 0.0, 40.0, 100.0, 120.0])
+    assert far.column(heights) == pytest.approx(replace(none, floor=0.0, cap=100.0).column(heights))
+
+
 def _lowered(layer: Layer) -> Layer:
     """The same layer by a base below everything."""
     return Layer(

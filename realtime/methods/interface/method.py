@@ -283,7 +283,7 @@ class Method(Parameters):
 
     def preparation(self, scene: Scene) -> Preparation:
         """Return a function that makes the state of all lights; constant data of
-        the scene are read here.
+        the scene are read here. Scenes have their lights in the order of `View.lights`.
         """
         if self.by_table or not scene.features.shadows:
             return no_state

@@ -82,7 +82,7 @@ class PlanePreparation:
     occluders: Occluders
 
     def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
-        """Return the planes of every light of a scene."""
+        """Return the planes of every light of a scene, in the order of `View.lights`."""
         occluders, camera = (
             with_positions(self.occluders, scene.positions),
             read_camera(scene.camera),

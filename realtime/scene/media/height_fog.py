@@ -181,15 +181,19 @@ class HeightFog(VaryingMedium):
         # By layer -log(1 - c T/s)/c, c = rise/H: T/s where c T/s is small, and no length where the
         # layer thins out before it has the depth T. The first layer to reach T decides.
         for layer in self.layers:
-            fraction = depth / (layer.sigma_t * self._fall(layer, z))
-            c = rise / layer.scale_height
+            even = fraction = depth / (layer.sigma_t * self._fall(layer, z))
+            c, to_base = rise / layer.scale_height, type(z)(0)
+            if self.clamped:
+                # A ray that rises has the density of the base up to there, and bends beyond it.
+                to_base = dr.select(rise > 0, dr.maximum((layer.base - z) / rise, 0), 0)
+                fraction = fraction - to_base
             bend = c * fraction
-            # From below the base a clamped layer grows no faster than at the base.
-            grown = dr.select(
+            grown = to_base + dr.select(
                 dr.abs(bend) < 1e-3, fraction, dr.select(bend < 1, -dr.log(1 - bend) / c, dr.inf)
             )
             if self.clamped:
-                grown = dr.select((z < layer.base) | (rise < 0), fraction, grown)
+                # Downwards a layer has at least the density of the beginning.
+                grown = dr.select((fraction < 0) | (rise < 0), even, grown)
             longest = dr.minimum(longest, grown)
         return longest
 

@@ -18,7 +18,7 @@ import drjit as dr
 
 from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded
+from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.integrate import Node, Start, integral, panel_nodes
 from airlight.realtime.scene.phase import Phase
@@ -177,7 +177,8 @@ class Medium(ABC):
         """Return the light of a constant field of radiance 1 in the medium up to a distance
         [m], RGB: 1 - exp(-tau).
         """
-        return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))
+        depths = self.optical_depth(rays, 0, distance)
+        return self.albedo * self.colour([-exp_expm1_bounded(-depth)[1] for depth in depths])
 
     def check_beam(self, axis, name: str) -> None:
         """Refuse a light at infinity along a unit vector, on the host, that

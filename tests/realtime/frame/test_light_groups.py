@@ -25,10 +25,10 @@ from airlight.realtime.scene.light_table import light_choice, light_tables, samp
 from airlight.validation.scenes.meshes import rotation
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers import frames
-from tests.helpers.area_lights import BLACK, fog, lamp, lit_scene, ring
+from tests.helpers.area_lights import BLACK, NULL, fog, lamp, lit_scene, ring
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.lamps import area_lamp, lit_by
-from tests.helpers.scenes import tiny_scene
+from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
 
 SIZE = (32, 24)
@@ -341,3 +341,13 @@ def test_what_is_in_the_shadow_of_a_sphere_light_stays_dark(variant):
         "bsdf": BLACK,
     }
     assert render(beside_a_sphere(box=box), "shadow-planes", points=16).airlight.max() < 1e-6
+
+
+def test_a_sphere_light_over_a_body_of_fog_is_that_of_its_samples(variant):
+    """A body lies on one side of a ray: places on half of the sphere are wrong by 91 %."""
+    light = lamp("sphere", bsdf=NULL, center=[-0.8, 0.4, 2.3], radius=0.7)
+    body = fog_sphere((-0.8, 0.4, 0.7), 0.6, sigma_t=3.0)
+    made = frames.renderer(clear_scene(size=(8, 6), lamp=light, body=body), "unshadowed", points=64)
+    samples = render_frame(replace(made, sphere_scales=None)).airlight
+    assert samples.max() > 0
+    assert relative_rmse(render_frame(made).airlight, samples) < 0.03

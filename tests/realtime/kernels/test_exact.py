@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import Rayleigh
+from airlight.analytic.phase import Isotropic, Rayleigh, Tabulated
 from airlight.realtime.kernels.exact import exact, panels_mean, path_interval
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.numerics.array_types import aligned_array, array_types
 from airlight.realtime.rays import RayGeometry, ray_geometry
 from airlight.realtime.scene.lights import Light, spot_fields
 from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import named_phase
 from airlight.realtime.scene.rule_reach import PANEL_NODES
 from airlight.validation.kernels.case_files import read_cases
 from airlight.validation.kernels.cases import integrate_cases
@@ -240,6 +241,18 @@ def test_what_the_rule_of_panels_leaves_without_rounding(name):
     assert np.abs(rule[long_enough] / reference[long_enough] - 1).max() < LEFT
 
 
+@pytest.mark.parametrize("table", [(0.0, 0.0, 1.0), (1e-9, 1e-9, 1.0)])
+def test_a_table_that_is_nothing_on_one_side(table):
+    """A rule that is judged by its error over nothing, 0/0, passes as right however wide it is."""
+    rays, host = many_rays(1000, 5), Tabulated(table)
+    values = array_types("single").scalar(host(np.linspace(-1, 1, len(table))))
+    phase = named_phase("tabulated", values=values)
+    expected, even = (airlight_segments(*rays, each)[0] for each in (host, Isotropic()))
+    error = np.abs(kernel_values(exact, rays, phase) - expected) / (expected + even + 1e-37)
+    assert error.max() < 2e-3
+    assert max(phase.reach.few, phase.reach.width) < 0.2
+
+
 # Certified values, in both precisions -------------------------------------------------------------
 
 
@@ -311,3 +324,18 @@ def test_quadrature(variant, feet, kernel, precision, phases, bound):
 def test_exact_in_fog_of_droplets(variant, data_folder, precision, allowed):
     cases = read_cases(data_folder / DROPLETS)
     assert integrate_cases(cases, "exact", precision) == pytest.approx(cases.value, rel=allowed)
+
+
+def test_exact_across_the_edge_of_droplets_without_their_peak():
+    """The function jumps from 0 to its largest value: panels and short segments end there."""
+    rng = np.random.default_rng(1)
+    foot, height = rng.uniform(0.5, 8, 40), 10 ** rng.uniform(-2, 0.5, 40)
+    x1 = np.where(rng.random(40) < 0.5, np.inf, rng.uniform(0.3, 12, 40))
+    rays, words = (
+        single_precision(foot, height, np.zeros(40), x1, np.full(40, 0.1)),
+        "mie-modified:2:8",
+    )
+    expected = true_values(rays, words)
+    for precision, allowed in (("single", 1e-4), ("double", 1e-6)):
+        values = kernel_values(exact, rays, words, precision=precision)
+        assert np.max(np.abs(values - expected) / (expected + 1e-6 * expected.max())) < allowed

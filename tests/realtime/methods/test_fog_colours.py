@@ -109,6 +109,11 @@ def test_local_lights_alone_are_refused(scene):
         shown(scene(LAMP), "unreal")
 
 
+def test_a_local_light_beside_a_sun_is_refused(scene):
+    with pytest.raises(InputError, match="and the scene has one of kind 'point'"):
+        shown(scene(SUN, LAMP), "wenzel")
+
+
 @pytest.mark.slow
 @pytest.mark.claim("fog-colours", tolerance="a factor of 2 to 8 in the mean")
 def test_ambient_light_over_ground_is_too_bright(scene):

@@ -13,12 +13,14 @@ from airlight.errors import InputError
 from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer
-from airlight.realtime.methods.interface.method import Layers
+from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.scene.animate import coloured_light
 from airlight.realtime.scene.media.medium import Medium
 from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.parts import mitsuba_mesh
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers.frames import read, relative_rmse, render
+from tests.helpers.occluders import closed_sphere
 from tests.helpers.scenes import spot, tiny_scene
 from tests.helpers.veil import Veil
 
@@ -90,6 +92,77 @@ def test_a_method_that_casts_no_rays_and_asks_for_one_is_told_so(scene):
 
     with pytest.raises(InputError, match="the method says that it casts no rays"):
         frame(scene, Asks)
+
+
+def lights_of_two_kinds(**changes):
+    """A spot between two point lights: a frame has them in another order than the scene."""
+    other = {
+        "type": "point",
+        "position": [-1.1, -0.6, 1.2],
+        "intensity": {"type": "rgb", "value": [1.0, 4.0, 2.0]},
+    }
+    scene = read(tiny_scene(spot=spot(beam=21.0), other=other, **changes))
+    assert [light.kind for light in scene.lights] == ["point", "spot", "point"]
+    return scene
+
+
+def test_states_of_lights_that_come_at_once_belong_to_their_lights(variant):
+    @dataclass(frozen=True)
+    class Told(Method):
+        name = "told"
+        at_once = True
+        uses_kernel = False
+
+        def prepare(self, scene, light):
+            return light.intensity
+
+        def airlight(self, view, light, state, kernel):
+            return dr.abs(state - light.intensity) + 0 * view.distance
+
+    assert np.max(render(lights_of_two_kinds(), Told).airlight) == 0
+
+
+@pytest.mark.parametrize("once", [True, False])
+def test_what_a_user_s_own_preparation_makes_belongs_to_the_lights_of_its_view(variant, once):
+    """Also for what it reads before all frames, and where a light is moved from frame to frame."""
+
+    @dataclass(frozen=True)
+    class Own(Method):
+        name = "own"
+        at_once = once
+        uses_kernel = False
+
+        def preparation(self, scene):
+            kinds = [light.kind for light in scene.lights]
+
+            def places(now):
+                several = len(now.lights) == len(kinds)
+                assert not several or [light.kind for light in now.lights] == kinds
+                return tuple(light.position + 0 for light in now.lights)
+
+            return places
+
+        def render(self, view, state, kernel):
+            away = [dr.norm(a - b.position) for a, b in zip(state, view.lights, strict=True)]
+            return Layers(view.medium.albedo * (dr.sum(away) + 0 * view.distance))
+
+    scene = lights_of_two_kinds()
+    moved = {"camera_moved": False, "geometry_moved": False, "light_moved": True}
+    made, cache = frame_renderer(scene, Own), None
+    for step in range(3):
+        last = scene.lights[-1]
+        lights = (*scene.lights[:-1], replace(last, position=last.position + 0.1 * step))
+        stages, cache = next_frame(made, replace(scene, lights=lights), cache, **moved)
+        assert np.max(image_frame(made, stages).airlight) == 0
+
+
+def test_planes_of_lights_in_one_buffer_belong_to_their_lights(variant):
+    """Ambient light puts all lights into one group."""
+    scene = lights_of_two_kinds(ball=mitsuba_mesh("ball", closed_sphere(), (0.3, 0.4, 0.5)))
+    alone, together = (
+        render(scene, "shadow-planes-2006", ambient=each).airlight for each in (0.0, 1e-9)
+    )
+    assert relative_rmse(together, alone) < 1e-6
 
 
 # A medium of two functions ------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import t as student
 
 from airlight.realtime.frame.image import render_frame
+from airlight.realtime.methods.interface.method import View
 from airlight.realtime.methods.registry import find_method
 from tests.helpers.frames import reference_of, renderer
 from tests.helpers.scenes import spot, tiny_scene
@@ -107,3 +108,16 @@ def test_surfaces_are_lit_by_many_lights_as_they_are_by_each(variant):
     )
     assert np.max(each) > 0
     np.testing.assert_allclose(many, each, rtol=1e-5, atol=1e-7)
+
+
+def test_the_largest_random_number_draws_no_dark_light(variant, monkeypatch):
+    """Of 64 samples the last has the fraction (63 + c)/64 of the power, which float32 rounds to 1;
+    the last light of the table is switched off.
+    """
+    largest = 1 - 2.0**-24
+    monkeypatch.setattr(View, "pattern", lambda self, *words, **how: type(self.distance)(largest))
+    off = {"type": "point", "position": [0.5, 0.9, 1.9], "intensity": {"type": "rgb", "value": 0.0}}
+    scene = tiny_scene(size=(8, 6), ball=None, floor=None, off=off)
+    frame = render_frame(renderer(scene, find_method("equi-angular"), samples=64))
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight.min() > 0

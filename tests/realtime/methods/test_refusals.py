@@ -52,6 +52,11 @@ from tests.helpers.lamps import lamp_scene
             {"jitter": "white", "sum": "transitions"},
             "jitter: got white with sum=transitions",
         ),
+        (
+            "ray-march",
+            {"depth": "running", "sum": "transitions"},
+            "depth: got running with sum=transitions",
+        ),
         ("ray-march", {"animate": "golden"}, "animate: got golden without jitter"),
     ],
 )

@@ -13,6 +13,7 @@ from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import find_method
+from airlight.realtime.methods.user_method import user_object
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.parameters import defaults
 from airlight.realtime.scene.read_scene import read_scene
@@ -221,6 +222,27 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
             "'not_there_for_tests'"
         ):
             find_method(f"{module}:f")
+
+
+def test_a_file_has_its_own_neighbours_as_they_are_now(tmp_path):
+    """Two folders have a module of one name, and one of them is edited, also after a failure."""
+
+    def shown(folder):
+        return user_object(f"{folder}/fog.py:value", "method")
+
+    first, second = tmp_path / "first", tmp_path / "second"
+    for number, folder in enumerate((first, second)):
+        folder.mkdir()
+        (folder / "fog.py").write_text("import tones_beside\nvalue = tones_beside.value\n")
+        (folder / "tones_beside.py").write_text(f"value = {number}\n")
+    assert [shown(folder) for folder in (first, second, first)] == [0, 1, 0]
+    (first / "tones_beside.py").write_text("value = 12345\n")
+    assert [shown(folder) for folder in (first, second)] == [12345, 1]
+    (first / "fog.py").write_text("import tones_beside\nvalue = 1 / tones_beside.zero\n")
+    with pytest.raises(InputError, match="has no attribute 'zero'"):
+        shown(first)
+    (first / "tones_beside.py").write_text("zero = 0.5\n")
+    assert shown(first) == 2
 
 
 def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):

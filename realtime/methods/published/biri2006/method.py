@@ -309,7 +309,7 @@ class PaperPreparation:
         return () if self.order == "exact" else tuple(self.occluders.warnings)
 
     def __call__(self, scene: Scene) -> tuple[PaperPlanes, ...]:
-        """Return the planes of every light of a scene."""
+        """Return the planes of every light of a scene, in the order of `View.lights`."""
         occluders, camera = (
             with_positions(self.occluders, scene.positions),
             read_camera(scene.camera),

@@ -5,12 +5,19 @@ plain sums share no code.
 
 from functools import partial
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.scene.closed_mesh import Bounds
+from airlight.realtime.scene.media.bounded import BoundedMedia
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import Isotropic
+from airlight.realtime.scene.read_media import make_bounded_medium
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
@@ -231,6 +238,23 @@ def test_an_ambient_field_fills_bounded_media(variant):
     chord = far - near
     expected = 0.3 * np.array([0.9, 0.4, 0.3]) * (1 - np.exp(-0.7 * chord))[:, None]
     assert gain.reshape(-1, 3) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("sigma_t", [1e-7, 1e-3])
+def test_thin_fog_keeps_the_digits_of_an_ambient_field(variant, sigma_t):
+    types = array_types("single")
+    fog, vacuum = (
+        Homogeneous((dr.opaque(types.scalar, each),), types.color(1), Isotropic())
+        for each in (sigma_t, 0.0)
+    )
+    no_planes = np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3))
+    ball = make_bounded_medium(fog, Bounds("ball", *no_planes, np.array([5.0, 0, 0]), 2.0), types)
+    within = BoundedMedia(*vars(vacuum).values(), bounded_media=(ball,), clear=True)
+    for medium, begin in ((fog, 0.0), (within, 3.0)):
+        rays = medium.rays(types.vector(0), types.vector(1, 0, 0))
+        for distance in (3.25, 6.5):
+            found = np.array(medium.ambient(rays, types.scalar(distance)), dtype=np.float64)
+            assert found == pytest.approx(-np.expm1(-sigma_t * (distance - begin)), rel=2e-6)
 
 
 @pytest.mark.claim("bounded-media-of-methods", tolerance="relative RMSE 1e-5 to 1e-4, by scene")

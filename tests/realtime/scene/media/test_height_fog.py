@@ -5,6 +5,7 @@ reference, and refusals.
 
 from dataclasses import replace
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from airlight.realtime.rays import ray_geometry
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.height_fog import HeightFog, Layer, phi
 from airlight.realtime.scene.media.medium import LitRays
-from airlight.realtime.scene.phase import HenyeyGreenstein
+from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
@@ -212,6 +213,26 @@ def frame(scene, method, kernel="exact", **parameters):
     return render_frame(
         frame_renderer(read_scene(scene), METHODS[method], kernel=find_kernel(kernel), **parameters)
     )
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_rays_end_where_nothing_is_left(variant, clamped):
+    """Below and above the base, up, level and down: an end that is given has the depth."""
+    types, depth = array_types("double"), 20.0
+    start, rise = (
+        types.scalar(grid.ravel())
+        for grid in np.meshgrid([-40.0, -1.0, 0.5, 9.0], [-0.9, -0.1, 0.0, 0.02, 0.3, 1.0])
+    )
+    up, number = types.vector(0, 0, 1), types.scalar
+    layers = tuple(Layer(*map(number, each)) for each in ((0.05, 0.0, 5.0), (0.002, 3.0, 900.0)))
+    medium = HeightFog(
+        layers, number(0), clamped, number(-1e6), number(1e6), up, types.color(1), Isotropic()
+    )
+    rays = medium.rays(up * start, types.vector(dr.sqrt(1 - rise * rise), 0, rise))
+    length = medium.length_from(rays, number(0), depth)
+    (found,) = medium.optical_depth(rays, number(0), dr.minimum(length, 1e6))
+    assert np.all((np.array(found) > depth * (1 - 1e-3)) | np.isinf(np.array(length)))
+    assert np.isfinite(np.array(length)).any()
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
