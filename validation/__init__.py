@@ -27,6 +27,4 @@ Read in this order:
 - `check/`: relations between frames, which need no reference;
 - `motion/`: independent renders and sequences of frames: bias apart from
   noise, flicker, lag, ghosts.
-
-`baselines/` holds what `airlight study scaling` measured once.
 """

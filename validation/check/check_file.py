@@ -59,6 +59,19 @@ FALLOFFS: dict[str, Callable[[Array, float], Array]] = {
     "cosine-smooth": _cosine_smooth,
     "linear": _linear,
 }
+_RIM = "rim:"  # and a power k: 1 - ((1 - c)/(1 - c of the edge))^k
+
+
+def _falloff(words: str) -> Callable[[Array, float], Array] | None:
+    """Return the falloff of a word; None for a word that is none."""
+    if not words.startswith(_RIM):
+        return FALLOFFS.get(words)
+    try:
+        power = float(words.removeprefix(_RIM))
+    except ValueError:
+        return None
+    # `_cosine` is the rest of (1 - c)/(1 - c of the edge) to 1.
+    return (lambda c, cone: 1 - (1 - _cosine(c, cone)) ** power) if 0 < power < math.inf else None
 
 
 @dataclass(frozen=True)
@@ -112,13 +125,21 @@ class Camera:
 
     def sensitivity(self, width: int, height: int) -> Array:
         """Return the weight of each pixel within the cone: 1 on the axis, 0 from its edge on."""
-        if self.cone is None or self.falloff not in FALLOFFS:
+        law = _falloff(self.falloff)
+        if self.cone is None or law is None:
             raise InputError(
                 f"cameras: got a cone of {self.cone} and the falloff {self.falloff!r}; expected "
-                f"degrees, and one of {', '.join(FALLOFFS)}"
+                f"degrees, and one of {', '.join(FALLOFFS)}, {_RIM}POWER"
+            )
+        # A cone that the frame cuts off has no whole sum.
+        shown = math.degrees(math.atan(self._half() * min(1.0, height / width)))
+        if not 0 < self.cone <= shown:
+            raise InputError(
+                f"cameras: got a cone of {self.cone:g} degrees in a frame that shows {shown:.4g} to "
+                "its nearest edge; expected a frame that holds all of the cone"
             )
         x, y = self._plane(width, height)
-        return FALLOFFS[self.falloff](1 / np.sqrt(1 + x * x + y * y), math.radians(self.cone))
+        return law(1 / np.sqrt(1 + x * x + y * y), math.radians(self.cone))
 
     def solid_angles(self, width: int, height: int) -> Array:
         """Return the solid angle of each pixel [sr]."""

@@ -28,7 +28,13 @@ import numpy as np
 from airlight.errors import InputError, nearest
 from airlight.validation.arrays import Array
 from airlight.validation.check.check_file import Asked
-from airlight.validation.check.relations import RELATIONS, SIGNATURES, Sides, block_means
+from airlight.validation.check.relations import (
+    RELATIONS,
+    SIGNATURES,
+    TOTAL,
+    Sides,
+    block_means,
+)
 from airlight.validation.columns import column
 
 BLOCK = 8  #: pixels on a side of a block, in images of 8 blocks or more
@@ -56,7 +62,10 @@ class Kept:
         "pixels",
         "column and row of the block with the largest error, where there is one",
     )
-    points_to: str = column("points to", meaning="what is likely wrong where a relation fails")
+    points_to: str = column(
+        "points to",
+        meaning="what is likely wrong where a relation fails, or why it cannot be told",
+    )
 
     @property
     def fails(self) -> bool:
@@ -77,23 +86,35 @@ def judge(
 
     `asked`: the relations; `frames`: layers by name, (height, width, 3), of each frame by name;
     `again`: two frames of one input; `rounding`: of a value, relative; `layer`: to judge in all
-    relations, by default that of each; `margin`: an error that is no fault, whatever made it.
+    relations that name none, by default that of each; `margin`: an error that is no fault, whatever
+    made it.
 
     Raises InputError for frames of other sizes, or without a layer that a relation needs.
     """
-    for each in asked:
-        _check(each)
     twice = (Asked("again", tuple(again)),) if again else ()
+    for each in (*twice, *asked):
+        _check(each)
     found: list[Kept] = []
     floors: dict[str, float] = {}
     for each in (*twice, *asked):
         relation = RELATIONS[each.name]
-        judged = layer or each.layer or relation.layer
+        # A layer that is named must be there; the usual one gives way to all light.
+        named = each.layer or layer
+        judged = named or _usual_layer(each, frames)
+        values = _layers(each, frames, judged)
+        if relation.alone and not named and judged != relation.layer:
+            why = (
+                f"frames have no layer {relation.layer}, of which alone it holds: write it, or "
+                "name the layer of these frames in check.json"
+            )
+            found.append(Kept(each.name, UNKNOWN, None, None, None, "", why))
+            continue
         for pair in twice:
             if judged not in floors:
-                sides = RELATIONS["again"].sides(_layers(pair, frames, judged), pair)
+                is_there = all(judged in frames[name] for name in pair.frames)
+                own = judged if is_there else _usual_layer(pair, frames)
+                sides = RELATIONS["again"].sides(_layers(pair, frames, own), pair)
                 floors[judged] = block_errors(sides).error
-        values = _layers(each, frames, judged)
         floor = floors.get(judged, 0.0)
         found.append(
             _answer(each, relation.sides(values, each), floor, rounding * len(values), margin)
@@ -118,16 +139,28 @@ def _check(asked: Asked) -> None:
         )
     if not (math.isfinite(asked.factor) and asked.factor > 0):
         raise InputError(f"{asked.name}: got the factor {asked.factor:g}, expected one above 0")
+    if len(asked.value) not in (0, 1, 3) or not all(0 <= each < math.inf for each in asked.value):
+        raise InputError(
+            f"{asked.name}: got the value {list(asked.value)}, expected one radiance or three from 0 on"
+        )
+
+
+def _usual_layer(asked: Asked, frames: Mapping[str, Mapping[str, Array]]) -> str:
+    """Return the layer that a relation judges where none is named: all light where a frame lacks
+    its own, and that layer where a frame lacks all light too.
+    """
+    usual, chosen = RELATIONS[asked.name].layer, [frames[name] for name in asked.frames]
+    is_there, is_total = (all(layer in each for each in chosen) for layer in (usual, TOTAL))
+    return TOTAL if is_total and not is_there else usual
 
 
 def _layers(asked: Asked, frames: Mapping[str, Mapping[str, Array]], layer: str) -> list[Array]:
-    """Return a layer of the frames of a relation; all light where a frame has nothing else."""
+    """Return a layer of the frames of a relation."""
     chosen = [frames[name] for name in asked.frames]
-    wanted = layer if all(layer in each for each in chosen) else "total"
     for name, each in zip(asked.frames, chosen):
-        if wanted not in each:
+        if layer not in each:
             raise InputError(f"{name}: has no layer {layer}; it has {', '.join(each)}")
-    values = [np.asarray(each[wanted], dtype=np.float64) for each in chosen]
+    values = [np.asarray(each[layer], dtype=np.float64) for each in chosen]
     sizes = {value.shape for value in values}
     if len(sizes) > 1 and asked.name not in ("size", "pan", "reciprocity"):
         raise InputError(f"{asked.name}: its frames have other sizes: expected one size")
@@ -210,6 +243,17 @@ def block_errors(sides: Sides) -> BlockErrors:
 
 
 def signature(found: Sequence[Kept]) -> str:
-    """Return what the failing relations say together; empty where that is nothing in common."""
+    """Return what the failing relations say together; empty where that is nothing in common.
+
+    A larger set is as likely where nobody asked the rest of it, or nothing was told.
+    """
     failing = {each.name for each in found if each.fails}
-    return next((words for names, words in SIGNATURES if names <= failing), "")
+    untold = RELATIONS.keys() - {each.name for each in found if each.verdict == HOLDS}
+    first = next((names for names, _ in SIGNATURES if names <= failing), None)
+    if first is None:
+        return ""
+    return ", or ".join(
+        words
+        for names, words in sorted(SIGNATURES, key=lambda each: len(each[0]))
+        if first <= names <= failing | untold
+    )

@@ -65,6 +65,7 @@ class Relation:
     sides: Callable[[Sequence[Array], Asked], Sides]
     frames: tuple[int, ...] = (2,)  #: how many it may take
     layer: str = AIRLIGHT  #: the layer that is judged where frames have layers
+    alone: bool = False  #: whether it holds for that layer alone, and not for all light
 
 
 def _same(frames: Sequence[Array], asked: Asked) -> Sides:
@@ -239,6 +240,7 @@ RELATIONS: dict[str, Relation] = {
             "opacity that is applied twice (a ratio of 2 in the place of 1), a density that is squared",
             _thinned,
             (3,),
+            alone=True,
         ),
         Relation(
             "depths-multiply",
@@ -246,11 +248,13 @@ RELATIONS: dict[str, Relation] = {
             _multiplied,
             (3,),
             layer=SURFACE,
+            alone=True,
         ),
         Relation(
             "albedo",
             "an albedo that is decoded as a colour, or that changes the extinction",
             _scaled,
+            alone=True,
         ),
         Relation(
             "exposure",

@@ -26,6 +26,7 @@ from airlight.validation.engine.transforms import (
     WINDOWS,
     reordered,
 )
+from airlight.validation.fog_model.laws import Falloff
 from airlight.validation.fog_model.radiance import Colour, Fog, Path, PhaseLaw, colour, put
 
 
@@ -149,7 +150,8 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return the guess with all lengths times a factor: paths grow with it, and light from
     points falls as its square.
 
-    Irradiance and radiance, of lights that are far or have extent, are what they were.
+    Irradiance and radiance, of lights that are far or have extent, are what they were. Lengths of an
+    engine's equation stay, and are p times shorter in the metres of the scene.
     """
     # Lengths times p: depths are sigma_t p times the old lengths, and 1/r^2 of point and spot
     # lights, which come first, is p^-2 times what it was.
@@ -159,7 +161,25 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         for light, value in enumerate(guess.fog.intensity)
     )
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[0], albedo))
-    return replace(guess, fog=replace(fog, intensity=intensity))
+    first, second = (_at_times(law, p[0]) for law in fog.law)
+    fog = replace(
+        fog,
+        intensity=intensity,
+        law=(first, second),
+        window=_at_times(fog.window, p[0]),
+        corners=tuple(each / p[0] for each in fog.corners),
+        light_length=fog.light_length / p[0],
+        near=fog.near / p[0],
+        far=fog.far / p[0],
+        fade=None if fog.fade is None else (fog.fade[0] / p[0], fog.fade[1] / p[0]),
+        lobe=None if fog.lobe is None else (fog.lobe[0], fog.lobe[1] / p[0]),
+    )
+    return replace(guess, fog=fog)
+
+
+def _at_times(law: Falloff | None, times: float) -> Falloff | None:
+    """Return a law by the distance at so many times the distance; 1 is the law itself."""
+    return law if law is None or times == 1 else lambda r: law(times * r)
 
 
 def _falling(predictor: Predictor, guess: Guess, p: Values) -> Guess:

@@ -102,6 +102,7 @@ def layered_reference(
         "airlight_se": reference.airlight_se,
         "surface_se": reference.surface_se,
         "emitted": reference.emitted,
+        "emitted_se": reference.emitted_se,
     }
     layers |= {layer: values for layer, values in extent.items() if values is not None}
     made: dict[str, str | int | float] = {

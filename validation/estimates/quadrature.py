@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The layers of a reference, each with its error: proven, estimated or statistical."""
 
+import math
+
 import numpy as np
 
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.storage.exr import TOTAL
-from airlight.validation.arrays import Array
-from airlight.validation.statistics.estimate import UNKNOWN, Estimate, Kind
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.statistics.estimate import INTERVAL, UNKNOWN, Estimate, Kind
 
 
 def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
@@ -25,17 +27,20 @@ def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = Tr
     return total if reference.emitted is None or not emitted else total + reference.emitted
 
 
-def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
-    """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without
-    area lights, where it is 0.
+def reference_error(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array | None:
+    """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None where nothing is
+    sampled; `emitted`: see `reference_layer`.
 
-    Airlight and surface are sampled independently: their variances add up to that of the total.
-    The emission of lights is exact.
+    That of the total is the root of the sum of the variances of its parts. The parts share their
+    positions and seeds; their covariance is left out. The emission of lights is exact along a ray;
+    its mean over a pixel has a standard error.
     """
     if reference.airlight_se is None or reference.surface_se is None:
         return None
     if layer == TOTAL:
-        return np.hypot(reference.airlight_se, reference.surface_se)
+        both = np.hypot(reference.airlight_se, reference.surface_se)
+        seen = reference.emitted_se if emitted else None
+        return both if seen is None else np.hypot(both, seen)
     return np.asarray(getattr(reference, f"{layer}_se"))
 
 
@@ -55,14 +60,15 @@ def stated_error(reference: ReferenceImage, layer: str) -> tuple[Array, Kind] | 
     return reference.airlight_error + reference.surface_error, "estimated"
 
 
-def known_to(reference: ReferenceImage, layer: str) -> Estimate:
+def known_to(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Estimate:
     """Return the mean of a layer, and the mean error of its pixels, where these
-    are finite [W/(m^2 sr)].
+    are finite [W/(m^2 sr)]; `emitted`: see `reference_layer`.
 
     It is proven or estimated as `stated_error` says, and statistical where lights or positions are
     sampled: a standard error and the stated error together then.
     """
-    values, sampled = reference_layer(reference, layer), reference_error(reference, layer)
+    values = reference_layer(reference, layer, emitted=emitted)
+    sampled = reference_error(reference, layer, emitted=emitted)
     stated = stated_error(reference, layer)
     kind: Kind = "estimated" if stated is None else stated[1]
     errors = np.zeros_like(values) if stated is None else stated[0]
@@ -71,10 +77,34 @@ def known_to(reference: ReferenceImage, layer: str) -> Estimate:
     finite = np.isfinite(values) & np.isfinite(errors)
     if not finite.any():
         return UNKNOWN
-    unknown = stated is None and sampled is None
-    return Estimate(
-        float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind
-    )
+    error = None if stated is None else float(errors[finite].mean())
+    return Estimate(float(values[finite].mean()), error, kind)
+
+
+def off_by(
+    reference: ReferenceImage, layer: str, *, emitted: bool = True, mask: Bools | None = None
+) -> tuple[float, float]:
+    """Return by how much the mean of a layer may be off, and the root mean square of that of its
+    values, both over the mean [1]; infinite where it is not known.
+
+    Standard errors count twice, as in intervals of 95 %. They are independent from pixel to pixel,
+    and dependent in the channels of one. `emitted`: see `reference_layer`; `mask`: which pixels
+    count, (height, width), all by default.
+    """
+    values = reference_layer(reference, layer, emitted=emitted)
+    stated = stated_error(reference, layer)
+    if stated is None:
+        return math.inf, math.inf
+    sampled = reference_error(reference, layer, emitted=emitted)
+    drawn = np.zeros_like(values) if sampled is None else INTERVAL * sampled
+    finite = np.isfinite(values + stated[0] + drawn)
+    finite &= True if mask is None else np.asarray(mask, dtype=bool)[:, :, None]
+    light = float(values[finite].sum())
+    if not light > 0:
+        return math.inf, math.inf
+    pooled = float(np.linalg.norm(np.where(finite, drawn, 0.0).sum(axis=2)))
+    root = float(np.sqrt(((stated[0] + drawn)[finite] ** 2).mean()))
+    return (float(stated[0][finite].sum()) + pooled) / light, root * int(finite.sum()) / light
 
 
 def known_words(estimate: Estimate) -> str:

@@ -40,6 +40,10 @@ from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.scenes.models import model_line, model_parts, model_words
 
+# An albedo is called above 1 from here on: beside what its interval says, samples of area lights,
+# and rays that stand for a pixel, err by half a per cent.
+_ALBEDO = 1.005
+
 
 @dataclass(frozen=True)
 class Fitted:
@@ -73,6 +77,8 @@ class Fit:
     failures: tuple[str, ...] = ()
     note: str = ""  #: what the reader of the file changed or left out, such as other primaries
     model: Mapping[str, str] | None = None  #: name and terms of an equation that is not physical
+    #: values that no fog has, and what these mean
+    doubts: tuple[str, ...] = ()
 
     @property
     def lines(self) -> list[str]:
@@ -103,6 +109,7 @@ class Fit:
             for each in self.parameters
             if each.high is None and each.low is not None and each.name not in held
         ]
+        lines += [f"{words}." for words in self.doubts]
         lines += [f"Failed: {reason}." for reason in self.failures]
         lines += [f"The file: {self.note}."] if self.note else []
         lines.append(f"The fit took {self.seconds:.2g} s.")
@@ -319,6 +326,27 @@ def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], solved:
         usual_size(relative) if relative.size else math.nan,
         tuple(confounded(group, unknowns, inner, lengths, what[2]) for group in groups),
         math.nan,
+        doubts=_doubts(rows, unknowns),
+    )
+
+
+def _doubts(rows: Sequence[Fitted], unknowns: Sequence[Unknown]) -> tuple[str, ...]:
+    """Return what it means that albedos are above 1 by more than their errors; nothing where none
+    is.
+    """
+    names = [
+        row.name
+        for row, unknown in zip(rows, unknowns, strict=True)
+        if unknown.kind == "albedo" and row.low is not None and row.low > _ALBEDO
+    ]
+    if not names:
+        return ()
+    are = "is" if len(names) == 1 else "are"
+    return (
+        f"{' and '.join(names)} {are} above 1, which no medium has: the image solves another "
+        "equation than this fit (name it by --model, see airlight list models), holds light that "
+        "was scattered more than once, or has brighter lights than the scene (look for 'intensity' "
+        "too, in a layer with surfaces)",
     )
 
 

@@ -47,7 +47,7 @@ def fog_of_model(reference: ReferenceScene, model: Model) -> Fog:
         fog,
         albedo=fog.albedo if model.lit_scale is None else (_WHITE,) * len(fog.albedo),
         phase=_phases(reference, fog, model),
-        airlight=tuple(kinds),
+        strength=tuple(kinds),
         surface=(surface,) * len(kinds),
         camera_segment=(model.camera_scale, camera),
         light_segment=(model.light_scale, light),

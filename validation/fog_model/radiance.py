@@ -100,6 +100,8 @@ class Fog:
     window: Falloff | None = None  #: factor on the light of lamps with a range
     #: distances from lamps at which their light has corners: nodes lie between them [m]
     corners: tuple[float, ...] = ()
+    #: factors of an equation on what media scatter of each light, and on no other light; none: 1
+    strength: tuple[float, ...] = ()
     #: whether lamps scatter without a phase function: it is 4 pi
     bare: bool = False
     #: depths at which a factor along a line on what the medium scatters is 1 and 0 [m]
@@ -145,7 +147,8 @@ class Fog:
         # Axes of the sum: k the layer, l the light, p the pixel, c the channel.
         factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
         layers = np.einsum("kl,klpc->kpc", factors, by_light[:, :-1])
-        if self.lit is not None:
+        # With a constant source the light of lights is its lobes, which no density makes.
+        if self.lit is not None and self.constant is None:
             layers[0] = -np.expm1(-self.lit * layers[0])
         # Light without lights has the factor that the fog of all lights has.
         shared = self.airlight[0] if len(set(self.airlight)) == 1 else 1.0
@@ -221,20 +224,29 @@ class FogModel:
         with np.errstate(over="ignore", invalid="ignore"):
             for number, light in enumerate(self.lights):
                 for layer, places in enumerate((light.nodes, light.surface)):
+                    strength = fog.strength[number] if fog.strength and layer == 0 else 1.0
                     if fog.constant is not None and layer == 0:
                         radiance[0, number] = self._lobe(fog, number) * light.intensity
-                    elif len(places.r):
-                        radiance[layer, number] = self._sums(places, fog, number) * light.intensity
+                    elif len(places.r) and strength:  # 0 times infinity is no number
+                        sums = self._sums(places, fog, number)
+                        radiance[layer, number] = sums * (strength * light.intensity)
             radiance[0, -1] = self._without_lights(fog)
         # Each pixel has the sum over its rays so far: the mean is this sum over their number.
         radiance *= len(view.pixels) / len(view.ray_pixel)
         return np.nan_to_num(radiance, nan=largest, posinf=largest, neginf=-largest)
 
     def transmittance(self, fog: Fog) -> Array:
-        """Return the transmittance of the rays up to their ends, the mean over each pixel,
-        (m, 3) [1].
+        """Return how much of what is behind it the fog leaves, the mean over each pixel, (m, 3) [1].
+
+        It is the factor that surfaces have, and one less the opacity by which fog is blended. Where
+        surfaces are not attenuated it is by the way of the fog to the camera, and where that is not
+        either, by the extinction itself: fog has an opacity even if it does not dim.
         """
-        left = self._of_pixels(np.exp(-self._depth(fog, *self._ray_ends(fog))))
+        fraction = next((each for each in reversed(fog.camera_segment) if each), 1.0)
+        depth = fraction * self._depth(fog, *self._ray_ends(fog))
+        if "surfaces" in fog.planar and "ends" not in fog.planar:
+            depth = depth * (self.view.reference.direction @ self.view.axis)[:, None]
+        left = self._of_pixels(np.maximum(np.exp(-depth), 1 - fog.most))
         return left / np.bincount(self.view.ray_pixel)[:, None]
 
     # Light without lights, of whole rays.

@@ -143,6 +143,12 @@ def _checked(table: "_Table") -> Cases:
         )
         if reason:
             raise InputError(f"{table.where(row, 'phase')}: {reason}")
+    # A mean cosine that no phase function takes would be dropped.
+    table.check(
+        "g",
+        (g == 0) | (np.array(phase) == "hg"),
+        "0, or 'hg' in a column 'phase': other phase functions have no g",
+    )
     # At |g| = 1 the phase function is a delta function.
     table.check("g", np.abs(g) < 1, "a number between -1 and 1")
     table.check("sigma_t", columns["sigma_t"] >= 0, "a number >= 0")

@@ -68,7 +68,10 @@ class RunsError:
     rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
     rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
     root_bias: float | None = column(
-        "bias by pixel", "1", "root of the squared bias, where its 95 % interval is above 0"
+        "bias by pixel",
+        "1",
+        "root of the squared bias, where its 95 % interval is above the square of the reference's "
+        "own error",
     )
     most_bias: float | None = column(
         "at most",

@@ -2,8 +2,8 @@
 """Independent renders of one frame against its reference: how much of the error is
 bias, and how much is noise.
 
-The reference has no noise: every random part is the renderer's. With e_i the error of run i of N,
-all relative to the mean of the reference, and G_ij the mean of e_i e_j over values,
+The reference is the same for all runs: every random part is the renderer's. With e_i the error of
+run i of N, all relative to the mean of the reference, and G_ij the mean of e_i e_j over values,
 
 - the variance is V = (sum of G_ii - sum of G_ij / N)/(N - 1), the mean over values
   of the variance over runs;
@@ -12,6 +12,11 @@ all relative to the mean of the reference, and G_ij the mean of e_i e_j over val
   two errors on;
 - the relative bias B is the mean of the B_i = sum of e_i over sum of the reference, with Student's
   interval. A bias that changes its sign over the image shows in b^2 alone.
+
+An error of the reference is in B and in b^2 too, however many runs there are. By as much as the
+mean of the reference may be off, the interval of B is wider to both sides; and a root of b^2 is
+reported where b^2 is beyond the mean square of what the values of the reference may be off
+(`validation.estimates.quadrature.off_by`).
 
 Errors of V and b^2 come from leaving out one run at a time. N runs averaged have
 the error sqrt(b^2 + V/N).
@@ -40,6 +45,7 @@ is the root mean square of n after a Gaussian of deviation s over the value befo
 s: 1 for white noise.
 """
 
+import glob
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -62,7 +68,7 @@ from airlight.validation.engine.observation import (
     pixel_kinds,
     scene_of_size,
 )
-from airlight.validation.estimates.quadrature import known_to, known_words
+from airlight.validation.estimates.quadrature import known_to, known_words, off_by
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
 from airlight.validation.motion.lag import SURE
 from airlight.validation.scenes.changes import UNCHANGED, Changes
@@ -78,6 +84,7 @@ from airlight.validation.statistics.samples import (
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
 _NO_NOISE = fact(0.0)
 _NAMED = 5  # files that a sentence names
+_ALIKE = "runs: all are the same; expected renders with different seeds"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +93,7 @@ class Noise:
 
     runs: int  #: of different images
     bias: Estimate
-    bias_ci: tuple[float, float]  #: 95 %
+    bias_ci: tuple[float, float]  #: 95 %, wider by the error of the reference
     detectable_bias: float = 0.0  #: that would be found nine times of ten
     squared_bias: Estimate
     variance: Estimate = _NO_NOISE
@@ -98,7 +105,7 @@ class Noise:
     blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
     blur_gain: tuple[float, ...] = ()
     seconds: float | None = None  #: of a run [s]
-    #: the root of the squared bias, where it is above zero by two errors
+    #: the root of the squared bias, where that is above the reference's own by two errors
     root_bias: float | None = None
     #: 1/(V T), which stays where samples and time are both doubled [1/s]
     efficiency: float | None = None
@@ -176,20 +183,23 @@ class Noise:
         return math.sqrt(max(bias, 0.0) + max(variance, 0.0) / runs)
 
 
-def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
+def measure_noise(
+    reference: Array,
+    runs: Sequence[Array],
+    seconds: float | None = None,
+    off: tuple[float, float] = (0.0, 0.0),
+) -> Noise:
     """Return the noise of renders of a frame; all of the error of a single one is bias.
 
     `reference`: (height, width, channels), finite; `runs`: independent renders of that shape,
-    finite; one of a renderer without random numbers; `seconds`: what one takes. Several runs that
-    are the same count once. Raises InputError for a dark reference, and where all runs are the
-    same.
+    finite; one of a renderer without random numbers; `seconds`: what one takes; `off`: by how much
+    the mean and the values of the reference may be off, see `off_by`. Several runs that are the
+    same count once. Raises InputError for a dark reference, and where all runs are the same.
     """
     # Images that are the same bit by bit are one run, of one seed.
     given, runs = runs, [runs[number] for number in sorted(set(first_equal(runs)))]
     if len(runs) == 1 < len(given):
-        raise InputError(
-            "runs: all are the same, bit by bit; expected renders with different seeds"
-        )
+        raise InputError(_ALIKE)
     count, mean = len(runs), float(reference.mean())
     if not mean > 0:
         raise InputError("runs: the reference is dark: nothing is relative to it")
@@ -206,13 +216,13 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
         seconds=seconds,
     )
-    noise = noise if count == 1 else _with_spread(noise, errors, blurred)
+    noise = noise if count == 1 else _with_spread(noise, errors, blurred, off[0])
 
-    # The estimate of the squared bias may be negative by chance: a root is taken only of one that
-    # is above zero by two errors.
+    # The estimate of the squared bias may be negative by chance, and holds the square of the
+    # reference's own error: a root is taken only of one that is above that by two errors.
     squared_bias, variance = noise.squared_bias, noise.variance.value
     root_bias = None
-    if squared_bias.value is not None and squared_bias.exceeds(0.0) is Answer.YES:
+    if squared_bias.value is not None and squared_bias.exceeds(off[1] ** 2) is Answer.YES:
         root_bias = math.sqrt(squared_bias.value)
     noise = replace(
         noise,
@@ -226,9 +236,9 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     )
 
 
-def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
+def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array], off: float) -> Noise:
     """Return the noise of one run with all numbers that need several runs, from their relative
-    errors, (runs, height, width, 3), and the same blurred.
+    errors, (runs, height, width, 3), the same blurred, and the error of the reference's mean.
     """
     count = len(errors)
     # G_ij of the module, the mean products of the errors of two runs.
@@ -240,6 +250,9 @@ def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array]) -> Nois
     # n_i of the module: the factor makes up for the mean over the runs, which is taken away.
     noise = (errors - errors.mean(axis=0)) * math.sqrt(count / (count - 1))
     square = float(np.mean(noise**2))
+    # They differ by the sign of a zero, or by less than the rounding of their mean.
+    if square <= 1e-24 * single.relative_rmse**2:
+        raise InputError(_ALIKE)
     largest = float(noise.flat[np.argmax(np.abs(noise))])
     spectrum, low = _spectrum(noise)
     # A Gaussian of deviation s divides the root mean square of white noise by 2 sqrt(pi) s.
@@ -250,8 +263,8 @@ def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array]) -> Nois
     return replace(
         single,
         bias=mean_of_runs(biases),
-        bias_ci=(bias - half, bias + half),
-        detectable_bias=detectable(count) * deviation,
+        bias_ci=(bias - half - off, bias + half + off),
+        detectable_bias=detectable(count) * deviation + off,
         squared_bias=squared_bias,
         variance=variance,
         largest_deviation=largest,
@@ -446,7 +459,10 @@ def compare_runs(
     reference = expected_layer(fitting, first)
     time = image_times(paths[0])
     filled, nonfinite = list(np.where(finite, runs, reference)), int((~finite).sum())
-    noise = measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3)
+    seconds = None if time is None else time[0].median_ms / 1e3
+    noise = measure_noise(
+        reference, filled, seconds, off_by(fitting, first.holds, emitted=first.emitted)
+    )
     if nonfinite:
         wrong = ", ".join(
             name for name, run in zip(names, runs, strict=True) if not np.isfinite(run).all()
@@ -471,7 +487,7 @@ def compare_runs(
         layer=first.name,
         expected=first.holds,
         pixel=kind.pixel,
-        known=known_to(fitting, first.holds),
+        known=known_to(fitting, first.holds, emitted=first.emitted),
         noise=noise,
         nonfinite=nonfinite,
         device="" if time is None else time[1],
@@ -521,7 +537,8 @@ def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
     InputError for fewer than two.
     """
     path = Path(pattern)
-    paths = sorted(path.parent.glob(path.name.replace("#", "[0-9]")))
+    # Other signs that have a meaning in patterns, such as brackets, stand for themselves.
+    paths = sorted(path.parent.glob(glob.escape(path.name).replace("#", "[0-9]")))
     if len(paths) < 2:
         raise InputError(
             f"{pattern}: {len(paths)} files have such a name; expected two or more independent "

@@ -48,7 +48,12 @@ class Figure(NamedTuple):
     interval: str = ""
 
     def over(self, other: "Figure") -> "Figure":
-        """Return the quotient of two positive numbers; its ends are the widest that it can have."""
+        """Return the quotient of two positive numbers; its ends are the widest that it can have.
+
+        Where the divisor may be 0 nothing is known of it: all three are NaN.
+        """
+        if not other.low > 0:
+            return Figure(math.nan, math.nan, math.nan)
         names = dict.fromkeys(name for name in (self.interval, other.interval) if name)
         return Figure(
             self.value / other.value,
@@ -191,6 +196,9 @@ def taken(claim: Claim, figures: Figures) -> Figure | str:
     figure = reduce(Figure.over, parts)
     if not all(map(math.isfinite, figure[:3])):
         return "the measured figure is not finite"
+    # An error as large as the number itself can turn the ends round.
+    if not figure.low <= figure.value <= figure.high:
+        return "the measured figure has no interval that holds it"
     return Figure(float(figure.value), float(figure.low), float(figure.high), figure.interval)
 
 

@@ -102,11 +102,8 @@ def cloud_frames() -> Figures:
 
 
 def _light_moved(scene: Scene) -> Timing:
-    # Three steps at most, one where the collector of the last frame still is one (within 0.05 of
-    # its spread).
-    renderer = frame_renderer(
-        scene, METHODS["cloud-collectors"], start="previous", iterations=3, settled=0.05
-    )
+    # Three steps at most, from the collectors of the last frame.
+    renderer = frame_renderer(scene, METHODS[_METHOD], start="previous", iterations=3)
     # The first frame searches from the start; timed are the frames after it.
     cache = first_frame(renderer)
 

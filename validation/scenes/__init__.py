@@ -3,7 +3,8 @@
 
 Read in this order:
 
-- `fog.toml`, `height_fog.toml`, `density_grid.toml`, `clouds.toml`: the built-in scenes as data;
+- `fog.toml`, `many_lights.toml`, `height_fog.toml`, `density_grid.toml`, `clouds.toml`: the built-in
+  scenes as data;
 - `names.py`: the names of scenes, and the refusal of others;
 - `registry.py`: their records by name, and the Mitsuba dictionaries that the data stand for;
 - `parts.py`: shapes of meshes, media, lights and cameras for such dictionaries;
@@ -12,7 +13,8 @@ Read in this order:
 - `smoke.py`: smoke as a density grid;
 - `hypertexture.py`: density by the distance into a mesh and gradient noise;
 - `engine_fog.py`: the height fog of engines as layers;
-- `models.py`: the equations of engines by name, and the words that name an equation;
+- `models.py`, `models.toml`: the equations of engines by name, as data, and the words that name an
+  equation;
 - `height_fog.py`: the volume `heightfog` of Mitsuba: density by height;
 - `random`: scenes drawn from a seed;
 - `numbers.py`: refuses numbers that cannot give a finite image;

@@ -28,7 +28,7 @@ against the uniform law.
 local extent up to eight times as well as one pixel.
 
 **The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see below.
-A bias that all pixels share shows here first: with 262 144 pixels 360 times better than in any one
+A bias that all pixels share shows here first: with 262 144 pixels 512 times better than in any one
 of them.
 
 Values without variance (s = 0: a pixel without light, one that no path reached, a reference without

@@ -50,7 +50,7 @@ class Statistics:
         "bias", meaning="sum of the test image over that of the reference, less 1"
     )
     relative_bias_ci: Ends = column(
-        "95 % interval", meaning="where 19 of 20 such runs find the bias"
+        "95 % interval", meaning="holds the true bias in 19 of 20 such runs"
     )
     relative_bias_ci_batches: Ends | None  #: that from the batch means
     relative_bias_se: Number  #: from the standard errors of the pixels

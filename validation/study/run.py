@@ -223,16 +223,18 @@ def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
         return None
     errors /= mean
     # The squared bias without the noise of the mean, from pairs of runs: see
-    # `validation.motion.noise`. Its root is reported only from two errors above zero on.
+    # `validation.motion.noise`. Its root is reported only from two errors above the mean square of
+    # the reference's own error on.
     products = errors @ errors.T / errors.shape[1]
     squared, _ = parts_of_error(products)
     bias, rmse = (student(each) for each in (errors.mean(axis=1), np.sqrt(np.diag(products))))
     ends = squared.ends()
+    own = float(np.mean((reference.error[counts] / mean) ** 2))
     return RunsError(
         len(errors),
         *bias,
         *rmse,
-        math.sqrt(squared.value) if squared.value and squared.exceeds(0.0) is Answer.YES else None,
+        math.sqrt(squared.value) if squared.value and squared.exceeds(own) is Answer.YES else None,
         None if ends is None else math.sqrt(max(ends[1], 0.0)),
     )
 

@@ -6,7 +6,7 @@ A cell is one combination of all of these; docs/many-scenes.md has the keys of a
 is refused by name before any work. The measurements of a report are a study too
 (`validation/study/studies/`), with more keys:
 
-    scenes = "all"                                          # every built-in scene of fog
+    scenes = "all"                                          # of homogeneous fog with few lights: `FOG_SCENES`
     half = ["fence"]                                        # scenes that are compared at half the width
     methods = "quick"                                       # one of each kind
     metrics = "usual"                                       # without those of other tools and colours

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors that vary: of independent runs of one frame, and of the frames under a light that moves.
 
-*Runs.* The reference has no noise: the error of runs is bias and noise apart. Methods that draw no
-random numbers are rendered once, and stand beside the others: all of their error is bias.
+*Runs.* All are compared with one reference: their error is bias and noise apart. A bias is told
+where it is beyond the error of the reference, which under area lights is statistical. Methods that
+draw no random numbers are rendered once, and stand beside the others: all of their error is bias.
 
 *Frames.* Each is compared with the reference of its lights. In a sweep the lights circle as in the
 animation of the scene; in a step they stand for `BEFORE` frames, then jump. A method that uses its
@@ -28,6 +29,7 @@ from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.arrays import Array, Counted
 from airlight.validation.clock import Piece, in_turns
+from airlight.validation.estimates.quadrature import off_by
 from airlight.validation.motion.judge import motion_verdict
 from airlight.validation.motion.measures import Measures, mean_measures, measure
 from airlight.validation.motion.measures import Sequence as Frames
@@ -69,7 +71,8 @@ def method_noise(
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
-    read, reference = read_scene(scene), reference_image(scene).airlight
+    read, image = read_scene(scene), reference_image(scene)
+    reference, off = image.airlight, off_by(image, "airlight")
     # All runs of all methods first. A method that draws no random numbers has one run, and so has
     # one whose runs turn out to be the same.
     rendered, turns = [], list[Turn]()
@@ -101,7 +104,7 @@ def method_noise(
     ]
     return [
         MethodNoise(
-            chosen.label, measure_noise(reference, images, took), reference, shown, deviation
+            chosen.label, measure_noise(reference, images, took, off), reference, shown, deviation
         )
         for chosen, (images, shown, deviation), took in zip(
             configurations, rendered, seconds, strict=True

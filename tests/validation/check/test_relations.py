@@ -6,13 +6,14 @@ a wall behind it, and a fault by name. It shares no code with anything that it i
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from airlight.errors import InputError
 from airlight.validation.check.check_file import Asked, Camera, read_check
-from airlight.validation.check.judge import FAILS, HOLDS, UNKNOWN, judge, signature
+from airlight.validation.check.judge import FAILS, HOLDS, UNKNOWN, Kept, judge, signature
 from airlight.validation.check.relations import RELATIONS
 
 SIZE, FOV, STEPS = (48, 36), 60.0, 192
@@ -268,6 +269,65 @@ def test_sets_of_relations_that_fail_together_name_a_term():
     assert signature(answers("")) == ""
 
 
+def test_a_set_that_nobody_asked_in_full_is_as_likely_as_a_smaller_one():
+    """`--only reciprocity` called a softened law a missing light path."""
+
+    def said(**verdicts):
+        rows = [
+            Kept(name.replace("_", "-"), verdict, 0.1, 0.01, 1.0, "", "")
+            for name, verdict in verdicts.items()
+        ]
+        return signature(rows)
+
+    alone = said(reciprocity=FAILS)
+    assert all(each in alone for each in ("on the way from the light", "in metres", "length"))
+    told = said(reciprocity=FAILS, units=HOLDS, bounds=UNKNOWN, pan=HOLDS)
+    assert "constant length" in told
+    assert "in metres" not in told
+    assert said(units=FAILS, reciprocity=FAILS).startswith("a law of distance")
+    assert said(moved=FAILS) == ""
+
+
+def test_what_holds_for_the_fog_alone_is_not_judged_by_all_light():
+    """Right frames of fog and surfaces in one image broke `thin`, `albedo` and `depths-multiply`."""
+    sigma, light = np.array([1.0, 0.5, 0.25]), np.ones((8, 8, 3))
+    frames = {}
+    for number, each in enumerate(sigma):
+        airlight, surface = each * light, 5 * np.exp(number * sigma[2]) * light
+        layers = {"airlight": airlight, "surface": surface, "total": airlight + surface}
+        frames[f"thin-{number}"] = layers
+    asked = [
+        Asked("thin", ("thin-0", "thin-1", "thin-2")),
+        Asked("albedo", ("thin-1", "thin-0")),
+        Asked("depths-multiply", ("thin-0", "thin-1", "thin-2")),
+    ]
+    whole = {name: {"total": layers["total"]} for name, layers in frames.items()}
+    for given, layer, verdict in (
+        (frames, None, HOLDS),
+        (whole, None, UNKNOWN),
+        (whole, "total", FAILS),
+    ):
+        found = judge(asked, given, rounding=1e-6, layer=layer)
+        assert {each.verdict for each in found} == {verdict}
+        assert all("check.json" in each.points_to for each in found) is (verdict == UNKNOWN)
+    # The floor of frames without that layer is the one that they have.
+    found = judge(asked, frames | {"a": whole["thin-0"]}, again=("a", "a"), rounding=1e-6)
+    assert {each.verdict for each in found} == {HOLDS}
+
+
+def test_a_rim_falls_from_one_on_the_axis_to_nothing_at_the_edge():
+    camera = Camera(60.0, cone=25.0)
+    weights = {
+        each: replace(camera, falloff=each).sensitivity(64, 64)
+        for each in ("cosine", "rim:1", "rim:3")
+    }
+    assert weights["rim:1"] == pytest.approx(weights["cosine"])
+    assert weights["rim:3"] == pytest.approx(1 - (1 - weights["cosine"]) ** 3)
+    for words in ("rim:", "rim:0", "rim:nan", "rim:-1", "edge"):
+        with pytest.raises(InputError, match="rim:POWER"):
+            replace(camera, falloff=words).sensitivity(8, 8)
+
+
 def test_nothing_lit_is_no_answer():
     dark = {"total": np.zeros((8, 8, 3))}
     (found,) = judge([Asked("units", ("a", "b"))], {"a": dark, "b": dark}, rounding=1e-6)
@@ -297,6 +357,16 @@ def test_a_margin_allows_what_is_beyond_noise():
         (Asked("units", ("a",)), "got 1 frames, expected 2"),
         (Asked("colours", ("a", "b"), order=(0, 0, 1)), "expected each of 0, 1, 2"),
         (Asked("intensity", ("a", "b"), factor=0.0), "expected one above 0"),
+        (Asked("furnace", ("a", "b"), value=(1.0, 2.0)), "expected one radiance or three"),
+        (Asked("units", ("a", "b"), layer="fogg"), "a: has no layer fogg; it has total"),
+        (
+            Asked("reciprocity", ("a", "b"), cameras=(Camera(60.0, cone=31.0),) * 2),
+            "all of the cone",
+        ),
+        (
+            Asked("reciprocity", ("a", "b"), cameras=(Camera(60.0, cone=-9.0),) * 2),
+            "all of the cone",
+        ),
         (Asked("pan", ("a", "b")), "expected two cameras"),
         (Asked("size", ("a", "b")), "twice the sides"),
         (Asked("units", ("a", "c")), "expected one size"),
@@ -311,6 +381,13 @@ def test_what_cannot_be_judged_is_refused(asked, why):
     frames["airlight"] = {"airlight": np.ones((8, 8, 3))}
     with pytest.raises(InputError, match=why):
         judge([asked], frames, rounding=1e-6)
+
+
+@pytest.mark.parametrize("again", [("a",), ("a", "a", "a")])
+def test_another_number_of_frames_of_one_input_is_refused(again):
+    frames = {"a": {"total": np.ones((8, 8, 3))}}
+    with pytest.raises(InputError, match=f"again: got {len(again)} frames, expected 2"):
+        judge([Asked("units", ("a", "a"))], frames, again=again, rounding=1e-6)
 
 
 @pytest.mark.parametrize(

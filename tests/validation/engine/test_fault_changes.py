@@ -13,11 +13,13 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.reference.scene.model import Law, Range
 from airlight.validation.engine import prediction
 from airlight.validation.engine.fault import Fault, factor_name
 from airlight.validation.engine.faults import FAULTS
 from airlight.validation.engine.prediction import Guess, SceneLight
 from airlight.validation.engine.targets import position_held, scaled
+from airlight.validation.fog_model.laws import LawFactor, Window
 from airlight.validation.fog_model.radiance import Fog
 
 FOG = Fog(
@@ -108,6 +110,10 @@ def test_lobes_have_another_g_and_other_phase_functions_stay():
 )
 def test_ways_that_are_not_attenuated(words, segments):
     assert changed(fault(*words)).fog == replace(FOG, **segments)
+    # On top of an equation with a constant path, that is missing with the way from the light.
+    constant = replace(FOG, light_segment=(0.0, 0.0), light_length=6.0)
+    without = segments.get("light_segment", (1.0, 1.0))[0] == 0
+    assert (changed(fault(*words), fog=constant).fog.light_length == 0) is without
 
 
 def test_fog_without_attenuation_may_end():
@@ -134,6 +140,34 @@ def test_terms_of_engines_alone():
     light = 2.0 * 0.1 + 3.0 * 0.2
     np.testing.assert_allclose(fog, 1 - math.exp(-3 * light) + 0.05)
     np.testing.assert_allclose(surface, light + 0.05)
+
+
+def test_another_unit_of_length_leaves_the_lengths_of_an_equation():
+    """A law of 16/(r^2 + 1) had its metre scaled with the scene: --diagnose --model found no unit."""
+    law, window = LawFactor(Law("softened", 1.0, scale=16.0)), Window(Range("quartic", 8.0))
+    equation = replace(
+        FOG,
+        law=(law, None),
+        window=window,
+        corners=(8.0,),
+        near=0.5,
+        far=300.0,
+        fade=(10.0, 20.0),
+        lobe=(4.0, 2.0),
+        light_length=6.0,
+    )
+    predictor = SimpleNamespace(reference=SimpleNamespace(lights=[None]))
+    fog = changed(fault("another unit of length"), 0.01, fog=equation, predictor=predictor).fog
+    r = np.array([1.0, 30.0, 500.0])
+    # The engine has r/100: the light is I f(r/100), of which I p^-2/r^2 stands in the intensity.
+    assert fog.law[0](r) == pytest.approx((0.01 * r) ** 2 * 16 / ((0.01 * r) ** 2 + 1))
+    assert fog.law[1] is None
+    assert fog.window(r) == pytest.approx((1 - (r / 800).clip(0, 1) ** 4) ** 2)
+    assert (fog.near, fog.far) == pytest.approx((50.0, 30_000.0))
+    assert (fog.corners, fog.fade, fog.lobe) == ((800.0,), (1000.0, 2000.0), (4.0, 200.0))
+    assert fog.sigma_t[0][0] * fog.light_length == pytest.approx(0.5 * 6.0)
+    same = changed(fault("another unit of length"), 1.0, fog=equation, predictor=predictor).fog
+    assert same == equation
 
 
 def test_another_unit_of_length_dims_lights_at_places_alone():

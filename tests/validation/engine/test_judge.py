@@ -4,6 +4,7 @@ called right where it is.
 """
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from airlight.validation.comparison.images import compare_images
 from airlight.validation.engine.error_place import error_place
 from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import EngineImage, measure_image
-from airlight.validation.engine.judge import compare_scene, references
+from airlight.validation.engine.judge import compare_scene, judge_image, references
 from airlight.validation.engine.observation import expected_layer, judged_layer, observation_of
 from airlight.validation.engine.verdict import Verdict, all_but_few, judge
 from airlight.validation.estimates.quadrature import (
@@ -99,6 +100,43 @@ def test_margin_decides_without_standard_errors(scene, expected, write):
     nan = expected.airlight.copy()
     nan[2, 3] = np.nan
     assert len(compare_scene(scene, write(airlight=nan), margin=0.01).comparison.failures) == 1
+
+
+@pytest.mark.claim("engine-margin")
+def test_a_margin_holds_the_error_of_the_reference_too(scene, expected):
+    """A bias of 1 % by a reference that may be off by 0.3 % is not shown to be within 1.1 %."""
+    mean, loaded = expected.airlight.mean(), load_scene(scene, (16, 12))
+    mask, spread = np.ones((12, 16), dtype=bool), np.full((12, 16, 3), 0.02 * mean)
+    mask[:, 8:] = False
+
+    def failures(spread, margin, mask=None):
+        own = replace(expected, airlight_se=spread, surface_se=0 * spread)
+        image = Image({"airlight": 1.01 * expected.airlight})
+        judged = judged_layer(image, "own.exr", name="airlight")
+        more = {"pixel": "centre", "margin": margin, "mask": mask}
+        compared = judge_image(image, judged, loaded, lambda pixel: own, **more)
+        return compared.comparison.failures
+
+    assert failures(0 * spread, 0.011) == failures(spread, 0.014) == ()
+    (reason,) = failures(spread, 0.011)
+    assert "is not shown to be within +-0.011: the mean of the reference may be off by" in reason
+    # Pixels outside of a mask count nowhere.
+    outside = np.where(mask[..., None], 0.0, spread)
+    assert failures(outside, 0.011) != ()
+    assert failures(outside, 0.011, mask) == ()
+
+
+def test_a_light_that_a_layer_does_not_show_is_no_part_of_how_well_it_is_known(scene, expected):
+    seen, loaded = np.full(expected.airlight.shape, 100.0), load_scene(scene, (16, 12))
+    none = 0 * seen
+    lit = replace(expected, emitted=seen, airlight_se=none, surface_se=none, emitted_se=0.1 * seen)
+    total = expected.airlight + expected.surface
+    for made, value in (({}, total + seen), ({"airlight:scene": "own"}, total)):
+        image = Image({"total": value}, attributes=made)
+        judged = judged_layer(image, "own.exr", name="total")
+        known = judge_image(image, judged, loaded, lambda pixel: lit, pixel="centre").known
+        assert known.value == pytest.approx(value.mean())
+        assert (known.error > 1) == judged.emitted == (not made)
 
 
 AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>

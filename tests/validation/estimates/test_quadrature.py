@@ -3,6 +3,8 @@
 estimated or statistical.
 """
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -18,12 +20,13 @@ from airlight.validation.estimates.images import layered_reference
 from airlight.validation.estimates.quadrature import (
     known_to,
     known_words,
+    off_by,
     reference_error,
     reference_layer,
 )
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
-from airlight.validation.statistics.estimate import Estimate
+from airlight.validation.statistics.estimate import INTERVAL, Estimate
 from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
 from tests.helpers.scenes import tiny_scene
 
@@ -99,6 +102,8 @@ def test_the_name_of_a_layer_says_what_its_error_is(variant, kind, error, header
     )
     more = {"emitted", "airlight_se", "surface_se"}
     assert set(lit.layers) == set(plain.layers) | more
+    over = stated(kind, emitted=layer, airlight_se=layer, surface_se=layer, emitted_se=2 * layer)
+    assert (layered_reference(loaded, over).layers["emitted_se"] == 2).all()
     assert lit.attributes["airlight:batches"] == 8
     for name in ("airlight", "surface"):
         compared = compare_images(plain, plain, layer=name)
@@ -113,6 +118,19 @@ def test_the_total_is_known_no_better_than_the_surface():
     assert known_to(plain, "surface") == Estimate(2.0, pytest.approx(2e-6), "estimated")
     assert known_to(plain, "total") == Estimate(3.0, pytest.approx(2e-6 + 1e-9), "estimated")
     assert known_words(known_to(plain, "surface")) == "known to 1e-06 of its mean (estimated)"
+
+
+def test_a_mean_may_be_off_by_less_than_its_values():
+    """Samples of two pixels: their standard errors add up as squares, those of channels do not."""
+    layer, seen = np.ones((1, 2, 3)), {"airlight_se": np.full((1, 2, 3), 0.01)}
+    reference = stated(emitted=2 * layer, surface_se=0.03 * layer, **seen)
+    mean, value = off_by(reference, "airlight")
+    assert mean == pytest.approx(2 * 0.01 / np.sqrt(2) + 1e-9, rel=1e-12)
+    assert value == pytest.approx(2 * 0.01 + 1e-9, rel=1e-12)
+    shown, alone = (off_by(reference, "total", emitted=each) for each in (True, False))
+    assert alone == pytest.approx(np.multiply(shown, 5 / 3))
+    assert off_by(stated(), "airlight") == pytest.approx((1e-9, 1e-9))
+    assert off_by(replace(reference, surface_error=None), "surface") == (np.inf, np.inf)
 
 
 def test_variances_of_the_total_add_up():
@@ -130,12 +148,14 @@ def test_variances_of_the_total_add_up():
         emitted=5 * layer,
         airlight_se=3 * layer,
         surface_se=4 * layer,
+        surface_error=0 * layer,
     )
     assert reference_error(plain, "total") is None
     # The error of the airlight says nothing of surfaces. Where the error of surfaces is not known,
     # the error of the sum is not known either.
     assert known_to(plain, "airlight") == Estimate(float(layer.mean()), 0.0, "proven")
     for unknown in ("surface", "total"):
+        assert known_to(replace(lit, surface_error=None), unknown).error is None
         assert known_to(plain, unknown).error is None
         assert known_words(known_to(plain, unknown)) == "its error is not known"
     assert reference_layer(plain, "total") == pytest.approx(3 * layer)
@@ -146,6 +166,27 @@ def test_variances_of_the_total_add_up():
     for name, error in (("airlight", 3), ("surface", 4), ("total", 5)):
         assert known_to(lit, name).error == pytest.approx(error * layer.mean())
         assert known_to(lit, name).kind == "statistical"
+    # Light that an image does not show makes its layer no better known.
+    shown = [known_to(lit, "total", emitted=each) for each in (True, False)]
+    assert [each.value for each in shown] == pytest.approx([8.0, 3.0])
+    assert shown[0].error == shown[1].error
+    # Where it is a mean over pixels its variance is one of three.
+    mean = replace(lit, emitted_se=12 * layer)
+    assert reference_error(mean, "total") == pytest.approx(13 * layer)
+    assert reference_error(mean, "total", emitted=False) == pytest.approx(5 * layer)
+    assert reference_error(mean, "airlight") == pytest.approx(3 * layer)
+    errors = [known_to(mean, "total", emitted=each).error for each in (True, False)]
+    assert errors == pytest.approx([13.0, 5.0])
+    by_value = [off_by(mean, "total", emitted=each)[1] for each in (True, False)]
+    assert by_value == pytest.approx([INTERVAL * 13 / 8, INTERVAL * 5 / 3])
+
+
+def test_pixels_outside_of_a_mask_put_no_mean_off():
+    layer, errors = np.ones((1, 2, 3)), np.array([0.01, 5.0])[None, :, None] * np.ones(3)
+    reference = stated(airlight_se=errors, surface_se=0 * layer)
+    mean, value = off_by(reference, "airlight", mask=np.array([[True, False]]))
+    assert mean == value == pytest.approx(INTERVAL * 0.01 + 1e-9, rel=1e-12)
+    assert off_by(reference, "airlight")[0] > 4
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import Image
+from airlight.validation.columns import plain
 from airlight.validation.engine.fault import Number
 from airlight.validation.engine.observation import Observation
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
@@ -160,6 +161,22 @@ def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfac
     whole = fitted(image, scene, ["sigma_t", "albedo", "intensity"], layer="total")
     assert whole.confounded == ()
     assert [each.value for each in whole.parameters] == pytest.approx([0.31, 0.83, 1.0], rel=1e-3)
+
+
+@pytest.mark.claim("fit-exact")
+def test_an_albedo_that_no_medium_has_is_named(variant, tmp_path):
+    """An image by another equation gave an albedo of 1.2 without a word, in text and JSON."""
+    scene = scene_file(tmp_path, albedo="0.8")
+    right = reference_image(load_scene(scene, (16, 12)).scene).airlight
+    for factor, noise, doubted in ((1.5, 0.0, True), (1.24, 0.0, False), (1.27, 0.3, False)):
+        image = right * (1 + noise * np.random.default_rng(1).normal(size=right.shape))
+        image = Image({"airlight": factor * image})
+        fit = fit_image(image, load_scene(scene, (16, 12)), ["albedo"], pixel="centre")
+        assert bool(fit.doubts) is doubted, fit
+        assert plain(fit)["doubts"] == list(fit.doubts)
+        assert (
+            any("albedo is above 1" in line and "--model" in line for line in fit.lines) is doubted
+        )
 
 
 @pytest.mark.slow

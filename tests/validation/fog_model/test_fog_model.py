@@ -131,6 +131,36 @@ def test_a_channel_without_extinction_attenuates_no_unbounded_ray():
     np.testing.assert_allclose(FogModel(view, ()).transmittance(fog), expected)
 
 
+def test_the_fog_leaves_of_surfaces_what_is_not_its_opacity(variant):
+    """Opacities of an equation were those of the physical one: its way to the camera and its cap
+    were left out.
+    """
+    view = view_of(read_reference(load_scene("sphere-spot", (12, 9)).scene))
+    model, fog = FogModel(view, scattering_paths(view, layers=(1,))), scene_fog(view.reference)
+    bare = model.layers(replace(fog, camera_segment=(1.0, 0.0)))[1]
+    lit = bare > 0
+    assert lit.mean() > 0.1
+    axis = frozenset({"nodes", "surfaces", "steps"})
+    for change in (
+        {},
+        {"camera_segment": (1.0, 0.4)},
+        {"camera_segment": (0.0, 2.5)},
+        {"planar": axis},
+        {"planar": axis - {"surfaces"}},
+        {"planar": frozenset({"surfaces", "ends"})},
+        {"planar": axis, "camera_segment": (0.3, 0.3), "near": 1.0, "far": 3.0},
+        {"reach": 0.5, "most": 0.3},
+        {"constant": (0.1, 0.2, 0.3), "most": 0.05},
+    ):
+        left = model.transmittance(replace(fog, **change))
+        seen = model.layers(replace(fog, **change))[1]
+        np.testing.assert_allclose((left * bare)[lit], seen[lit], rtol=1e-6, err_msg=str(change))
+    # Fog that does not dim surfaces is blended by what dims itself, or by the extinction.
+    for path in ((1.0, 0.0), (0.0, 0.0)):
+        left = model.transmittance(replace(fog, camera_segment=path))
+        assert np.array_equal(left, model.transmittance(fog))
+
+
 @pytest.mark.parametrize("radius", [1e-9, 1e-3, 0.3])
 def test_even_samples_of_a_sphere_give_its_light_however_small_and_far_it_is(radius):
     """By even normals: 2000 samples are the light of the sphere to 1 %, also where its

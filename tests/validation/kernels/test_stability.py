@@ -253,6 +253,17 @@ def test_two_columns_of_one_name_are_refused(tmp_path):
         read_cases(path)
 
 
+@pytest.mark.parametrize("phase", ["", "isotropic", "hg:0.5", "mie:6"])
+def test_a_mean_cosine_that_the_phase_function_has_not_is_refused(tmp_path, phase):
+    """A file without the column `phase` is isotropic: its g would be dropped."""
+    header, cell = ("phase,", f"{phase},") if phase else ("", "")
+    path = case_file(tmp_path, f"{header}g,t,h,x0,x1,sigma_t\n{cell}0.8,1,2,0,inf,0.5\n")
+    with pytest.raises(
+        InputError, match=r"line 2, column 'g': 0\.8 is out of range; expected 0, or"
+    ):
+        read_cases(path)
+
+
 def test_a_line_of_spaces_is_empty(tmp_path):
     """It was a row of one cell in a file of seven columns."""
     assert len(read_cases(case_file(tmp_path, SHORT + "   \n , \n")).x0) == 4

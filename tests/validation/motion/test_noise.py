@@ -13,7 +13,13 @@ from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.columns import plain
 from airlight.validation.motion.blocks import parts_of_error
 from airlight.validation.motion.judge import compare_frames
-from airlight.validation.motion.noise import Noise, compare_runs, detectable, measure_noise
+from airlight.validation.motion.noise import (
+    Noise,
+    compare_runs,
+    detectable,
+    measure_noise,
+    run_paths,
+)
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.statistics.estimate import Answer
 from airlight.validation.statistics.samples import student
@@ -153,6 +159,47 @@ def test_a_bias_of_changing_sign_shows_in_its_square():
     assert found.bias_ci[0] < 0 < found.bias_ci[1]
     assert found.root_bias == pytest.approx(0.1, rel=0.05)
     assert math.isinf(found.seconds_to[0.05] or math.inf)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.003])
+def test_an_error_of_the_reference_is_no_bias_of_the_runs(off):
+    """Sixteen runs without a bias, and a reference with random errors: their square was said to be
+    a bias of the runs. An error of its mean is one no more.
+    """
+    random = np.random.default_rng(12)
+    own = 2e-3 * random.normal(size=REFERENCE.shape)
+    reference, runs = (1 + off) * REFERENCE + own, renders(13, 16, sigma=0.01)
+    assert measure_noise(reference, runs).verdict.startswith("a bias")
+    known = off + 4e-3 / math.sqrt(own.size), math.hypot(off, 4e-3)
+    found = measure_noise(reference, runs, off=known)
+    assert found.verdict.startswith("no bias")
+    assert found.bias_ci[1] - found.bias_ci[0] > 2 * known[0]
+    assert found.detectable_bias > known[0]
+    # A bias beyond that is found all the same.
+    biased = measure_noise(reference, renders(13, 16, 0.02, 0.01), off=known)
+    assert biased.verdict.startswith("a bias of +")
+    assert biased.root_bias == pytest.approx(0.02 - off, rel=0.2)
+
+
+def test_runs_that_differ_by_less_than_rounding_are_refused():
+    """There was a division by their noise, which is zero."""
+    for value in (-0.0, 1e-40):
+        images = [0.1 * REFERENCE for _ in range(3)]
+        for number, image in enumerate(images):
+            image[0] = 0.0
+            image[0, number] = value
+        with pytest.raises(InputError, match="all are the same"):
+            measure_noise(REFERENCE, images)
+
+
+def test_only_the_sign_for_digits_has_a_meaning_in_names(tmp_path):
+    """Brackets in a name stood for one of the letters in them: no file was found."""
+    names = ["night [v2] 1.exr", "night [v2] 2.exr", "night v 1.exr", "night * 1.exr"]
+    for name in names:
+        (tmp_path / name).touch()
+    assert [path.name for path in run_paths(tmp_path / "night [v2] #.exr")] == names[:2]
+    with pytest.raises(InputError, match="1 files have such a name"):
+        run_paths(tmp_path / "night * #.exr")
 
 
 def test_a_seed_used_twice_is_noticed(variant, tmp_path):

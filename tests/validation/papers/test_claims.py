@@ -170,6 +170,9 @@ def test_figures_are_divided_with_their_intervals_and_reasons_stay():
     row = judged(each, {"a": "not measured: too slow", "b": 1.0})
     assert (row.measured, row.verdict, row.why) == (None, "impossible", "not measured: too slow")
     assert judged(each, {"a": float("inf"), "b": 1.0}).verdict == "impossible"
+    # A divisor that may be 0, and ends that an error as large as its number has turned round.
+    assert judged(each, {"a": 8.0, "b": Figure(1.0, 0.0, 2.0)}).verdict == "impossible"
+    assert judged(each, {"a": Figure(8.0, 7.0, -9.0), "b": 1.0}).verdict == "impossible"
 
 
 def test_a_stencil_of_one_ray_by_hand():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from airlight.realtime.clouds.collector_search import Collector
+from airlight.realtime.methods.interface.method import method_parameters
 from airlight.validation.papers import clouds
 from airlight.validation.timing import Timing
 
@@ -108,7 +109,10 @@ def test_points_are_shaded_where_their_way_to_the_sun_enters_a_cloud_again(varia
 
 def test_a_frame_with_moved_light_makes_its_maps_and_its_light(monkeypatch):
     timings = iter([Timing(3.0, 2.0, 4.0, 7), Timing(10.0, 9.0, 12.0, 5)])
-    monkeypatch.setattr(clouds, "frame_renderer", lambda *args, **how: None)
+    # The parameters must be those of the method.
+    monkeypatch.setattr(
+        clouds, "frame_renderer", lambda scene, method, **how: method_parameters(method, how)
+    )
     monkeypatch.setattr(clouds, "first_frame", lambda renderer: None)
     monkeypatch.setattr(clouds, "time_repeated", lambda work, seconds: next(timings))
     assert clouds._light_moved(None) == Timing(13.0, 11.0, 16.0, 5)

@@ -117,7 +117,7 @@ def test_terms_alone_have_no_name(words, terms):
         ),
         ("filament:color=2", {"source": "constant:2", "lobe": "none"}),
         ("filament:color=1,2,3,inScatteringSize=8,inScatteringStart=3", {"lobe": "8:3"}),
-        ("flax:cell=0.4,VolumetricFogDistance=90", {"law": "softened:0.16", "fade": "72:90"}),
+        ("flax:cell=0.4,VolumetricFogDistance=90", {"law": "softened:0.16", "fade": "72:88.59375"}),
         ("o3de:FogDensityClamp=0.7", {"cap": "0.7", "source": "constant:0.45,0.45,0.6"}),
     ],
 )
@@ -129,6 +129,17 @@ def test_parameters_of_engines_decide_terms(words, terms):
     told = {*(word for word in terms), "name", "ends", "light_path"}
     rest = [each.name for each in fields(Model) if each.name not in told]
     assert all(getattr(model, name) == getattr(engine, name) for name in rest)
+
+
+def test_the_fade_of_flax_has_the_weights_of_its_slices():
+    """The engine weighs slice i of N, which begins half a slice before i D/N."""
+    fade, slices = model_of("flax:cell=0.4,VolumetricFogDistance=90").fade_of, 64
+    assert fade is not None
+    full, none = fade
+    for i in range(slices):
+        depth = i * 90 / slices
+        weight = (slices - 1 - i) / (0.2 * slices - 1)
+        assert (none - depth) / (none - full) == pytest.approx(weight, rel=1e-12, abs=1e-12)
 
 
 def test_terms_after_a_preset_override_it_and_change_its_name():

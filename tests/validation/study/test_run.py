@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from airlight.analytic.clock import Spent
 from airlight.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.memory import Memory
@@ -25,6 +26,7 @@ from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.study import cost as expected_work
 from airlight.validation.study import reference as sampled
 from airlight.validation.study import run as module
+from airlight.validation.study import variation
 from airlight.validation.study.configuration import STANDARD, Configuration, configuration, prepared
 from airlight.validation.study.cost import Work, check_work, reference_work
 from airlight.validation.study.reference import cell_reference, load_cell
@@ -77,6 +79,41 @@ def test_a_row_has_the_errors_and_what_they_cost():
         == "airlight view sphere-spot --method shadow-planes --set kernel=exact --size 24x18"
     )
     assert row_values(row)["error.p99"] == row.error.p99
+
+
+def test_an_error_of_the_reference_is_no_bias_of_runs_by_pixel():
+    """Eight runs without a bias by a reference with random errors: these were called a bias."""
+    random = np.random.default_rng(5)
+    own = 2e-3 * random.normal(size=(12, 16, 3))
+    runs = [1 + 0.01 * random.normal(size=own.shape) for _ in range(8)]
+
+    def root(runs, error):
+        of = sampled.Reference(
+            1 + own, np.full(own.shape, error), "statistical", None, None, None, Spent()
+        )
+        return module._runs_error(of, runs).root_bias
+
+    assert root(runs, 0.0) == pytest.approx(2e-3, rel=0.3)
+    assert root(runs, 3 * 2e-3) is None
+    # A bias beyond that is found all the same.
+    assert root([run + 0.02 for run in runs], 3 * 2e-3) == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_an_error_of_the_reference_is_no_bias_of_a_method(variant, monkeypatch, known):
+    """A reference with random errors of 1 %: an exact method was said to have them."""
+    scene = mi.load_dict(tiny_scene(ball=None, size=(8, 6)))
+    exact = variation.reference_image(scene)
+    own = 0.01 * exact.airlight.mean()
+    spread = np.full(exact.airlight.shape, own if known else 0.0)
+    random = np.random.default_rng(5).normal(size=spread.shape)
+    other = replace(
+        exact, airlight=exact.airlight + own * random, airlight_se=spread, surface_se=spread
+    )
+    monkeypatch.setattr(variation, "reference_image", lambda scene: other)
+    (found,) = variation.method_noise(scene, [configuration("shadow-planes")], runs=2)
+    assert found.noise.relative_rmse == pytest.approx(0.01, rel=0.3)
+    assert (found.noise.root_bias is None) == known
 
 
 @pytest.mark.usefixtures("variant")
