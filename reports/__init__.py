@@ -4,10 +4,11 @@
 Read in this order:
 
 - `machine/`: what works on this machine, the Mitsuba variant, progress bars;
-- `data/`: report.json: its schema, writing, reading and claims;
+- `data/`: report.json: its schema, writing and reading;
 - `plotting/`: the style of charts, colour maps, pictures;
 - `tables/`: tables as data, and how they are drawn;
 - `interchange/`: descriptions of scenes for other renderers, glTF;
+- `engines/`: the report on engines of others: its data, judgements and page;
 - `diff/`: the comparison of two reports;
 - `page/`: the page of a report;
 - `figures/`: figures of a report and of the papers;

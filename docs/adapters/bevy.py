@@ -172,6 +172,8 @@ def refusal(described: dict[str, Any]) -> str | None:
         return "the adapter brings homogeneous fog alone"
     if len(set(medium["sigma_t"])) > 1:
         return "its fog has one extinction for all colours; expected a grey one"
+    if medium["sigma_t"][0] == 0:
+        return "the scene has no fog"
     if any(light["kind"] not in ("point", "spot") for light in lights):
         return "the adapter brings no lights but lamps"
     if described["sky"]:

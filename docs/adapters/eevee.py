@@ -100,11 +100,8 @@ def farthest(described: dict[str, Any]) -> float:
     ]
     lights = [light for light in described["lights"] if "position" in light]
     lamps = [4 * (Vector(light["position"]) - place).length for light in lights]
-    thick = (
-        8 / min((described["medium"] or {}).get("sigma_t", [0.0]))
-        if described["medium"]
-        else math.inf
-    )
+    least = min((described["medium"] or {}).get("sigma_t", [0.0]))
+    thick = 8 / least if least > 0 else math.inf
     return float(f"{min(thick, 1.01 * max([*corners, *lamps], default=100.0)):.6g}")
 
 

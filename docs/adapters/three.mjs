@@ -8,6 +8,8 @@
 // its density. Lights that are `dim` times as bright, and an image divided by `dim`, leave
 // int q dx. The node is 100 sigma_s, and lights are I/(4 pi), as there is no phase function: that
 // is isotropic scattering, and nothing is attenuated.
+import { inside } from './scene.mjs';
+
 const SCALE = 100; // the engine's 0.01
 const STEPLESS = 0.01; // a smoothstep needs a width [degrees]
 const RADIUS = 0.1; // where the law is cut [m]
@@ -29,15 +31,9 @@ function refusal({ camera, lights, medium, hulls }) {
     return 'its fog has bounds only where the camera is within them';
 }
 
-function inside({ positions, normals }, point) {
-  for (let i = 0; i < positions.length; i += 9)
-    if ([0, 1, 2].reduce((sum, k) => sum + normals[i + k] * (point[k] - positions[i + k]), 0) > 0)
-      return false;
-  return true;
-}
-
-/** Return the equation as terms of `airlight compare --model`. */
-function model({ hulls }, { far }) {
+/** Return the equation as terms of `airlight compare --model`; undefined where lights are not dark. */
+function model({ hulls }, { far, dim }) {
+  if (dim > 1e-3) return undefined; // 1 - exp(-X) is not X
   const ends = hulls.length ? '' : `,ends=spheres:0:${far}`;
   const terms = `light-path=off,camera-path=off,law=clamped:${RADIUS},spot=cosine-smooth`;
   return `${terms},phase=isotropic${ends}`;

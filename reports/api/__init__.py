@@ -9,7 +9,7 @@ Read in this order:
 - `comparisons.py`: comparisons, diagnoses and fits as results
 - `render.py`: `load_scene`, `render`; `frames.py`: the work of it;
 - `configurations.py`: the methods that a user names, checked
-- `reference.py`: `reference`
+- `reference.py`: `reference`; `rays.py`: `rays`, the camera rays of a scene
 - `compare.py`: `compare`, with `--diagnose` and `--fit`
 - `check.py`: `check`, relations between frames
 - `report.py`: `report`; `engines.py`: that on engines of others

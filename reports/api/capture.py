@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from airlight.reports.api.explore import Description
 
 _LAYERS = ("airlight", "surface")
+LIMIT = 300.0  #: of an engine by default [s]
 _LONGEST = 2e6  # [s], as of `realtime.child_process`
 
 
@@ -103,7 +104,7 @@ def capture(
     settings: Values = (),
     edit: Sequence[str] = (),
     adapters: File | None = None,
-    limit: float = 300.0,
+    limit: float = LIMIT,
     progress: Progress = None,
 ) -> Capture:
     """Render a scene in an engine, without a window, and write an EXR file.
@@ -153,8 +154,7 @@ def capture(
     if output is None:
         raise InputError(f"output: expected a file to write, such as -o {engine}.exr")
     (file,) = output_files(output, ".exr")
-    if not 0 < limit <= _LONGEST:
-        raise InputError(f"limit: got {limit:g}, expected a time above 0 up to {_LONGEST:g} [s]")
+    check_limit(limit)
     edits = _edits(edit)
     options = [*_settings(settings), *(f"edit={each}" for each in edits)]
     command = adapter_command(engine, adapters)
@@ -201,6 +201,12 @@ def capture(
         problems=told.problems,
         remarks=_remarks(described),
     )
+
+
+def check_limit(limit: float) -> None:
+    """Refuse what is no time that an engine may take [s]."""
+    if not 0 < limit <= _LONGEST:
+        raise InputError(f"limit: got {limit:g}, expected a time above 0 up to {_LONGEST:g} [s]")
 
 
 def _settings(settings: Any) -> list[str]:

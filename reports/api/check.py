@@ -188,12 +188,15 @@ def check(
         with telling(progress, f"{what} in {engine}") as tell:
             return _engine(str(what), engine, parameters, adapters, chosen, pixels, margin, tell)
     if model is not None:
-        exclude("model", "is no method", {"method": method, "kernel": kernel, **parameters})
+        others = {"method": method, "kernel": kernel, "precision": precision, **parameters}
+        exclude("model", "is no method", others)
         equation = chosen_model(model)
         assert equation is not None
         with telling(progress, f"{what}: {equation.title}") as tell:
             return _model(str(what), equation, chosen, pixels, margin, tell)
     if method is None:
+        others = {"kernel": kernel, "precision": precision, **parameters}
+        exclude("check", "without a method the frames are there already", others)
         return _files(Path(what), chosen, margin)
     asked = configuration_of(method, kernel, parameters)
     # A user's code may be written for single precision alone, as shaders are.
@@ -300,7 +303,8 @@ def _model(
 
 def _edge(model: "Model") -> str:
     """Return the edge of the spots of an equation, which the camera in their place then has too."""
-    return {"angle": "linear", "rim": "cosine"}.get(model.spot_of[0], model.spot_of[0])
+    kind, power = model.spot_of
+    return {"angle": "linear", "rim": f"rim:{power!r}"}.get(kind, kind)
 
 
 def _engine(

@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airlight.reports.api.inputs import File
+from airlight.reports.api.inputs import File, exclude
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table
 
 if TYPE_CHECKING:
     from airlight.reports.diff.compare import Difference
 
+_TIME_TOLERANCE = 0.25  #: relative change of a time that counts as noise on a quiet machine
+
 
 def diff(
     old: File,
     new: File,
     *,
-    time_tolerance: float = 0.25,
+    time_tolerance: float = _TIME_TOLERANCE,
 ) -> "ReportDifference":
     """Compare two reports: what got slower or less accurate.
 
@@ -50,6 +52,8 @@ def diff(
     if on_engines[0] and on_engines[1]:
         from airlight.reports.api.engines import difference_of_engines
 
+        given = {"time_tolerance": time_tolerance not in (_TIME_TOLERANCE, math.inf)}
+        exclude("diff", "reports on engines have no times", given)
         moved = difference_of_engines(on_engines[0], on_engines[1])
         return ReportDifference(old=str(old), new=str(new), difference=moved)
     # An infinite tolerance leaves times out.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airlight.errors import InputError, nearest
+from airlight.reports.api.capture import check_limit
 from airlight.reports.api.inputs import pixels_of, several, telling
 from airlight.reports.machine.engine_adapter import CannotError, adapter_names
 from airlight.reports.machine.environment import MissingError, activate
@@ -98,9 +99,10 @@ def report_on_engines(
     # Names are refused before Mitsuba starts.
     for scene in scenes:
         check_scene(scene)
-    asked = [name for words in several(engines) for name in str(words).split(",")]
+    check_limit(limit)
+    asked = [name.strip() for words in several(engines) for name in str(words).split(",")]
     of_engine = _settings(settings)
-    kept = None if images is None else _Kept.of(Path(images))
+    kept = None if images is None else _Kept.of(Path(images), [str(scene) for scene in scenes])
     known = adapter_names(adapters) if kept is None else kept.engines
     chosen = known if ALL in asked else asked
     for name in [*chosen, *of_engine]:
@@ -195,16 +197,19 @@ class _Kept:
     before: "Engines | None"  #: what engines.json says beside them
 
     @classmethod
-    def of(cls, folder: Path) -> "_Kept":
-        """Find the captures of a folder; Mitsuba is not needed."""
+    def of(cls, folder: Path, asked: Sequence[str]) -> "_Kept":
+        """Find the captures of a folder; `asked` are the scenes that the user names. Mitsuba is not
+        needed.
+        """
         from airlight.reports.engines.record import engines_file, read_engines
         from airlight.validation.engine.images import find_images, images_size
 
         file = engines_file(folder)
         before = None if file is None else read_engines(file)
-        # Files may be named by scenes of the user, whose paths engines.json knows.
+        # Files may be named by scenes of the user, whose paths the command or engines.json has.
         sources = {scene_stem(name): name for name in scene_names()}
         sources |= {scene.name: scene.source for scene in before.scenes} if before else {}
+        sources |= {scene_stem(name): name for name in asked}
         found = find_images(folder, sources)
         labels = {image.label for images in found.values() for image in images}
         labels |= set(before.engines) if before else set()

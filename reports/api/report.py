@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from airlight.errors import InputError
+from airlight.reports.api.capture import LIMIT
 from airlight.reports.api.inputs import (
     File,
     Kernels,
@@ -143,7 +144,7 @@ def report(
     engines: Words | None = None,
     diagnose: bool = False,
     adapters: File | None = None,
-    limit: float = 300.0,
+    limit: float = LIMIT,
     output: File | None = None,
     from_: File | None = None,
     figures: Literal["single", "double"] | None = None,
@@ -173,7 +174,8 @@ def report(
     quick
         Few scenes and small images, for a first look in some minutes.
     full
-        Large images, many samples and all tables, in about an hour.
+        Large images, many samples and all tables, in about an hour; fourteen scenes by default. Height
+        fog, density grids and many lights are measured where they are named.
     size
         Width and height of images and timed frames [pixels], or WxH; those of the effort by default.
     method
@@ -242,6 +244,7 @@ def report(
         exclude("engines", "no method is measured", {**of_methods, "cluster": cluster})
         if images is not None:
             of_engines: dict[str, Any] = {"size": size, "set": settings, "adapters": adapters}
+            of_engines |= {"limit": limit != LIMIT}
             exclude("images", "the engines are not run", of_engines)
         from airlight.reports.api.engines import report_on_engines
 
@@ -257,7 +260,8 @@ def report(
             output=Path(FOLDER if output is None else output),
             progress=progress,
         )
-    exclude("report", "they belong to --engines", {"diagnose": diagnose, "adapters": adapters})
+    of_adapters = {"diagnose": diagnose, "adapters": adapters, "limit": limit != LIMIT}
+    exclude("report", "they belong to --engines", of_adapters)
     # An old report is drawn again: nothing is measured, and options of measurement are mistakes.
     # With --figures, scenes and methods choose what the strip shows.
     if from_ is not None:

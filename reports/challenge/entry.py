@@ -58,7 +58,7 @@ def read_entry(folder: Path) -> EntryFolder:
     said, cannot = _said(folder / ENTRY)
     # The seed is in challenge.json, in entry.toml, or made of the words of the entry; where it is
     # said twice it is the same.
-    words = said.get("entry") or (challenge.entry if challenge else "")
+    words = " ".join((said.get("entry") or (challenge.entry if challenge else "")).split())
     seed = said.get("seed") or (challenge.seed if challenge else "")
     seed = seed or (seed_of_entry(words) if words else "")
     if not seed:

@@ -150,12 +150,14 @@ def read_score(file: Path) -> Score:
                 "of a black image: score again"
             )
     # Another machine finds the same number again, but for the rounding of logarithms.
-    again, _ = combined_score(score.scenes, score.digests.scenes)
-    said = (score.number, *score.interval)
-    made = (again.number, again.low, again.high)
-    if not all(abs(one - two) <= _UNIT * two for one, two in zip(said, made, strict=True)):
+    again, kinds = combined_score(score.scenes, score.digests.scenes)
+    made = (again.number, again.low, again.high, *kinds.values())
+    said = (score.number, *score.interval, *(score.kinds.get(kind, 0.0) for kind in kinds))
+    follow = all(abs(one - two) <= _UNIT * two for one, two in zip(said, made, strict=True))
+    if not follow or len(score.kinds) != len(kinds):
         raise InputError(
             f"{file}: its errors make the number {made[0]:g}, interval {made[1]:g} to {made[2]:g}, "
-            "it says others; expected a score as it was written: score again"
+            "and numbers of kinds, of which it says others; expected a score as it was written: "
+            "score again"
         )
     return score

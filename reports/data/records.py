@@ -99,7 +99,7 @@ class Reference:
     )
     kind: str | None = column(
         meaning="of that error: `proven`, `estimated` (density grids) or `statistical` (area lights, skies); `null` in "
-        "reports of 1.0.0",
+        "reports of before 2026-11-29",
         default=None,
     )
     surface_error: Number = column(

@@ -6,4 +6,5 @@ Read in this order:
 
 - `times.py`: a finding; times, by the rules of `validation.statistics.noise`
 - `compare.py`: errors, references, papers, and all of these together
+- `engines.py`: reports on engines: which numbers moved, which verdicts turned
 """

@@ -240,7 +240,10 @@ def captured_of(image: Image) -> Captured:
 
 def _headline(file: Path, source: str) -> str:
     """Return what the diagnosis says of an image, without being told the engine's equation."""
-    found = diagnose_file(file, source, model=PHYSICAL)
+    try:
+        found = diagnose_file(file, source, model=PHYSICAL)
+    except InputError as error:  # a sun in fog without bounds has no physical image
+        return f"nothing, as it cannot look: {error}"
     said = {each.layer: " ".join(each.lines[1:2]) for each in found}
     if len(said) == 1:
         return next(iter(said.values()))

@@ -76,14 +76,19 @@ def _sentence(data: Engines, engine: str) -> Iterator[str]:
         return
     # Two ranges and two counts.
     found = [layer.blocks["equation"] for layer in layers]
-    equation = "that of physics" if not any(found) else f"{_range(found)} off physics"
+    known = {error for error in found if error is not None}
+    equation = "its equation is that of physics"
+    if not known:  # a sun in fog without bounds has no physical image
+        equation = "how far its equation is off physics is not known"
+    elif any(known):
+        equation = f"its equation is {_range(found)} off physics"
     algorithm = _range([layer.blocks["algorithm"] for layer in layers])
     scenes = f"{len(layers)} scene{'' if len(layers) == 1 else 's'}"
     right = sum(layer.right for layer in layers)
-    words = f"{judged[0].title} in {scenes}: its equation is {equation}"
-    words += (
-        f", its images are {algorithm} off its equation, and {right} of {len(layers)} right by it"
+    words = (
+        f"{judged[0].title} in {scenes}: {equation}, its images are {algorithm} off its equation"
     )
+    words += f", and {right} of {len(layers)} right by it"
     others = len(cells) - len(judged)
     yield f"{words}; {others} more it does not have." if others else f"{words}."
 

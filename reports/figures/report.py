@@ -88,12 +88,17 @@ def latex_table(scenes: Sequence[Scene]) -> str:
     for scene in scenes:
         error = scene.reference.relative_error
         known = f", reference known to {number(error, 2, zeros=True)}" if error else ""
-        about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene.size) + known
+        about = _size(scene.size) + known
+        about += f", frames timed at {_size(scene.timed)}" if scene.timed != scene.size else ""
         rows = [_latex_row(entry) for entry in scene.methods]
         tables.append(
             methods_table(scene.name, rows, "label", *_TIMES, *_ERRORS, explanation=about)
         )
     return latex(tables, comment=comment)
+
+
+def _size(size: tuple[int, int]) -> str:
+    return "{} \N{MULTIPLICATION SIGN} {}".format(*size)
 
 
 def _latex_row(entry: CellRow) -> Row:
@@ -245,7 +250,8 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5
     # A character is about half as wide as the letters are high: titles keep to their column.
     letters = int(72 * wide / len(images) / (0.55 * size))
-    titles = [_words(entry, scene, letters) for entry in (None, *methods)]
+    about = f"reference\n{methods[0].layer}\n{scene}"
+    titles = [about, *(_words(entry, letters) for entry in methods)]
     lines = max(title.count("\n") for title in titles) + 1
     above = lines * 1.25 * size / 72 + 0.2
     figure = new_figure(wide, wide / len(images) * (2 * height / width + 0.5) + above)
@@ -274,13 +280,11 @@ def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], co
     return figure
 
 
-def _words(entry: CellRow | None, scene: str, letters: int) -> str:
+def _words(entry: CellRow, letters: int) -> str:
     """Return a label, its parameters, the error and the time, in lines of so many letters."""
-    if entry is None:
-        return f"reference\n\n{scene}"
     name, _, rest = entry.label.partition(" (")
     time = f", {number(entry.times.frame.median_ms)} ms" if entry.times else ""
-    parts = (name, rest.rstrip(")"), f"RMSE {_rmse(entry):.1e}{time}")
+    parts = (name, rest.rstrip(")"), f"rel. RMSE {_rmse(entry):.1e}{time}")
     return "\n".join(textwrap.fill(part, letters) for part in parts)
 
 

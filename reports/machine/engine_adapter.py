@@ -94,9 +94,14 @@ def _runner(path: Path) -> list[str]:
         return []
     with path.open("rb") as stream:
         first = stream.readline(1000).decode("utf-8", errors="replace")
-    words = shlex.split(first[2:]) if first.startswith("#!") else []
-    # `env` looks the program up in PATH, and so does the caller.
-    return words[1:] if words and Path(words[0]).name == "env" else words
+    try:
+        words = shlex.split(first[2:]) if first.startswith("#!") else []
+    except ValueError:  # a quote without an end
+        return []
+    # `env` looks the program up in PATH, and so does the caller; its -S takes several words.
+    if words and Path(words[0]).name == "env":
+        return words[2:] if words[1:2] == ["-S"] else words[1:]
+    return words
 
 
 def run_adapter(engine: str, command: Sequence[str], *, limit: float, folder: Path) -> Told:

@@ -107,6 +107,9 @@ def speed_chart(
     panels = figure.subplots(down, across, squeeze=False)
     for panel, scene in zip(panels.flat, timed):
         speed_panel(panel, scene.name, scene.methods, styles)
+        # Frames may be timed at another size than that of the images whose errors are shown.
+        if scene.timed != scene.size:
+            panel.set_xlabel("time of a frame of {} x {} [ms]".format(*scene.timed))
     for panel in panels.flat[len(timed) :]:
         panel.set_axis_off()
     figure.supylabel("relative RMSE of the airlight [1]", fontsize="medium")
@@ -135,7 +138,7 @@ def speed_panel(
 
     For a method that draws random numbers a bar goes down from its error to its bias, or to the
     largest possible bias. A time that another program measured is hollow, and says so: it is of
-    another run than the others.
+    another run than the others. An error of other light than the airlight says so, too.
     """
     points = {}
     for entry in filter(has_point, entries):
@@ -153,11 +156,14 @@ def speed_panel(
             bias = noise.most_bias if noise.root_bias is None else noise.root_bias
             if bias is not None:
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
-        # Not measured in turns with the others.
+        # Not measured in turns with the others, or not of the light that the axis names.
+        remarks = [] if entry.layer == "airlight" else [f"error of the {entry.layer}"]
         if entry.times.run is None:
             style["markerfacecolor"] = "none"
+            remarks.append("timed elsewhere")
+        if remarks:
             panel.annotate(
-                "timed elsewhere",
+                ", ".join(remarks),
                 (frame.median_ms, error),
                 (0, 5),
                 textcoords="offset points",

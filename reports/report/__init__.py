@@ -6,5 +6,6 @@ Read in this order:
 - `scene.py`: the record of a scene, and its files
 - `others.py`: what belongs to no scene: stability, growth, claims of papers
 - `claims.py`: the sentences at the top, from the numbers, and what user methods did wrong
-- `measure.py`: all of these, report.json and the page, in a folder out of sight until it is whole
+- `staged.py`: a folder out of sight until it is whole
+- `measure.py`: all of these, report.json and the page
 """

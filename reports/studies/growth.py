@@ -89,40 +89,41 @@ def scaling(
 
 
 def _draw_scaling(records: list[Scaling], column: str) -> Any:
-    """Return the time of a frame over its work, by kind of work, with the fitted
+    """Return the time of a frame over its work, by scene and kind of work, with the fitted
     exponents and the camera rays.
     """
     from airlight.reports.plotting.figure import new_figure
     from airlight.reports.plotting.style import WIDTHS, report_styles
     from airlight.reports.tables.costs import WORK
 
-    # A panel for each kind of work, in it a line for each method; the camera rays are the floor
-    # below all of them.
-    kinds = list(dict.fromkeys(record.kind for record in records))
+    # A panel for each kind of work in each scene, in it a line for each method; the camera rays are
+    # the floor below all of them.
+    kinds = list(dict.fromkeys((record.scene, record.kind) for record in records))
     width, double = WIDTHS[column], column == "double"
     across = min(len(kinds), 2 if double else 1)
     down = -(-len(kinds) // across)
     figure = new_figure(width, (0.42 if double else 0.9) * width * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     styles = report_styles((record.label.split()[0], record.label) for record in records)
-    for panel, kind in zip(panels, kinds):
-        costs: tuple[StepCost, ...] = ()
-        for record in (each for each in records if each.kind == kind):
+    for panel, (scene, kind) in zip(panels, kinds):
+        most: tuple[StepCost, ...] = ()
+        for record in (each for each in records if (each.scene, each.kind) == (scene, kind)):
             costs = record.costs
+            most = max(most, costs, key=len)
             label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
             times = [cost.frame.median_ms for cost in costs]
             panel.plot([cost.work for cost in costs], times, label=label, **styles[record.label])
-        # The camera rays are the same for all methods: the times beside the last method stand for
-        # all.
-        rays = [cost.rays.median_ms for cost in costs]
+        # The camera rays are the same for all methods: the times beside the method with the most
+        # steps stand for all.
+        rays = [cost.rays.median_ms for cost in most]
         panel.plot(
-            [cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays"
+            [cost.work for cost in most], rays, color="0.6", linestyle=":", label="camera rays"
         )
         panel.set(
             xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]"
         )
+        panel.set_title(scene, parse_math=False)  # a dollar in a name must not begin a formula
         panel.legend(loc="best")
     for panel in panels[len(kinds) :]:
         panel.remove()
-    figure.suptitle(", ".join(dict.fromkeys(record.scene for record in records)))
     return figure

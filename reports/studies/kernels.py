@@ -96,9 +96,10 @@ def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
     styles = kernel_styles(dict.fromkeys(cost.family for cost in costs))
     for panel, (statistic, title) in zip(panels, _STATISTICS.items()):
         for family, style in styles.items():
-            # By time; errors outside the range are drawn at its edge.
+            # By time; errors outside the range are drawn at its edge, and so are those of all rays
+            # of a kernel that gave values that are not finite.
             points = sorted(
-                (cost.time.median, error)
+                (cost.time.median, most if cost.nonfinite and statistic != "median" else error)
                 for cost in costs
                 if cost.family == family
                 and cost.time

@@ -150,8 +150,8 @@ def methods(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; all built-in scenes for fog by
-        default.
+        Built-in scenes, random:SEED and Mitsuba XML or pbrt files; by default the fourteen built-in
+        ones of homogeneous fog with few lights.
     method
         A method of `airlight list methods`, a user's as MODULE:FUNCTION, FILE.py:FUNCTION or
         FILE.glsl, or 'all', the default; may be given several times. A name stands for its standard

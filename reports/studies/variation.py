@@ -39,9 +39,10 @@ def noise(
 ) -> Study:
     """Measure bias and noise of methods that draw random numbers, by independent runs of one frame.
 
-    The reference has no noise. Methods that draw no random numbers stand in the same table: all of
-    their error is bias. docs/your-engine.md explains the numbers; `airlight compare SCENE
-    "runs/####.exr"` has the same for renders of others.
+    All runs are compared with one reference, and a bias is told where it is beyond the error of that.
+    Methods that draw no random numbers stand in the same table: all of their error is bias.
+    docs/your-engine.md explains the numbers; `airlight compare SCENE "runs/####.exr"` has the same
+    for renders of others.
 
     Parameters
     ----------

@@ -11,7 +11,8 @@ this file says where each is, to editors and type checkers too.
 >>> airlight.compare(exact, frame).metrics.relative_rmse < 0.01
 True
 
-Every command is a function of the same name; the other names are what these are made of.
+Every command but `test` and `completion` is a function of the same name; the other names are what
+these are made of.
 """
 
 import sys

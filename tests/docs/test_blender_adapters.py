@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -217,6 +218,16 @@ def test_the_equation_of_eevee_is_that_of_its_settings(adapter, settings, path):
     lamps = "range=quartic:205,spot=cosine-smooth"
     assert model == f"{path}{lamps},ends=planes:0.02:20.5,surface.light-path=off"
     assert not model_of(model).is_physical
+
+
+def test_a_channel_without_extinction_ends_no_fog_of_eevee(adapter, monkeypatch):
+    nothing = SimpleNamespace(data=SimpleNamespace(objects=[]))
+    monkeypatch.setitem(sys.modules, "bpy", nothing)
+    monkeypatch.setitem(sys.modules, "mathutils", SimpleNamespace(Vector=tuple))
+    described = {"camera": {"position": [0, 0, 0]}, "lights": []}
+    far = adapter("eevee").farthest
+    assert far(described | {"medium": {"sigma_t": [0.5, 0.0, 0.2]}}) == 101
+    assert far(described | {"medium": {"sigma_t": [0.5, 0.1, 0.2]}}) == 80
 
 
 # With Blender.

@@ -228,9 +228,14 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
 
 
 @cache
-def _judged() -> dict[str, Any]:
+def _papers() -> dict[str, Any]:
     """Return what `airlight paper --json` printed."""
-    return json.loads((DATA / "papers.json").read_text(encoding="utf-8"))["result"]
+    return json.loads((DATA / "papers.json").read_text(encoding="utf-8"))
+
+
+def _judged() -> dict[str, Any]:
+    """Return the result of `airlight paper --json`."""
+    return _papers()["result"]
 
 
 def verdicts() -> str:
@@ -245,12 +250,12 @@ def verdicts() -> str:
 
 def judged() -> str:
     """Return how many claims have each verdict, and what measured them."""
-    record = _judged()
+    command, record = _papers()["command"], _judged()
     made = record["environment"]
     rows = [record_of(row, Claim) for row in record["papers"] if row["verdict"]]
     rest = f" {record['left_out']} more were not measured." if record["left_out"] else ""
     return (
-        f"{count_words(rows)}.{rest} Measured {record['measured'][:10]} by `airlight paper`, commit "
+        f"{count_words(rows)}.{rest} Measured {record['measured'][:10]} by `{command}`, commit "
         f"{made['build']['commit'][:12]}, on {made['processor']}, {made['threads']} threads, "
         f"mitsuba {made['versions']['mitsuba']}, drjit {made['versions']['drjit']}."
     )

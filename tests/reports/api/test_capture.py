@@ -212,6 +212,14 @@ def test_mistakes_are_refused_before_anything_starts(folder, tmp_path, monkeypat
     assert why in str(caught.value)
 
 
+def test_the_first_line_of_an_adapter_may_have_several_words_behind_env(tmp_path):
+    (tmp_path / "one.py").write_text(f"#!/usr/bin/env -S {sys.executable} -P\n")
+    (tmp_path / "two.py").write_text("#!/bin/sh don't\n")  # a quote without an end
+    assert engine_adapter.adapter_names(tmp_path) == ["one"]
+    command = engine_adapter.adapter_command("one", tmp_path)
+    assert command == [sys.executable, "-P", str(tmp_path / "one.py")]
+
+
 def test_what_is_missing_is_named_with_the_line_to_type(folder, tmp_path, monkeypatch):
     with pytest.raises(MissingError, match=r"runs by nowhere-to-be-found, which is missing. To"):
         airlight.capture("lost", "open-fog", output=tmp_path / "x.exr", adapters=folder)

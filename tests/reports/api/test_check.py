@@ -106,6 +106,8 @@ def test_frames_of_a_folder_are_judged(folder, capsys):
         (("--only", "unitz"), "only: got 'unitz'"),
         (("--only", "pan"), "none of the relations that are asked for"),
         (("--margin", "2"), "margin: got 2"),
+        (("--set", "kernel=exact", "--precision", "double"), "leave out kernel, precision"),
+        (("--set", "steps=8"), "leave out steps"),
     ],
 )
 def test_what_a_folder_has_not_is_refused(folder, capsys, words, why):

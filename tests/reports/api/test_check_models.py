@@ -43,8 +43,15 @@ def test_a_light_path_alone_is_what_reciprocity_finds(variant):
     }
 
 
+def test_the_camera_in_the_place_of_a_spot_has_its_rim(variant):
+    """It had the rim of the power 1: with any other, `reciprocity` failed where nothing is wrong."""
+    assert broken("spot=rim:3", only="reciprocity", size="16x12") == set()
+
+
 def test_a_model_is_no_method(variant):
     with pytest.raises(InputError, match="model: is no method"):
         airlight.check("sphere-spot", "unshadowed", model="three")
+    with pytest.raises(InputError, match="leave out precision"):
+        airlight.check("sphere-spot", model="three", precision="single")
     with pytest.raises(InputError, match="no model is called"):
         airlight.check("sphere-spot", model="plycanvas")

@@ -180,6 +180,8 @@ def test_kept_images_are_judged_alike_and_a_change_is_seen(written, tmp_path, ca
             "images: the engines are not run; leave out adapters",
         ),
         (["--diagnose"], "report: they belong to --engines; leave out diagnose, adapters"),
+        (["--limit", "9"], "report: they belong to --engines; leave out adapters, limit"),
+        (["--engines", "fake", "--limit", "nan"], "limit: got nan, expected a time above 0"),
     ],
 )
 def test_mistakes_are_one_line(variant, words, said, adapters, tmp_path, capsys):
@@ -216,7 +218,37 @@ def test_scenes_of_users_have_images_too(variant, adapters, tmp_path):
     assert again.data.cells[0].layers == cell.layers
 
 
+SUN = """<scene version="3.0.0">
+<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="0.1"/><rgb name="albedo" value="0.8"/>
+</medium><emitter type="directional"><vector name="direction" value="0.2,0.1,-1"/>
+<rgb name="irradiance" value="1"/></emitter><sensor type="perspective"><ref name="medium" id="fog"/>
+<film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="18"/></film>
+</sensor></scene>"""
+
+
+@pytest.mark.claim("engines-judged")
+def test_what_has_no_physical_image_is_told_so_and_not_taken_for_physics(variant, tmp_path):
+    """A sun in fog without bounds; its capture lies in a folder without engines.json."""
+    scene, images = tmp_path / "sun.xml", tmp_path / "images"
+    scene.write_text(SUN)
+    own = airlight.reference(str(scene), model="light-path=off")
+    images.mkdir()
+    attributes = {"airlight:engine": "Fake", "airlight:model": "light-path=off"}
+    layers = {"airlight": own.airlight, "surface": own.surface}
+    write_exr(images / "sun.fake.exr", Image(layers, attributes=attributes))
+    made = airlight.report(
+        str(scene), engines="all", images=images, diagnose=True, output=tmp_path / "out"
+    )
+    (said,) = made.claims
+    assert "how far its equation is off physics is not known" in said
+    assert "1 of 1 right by it" in said
+    (cell,) = made.data.cells
+    assert "nothing of it arrives" in cell.headline
+
+
 def test_data_of_another_version_are_refused(tmp_path):
     (tmp_path / "engines.json").write_text('{"schema": "airlight-engines/0"}')
     with pytest.raises(InputError, match="airlight-engines/1; make it again"):
         airlight.diff(tmp_path, tmp_path)
+    with pytest.raises(InputError, match="no times; leave out time_tolerance"):
+        airlight.diff(tmp_path, tmp_path, time_tolerance=0.1)

@@ -70,11 +70,13 @@ def test_entries_of_other_challenges_share_no_table():
     ]
 
 
-@pytest.mark.parametrize("field", ["number", "interval", "error"])
+@pytest.mark.parametrize("field", ["number", "interval", "error", "kinds"])
 def test_a_score_whose_number_does_not_follow_is_refused(tmp_path, field):
     data = json.loads(score_text(score("a", 0.1)))
     if field == "error":
         data["scenes"][3]["error"] *= 0.5
+    elif field == "kinds":
+        data["kinds"]["engine"] *= 0.5
     else:
         data[field] = 0.05 if field == "number" else [0.01, 0.02]
     (tmp_path / "a.json").write_text(json.dumps(data, indent=1))

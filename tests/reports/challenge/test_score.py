@@ -97,7 +97,11 @@ def test_the_words_of_an_entry_are_its_seed(perfect, small, tmp_path, capsys):
     entry = perfect("named", seed=seed_of_entry(words), entry=words)
     data = json.loads(scored(entry, tmp_path))
     assert data["entry"]["entry"] == words
+    # The same words with other spaces are the same entry, also beside challenge.json.
     text = (entry / "entry.toml").read_text()
+    assert run(["challenge", "new", "--entry", words, "-o", str(entry)]) == 0
+    (entry / "entry.toml").write_text(text.replace("named, commit", "named,  commit"))
+    assert json.loads(scored(entry, tmp_path)) == data
     (entry / "entry.toml").write_text(text.replace("commit abc", "commit abd"))
     assert run(["challenge", "score", str(entry)]) == 2
     assert "has the seed" in capsys.readouterr().err

@@ -4,6 +4,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,15 @@ def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(repor
     assert "a\\_scene" in (tmp_path / "first" / "methods-table.tex").read_text()
 
 
+def test_tables_and_charts_name_the_size_of_timed_frames(report):
+    """Images of 32 x 24 pixels are compared, frames of 320 x 240 timed."""
+    (studied,) = load_report(report)[0].scenes
+    assert "frames timed at 320" in figures.latex_table([studied])
+    assert "frames timed" not in figures.latex_table([replace(studied, timed=studied.size)])
+    label = figures.draw_speed([studied], "single").axes[0].get_xlabel()
+    assert label == "time of a frame of 320 x 240 [ms]"
+
+
 def test_the_strip_shows_where_methods_are_wrong(report):
     data, place = load_report(report)
     _, methods, images = figures._strip(data, place, None, None)
@@ -135,6 +145,7 @@ def test_the_panels_of_the_strip_are_the_images_under_their_names(report):
     scene, methods, images = figures._strip(data, place, None, None)
     figure = figures.draw_strip(scene, methods, images, "double")
     titled = [axes for axes in figure.axes if axes.get_title() and axes.images]
+    assert titled[0].get_title() == "reference\nairlight\na_scene"
     assert [axes.get_title().split("\n")[0] for axes in titled] == [
         "reference",
         *(m.label.split(" (")[0] for m in methods),

@@ -217,6 +217,15 @@ def test_bars_of_noisy_methods_go_down_to_their_bias():
     np.testing.assert_allclose(np.ravel([bar[0][:, 1] for bar in bars]), [0.05, 0.2])
 
 
+def test_an_error_of_other_light_than_the_airlight_says_so():
+    from matplotlib.figure import Figure
+
+    entries = [record_of(entry(each, layer=each), Method) for each in ("airlight", "total")]
+    panel = Figure().subplots()
+    speed_panel(panel, "scene", entries, {"airlight": {}, "total": {}})
+    assert [text.get_text() for text in panel.texts] == ["error of the total"]
+
+
 def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():
     """A dollar begins mathematics in matplotlib; half a formula would end the
     report after all its work.

@@ -6,6 +6,7 @@ and what has none says why.
 import csv as comma_separated
 import io
 
+from airlight.reports.studies.growth import _draw_scaling
 from airlight.reports.tables.costs import (
     cliffs,
     cost_table,
@@ -147,3 +148,13 @@ def test_records_to_compare_are_of_one_method_scene_size_and_work():
     old, new = growth(exponent=0.5), growth(exponent=0.6)
     assert same_records([old, growth(size=(40, 30))], [growth(size=(20, 15)), new]) == [(old, new)]
     assert same_records([old], []) == []
+
+
+def test_growth_in_two_scenes_has_a_panel_for_each():
+    """A method that refused early does not cut the camera rays short."""
+    refused = growth_record(works=(100.0,)) | {"label": "light-volumes (exact)"}
+    records = [growth_record(), growth_record() | {"scene": "fence"}, refused]
+    figure = _draw_scaling([record_of(each, Scaling) for each in records], "single")
+    lines = {axes.get_title(): axes.lines for axes in figure.axes}
+    assert {name: len(of) for name, of in lines.items()} == {"hall": 3, "fence": 2}
+    assert list(lines["hall"][-1].get_xdata()) == [100.0, 400.0]
