@@ -249,8 +249,9 @@ def adapted(
     tolerance of each [1]. Returns `value`, `error`: the sums and estimates of their errors,
     (count,), or (count, columns): all columns share panels.
     """
-    # A sum that still misses its tolerance after so many halvings says so by its error.
-    halvings = 40
+    # A sum that still misses its tolerance after so many halvings, or with so many panels, says so
+    # by its error. A kink needs two panels a halving; thousands chase rounding of the integrand.
+    halvings, most = 40, 4096
     panels = evaluate(*first)
     for _ in range(halvings):
         owner = row[panels.owner]
@@ -261,10 +262,11 @@ def adapted(
             break
         # Otherwise each panel may take an equal part of the tolerance. Those that exceed it are
         # halved, unless their error is rounding, which no halving removes.
-        fraction = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
+        panel_count = np.bincount(owner, minlength=count)
+        fraction = (allowed.T / np.maximum(panel_count, 1)).T
         misses = missed[owner] & (panels.error > fraction[owner]) & (panels.error > panels.noise)
         # Columns share their panels: a panel that one column needs halved is halved for all.
-        halve = np.any(misses.reshape(len(misses), -1), axis=1)
+        halve = np.any(misses.reshape(len(misses), -1), axis=1) & (panel_count[owner] < most)
         if not halve.any():
             break
         # Both halves of every such panel are evaluated in one call.

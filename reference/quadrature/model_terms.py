@@ -60,7 +60,7 @@ from airlight.reference.scene.point_light import ReferenceLight
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 from airlight.reference.visibility.distances import half_chord
-from airlight.reference.visibility.planes import Rays, spot_edge
+from airlight.reference.visibility.planes import Rays, axis_versine, spot_edge, versine
 
 Array = NDArray[np.float64]
 Weight = Callable[[Array], Array]
@@ -254,29 +254,25 @@ def edge_profile(model: Model, light: ReferenceLight, rays: Rays) -> Profile | N
     if kind == "angle" or light.axis is None or light.cosine:
         return profile_of(light, rays)
     axis = light.axis
-    start = (rays.origin - rays.position) @ axis
-    rise = rays.direction @ axis
 
     def profile(x: Array, ray: NDArray[np.int64]) -> Array:
-        r = np.hypot(rays.height[ray, None], x - rays.foot[ray, None])
-        cosine = (start[ray, None] + rise[ray, None] * x) / np.maximum(r, np.finfo(float).tiny)
-        return edge(kind, power, np.clip(cosine, -1, 1), light)
+        theta = np.arctan2(x - rays.foot[ray, None], rays.height[ray, None])
+        return edge(kind, power, axis_versine(theta, rays[ray], axis), light)
 
     return profile
 
 
-def edge(kind: str, power: float, cosine: Array, light: ReferenceLight) -> Array:
-    """Return intensity over that on the axis by the cosine of the angle to it [1]."""
-    beam, cutoff = np.cos(light.beam), np.cos(light.cutoff)
+def edge(kind: str, power: float, versine: Array, light: ReferenceLight) -> Array:
+    """Return intensity over that on the axis by 1 - cos of the angle to it [1]."""
+    # 1 - cos = 2 sin^2(angle/2) keeps its digits near the axis.
+    beam, cutoff = (2 * np.sin(0.5 * angle) ** 2 for angle in (light.beam, light.cutoff))
     if kind == "angle":
-        return spot_edge(cosine, light)
+        return spot_edge(versine, light)
     if kind == "rim":
-        # 1 - c = 2 sin^2(angle/2), which keeps its digits near the axis.
-        rim = np.maximum(1 - cosine, 0.0) / (2 * np.sin(0.5 * light.cutoff) ** 2)
-        return 1 - np.minimum(rim, 1.0) ** power
-    if not beam > cutoff:  # a hard spot keeps its edge
-        return (cosine >= cutoff).astype(np.float64)
-    t = np.clip((cosine - cutoff) / (beam - cutoff), 0.0, 1.0)
+        return 1 - np.minimum(versine / cutoff, 1.0) ** power
+    if not beam < cutoff:  # a hard spot keeps its edge
+        return (versine <= cutoff).astype(np.float64)
+    t = np.clip((cutoff - versine) / (cutoff - beam), 0.0, 1.0)
     return t * t if kind == "cosine-squared" else t * t * (3 - 2 * t)
 
 
@@ -418,8 +414,10 @@ def surface_strength(
         factor = factor * weight(r)
     kind, power = model.spot_of
     if kind != "angle" and light.axis is not None:
-        cosine = np.clip((way @ light.axis) / r, -1, 1)
+        cosine = (way @ light.axis) / r
+        squared_sine = np.sum(np.cross(way, light.axis) ** 2, axis=1) / r**2
+        off_axis = versine(cosine, squared_sine)
         # Mitsuba's light has its own edge, which is taken out where there is light at all.
-        own, asked = edge("angle", 1.0, cosine, light), edge(kind, power, cosine, light)
+        own, asked = edge("angle", 1.0, off_axis, light), edge(kind, power, off_axis, light)
         factor = factor * np.where(own > 0, asked / np.where(own > 0, own, 1.0), 0.0)
     return factor

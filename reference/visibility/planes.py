@@ -25,6 +25,14 @@ cosine between an axis of the light and the way to the point at theta is
 to the foot point. A cone of half angle b is therefore one interval, |theta - theta_m| <= acos(cos
 b / m), nothing if m < cos b: no nappes, no cases. (`realtime.rays` solves a quadratic equation in
 the distance instead.)
+
+Cosines of small angles have few of their digits: a spot of 0.3 degrees would end 1e-11 of its edge
+beside its place, and adaptive rules would chase that. With the third component of the axis,
+`beside`, the sine of its angle to the way is
+
+    s(theta) = sqrt((axial cos(theta) - across sin(theta))^2 + beside^2),
+
+and 1 - c = s^2/(1 + c), tan(half) = sqrt(sin^2 b - beside^2)/cos b, which keep theirs.
 """
 
 from dataclasses import dataclass
@@ -118,12 +126,21 @@ def cone_interval(rays: Rays, light: ReferenceLight, angle: float) -> tuple[Arra
     if light.axis is None:
         half_pi = np.full(len(rays.foot), 0.5 * np.pi)
         return -half_pi, half_pi
-    axial, across = rays.direction @ light.axis, rays.normal @ light.axis
-    magnitude = np.hypot(axial, across)
+    axial, across, beside = _in_plane(rays, light.axis)
     middle = np.arctan2(axial, across)
-    ratio = np.cos(angle) / np.maximum(magnitude, np.finfo(float).tiny)
-    half = np.where(ratio < 1, np.arccos(np.minimum(ratio, 1.0)), -1.0)
+    # The half angle within the plane has the cosine cos(angle)/sqrt(1 - beside^2), and this tangent,
+    # which keeps the digits of narrow cones.
+    square = np.sin(angle) ** 2 - beside**2
+    half = np.where(square > 0, np.arctan2(np.sqrt(np.maximum(square, 0)), np.cos(angle)), -1.0)
     return middle - half, middle + half
+
+
+def _in_plane(rays: Rays, axis: Array) -> tuple[Array, Array, Array]:
+    """Return the components of an axis along the rays, along their normals, and beside both,
+    (rays,) each [1].
+    """
+    beside = np.cross(rays.direction, rays.normal) @ axis
+    return rays.direction @ axis, rays.normal @ axis, beside
 
 
 def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
@@ -135,18 +152,34 @@ def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
     """
     if not light.is_soft or light.axis is None:
         return np.ones_like(theta)
-    axial, across = (rays.direction @ light.axis)[:, None], (rays.normal @ light.axis)[:, None]
-    # The cosine at a sample of an area light; else Mitsuba's spot.
-    if light.cosine:
-        return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
-    return spot_edge(axial * np.sin(theta) + across * np.cos(theta), light)
+    if not light.cosine:
+        return spot_edge(axis_versine(theta, rays, light.axis), light)
+    # The cosine at a sample of an area light.
+    axial, across, _ = (each[:, None] for each in _in_plane(rays, light.axis))
+    return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
 
 
-def spot_edge(cosine: Array, light: ReferenceLight) -> Array:
-    """Return the profile of Mitsuba's spot, linear in the angle from `beam` to `cutoff`, by the
-    cosine of the angle to the axis [1].
+def axis_versine(theta: Array, rays: Rays, axis: Array) -> Array:
+    """Return 1 - cos of the angles between an axis of the light and the ways to points, (rays,
+    angles) [1].
+
+    `theta`: angles at the light, (rays, angles) [rad].
     """
-    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    axial, across, beside = (each[:, None] for each in _in_plane(rays, axis))
+    cosine = axial * np.sin(theta) + across * np.cos(theta)
+    return versine(cosine, (axial * np.cos(theta) - across * np.sin(theta)) ** 2 + beside**2)
+
+
+def versine(cosine: Array, squared_sine: Array) -> Array:
+    """Return 1 - cos, which keeps its digits at small angles: sin^2 over 1 + cos."""
+    return np.where(cosine > 0, squared_sine / (1 + np.maximum(cosine, 0)), 1 - cosine)
+
+
+def spot_edge(versine: Array, light: ReferenceLight) -> Array:
+    """Return the profile of Mitsuba's spot, linear in the angle from `beam` to `cutoff`, by 1 - cos
+    of the angle to the axis [1].
+    """
+    angle = 2 * np.arcsin(np.sqrt(np.clip(0.5 * versine, 0.0, 1.0)))
     if not light.is_soft:
         return (angle <= light.cutoff).astype(np.float64)
     return np.clip((light.cutoff - angle) / (light.cutoff - light.beam), 0.0, 1.0)
