@@ -444,10 +444,11 @@ def spawn_surfaces(
 def spawn_lights(bevy: Any, scene: Scene, settings: dict[str, Any], commands: Any) -> None:
     """Spawn the lamps, and the fog: a box about the camera."""
     for light, matrix in scene.lights:
-        brightest = max(light["intensity"])
+        brightest = max(light["intensity"]) or 1.0  # of a lamp that is off
         values = {
             "color": bevy.color([each / brightest for each in light["intensity"]]),
-            "intensity": 4 * math.pi * brightest,  # in lumens, also that of spots
+            # In lumens, also that of spots.
+            "intensity": 4 * math.pi * max(light["intensity"]),
             "range": settings["range"],
             "shadows_enabled": True,
             "shadow_depth_bias": settings["shadow_depth_bias"],

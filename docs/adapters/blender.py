@@ -173,8 +173,6 @@ def refusal(engine: Engine, described: dict[str, Any], properties: dict[str, Any
         if "cannot" in part:
             like = "" if engine.key == "CYCLES" else " is set up as Cycles"
             return f"{engine.name}{like}: {part['cannot']}"
-    if described["sky"]:
-        return f"{engine.name}: the adapter brings no sky"
     for medium in [described["medium"] or {}, *described["bounded_media"]]:
         phase = medium.get("phase", {"name": "isotropic"})["name"]
         if phase not in engine.phases:

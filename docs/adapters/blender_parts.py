@@ -170,8 +170,8 @@ def medium_of(node: Any, unit: float) -> Medium:
     # Volumes that are added up scatter and absorb together.
     if node.bl_idname == "ShaderNodeAddShader":
         medium = Medium(np.zeros(3), np.zeros(3))
-        for each in map(source, node.inputs):
-            medium += medium if each is None else medium_of(each, unit)
+        for each in filter(None, map(source, node.inputs)):
+            medium += medium_of(each, unit)
         return medium
     if node.bl_idname not in _VOLUMES:
         raise CannotError(f"its volume is a {node.bl_label}; expected one that is the same inside")

@@ -61,7 +61,7 @@ export function sceneOf(json, glb) {
 
 /** Return why no engine of a game can have a scene, in words; undefined where it can. */
 export function refusal({ described, lights, medium, hulls }) {
-  if (!medium) return 'the scene has no fog';
+  if (!medium || medium.sigma_t?.every(x => x === 0)) return 'the scene has no fog';
   if (medium.voxels) return 'its fog is a density grid, which the adapter does not bring';
   if (described.lights.some(light => light.kind === 'area')) return 'its fog has no area lights';
   if (described.sky) return 'its fog has no sky';

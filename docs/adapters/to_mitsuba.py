@@ -26,7 +26,7 @@ from typing import Any, NoReturn
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from blender import WRONG, end, find_bpy
+from blender import MISSING, WRONG, end, find_bpy
 
 try:
     import numpy as np
@@ -141,6 +141,9 @@ def main() -> None:
     find_bpy("to_mitsuba")
     import bpy
 
+    # Before 5.0 an area light of Cycles is darker, by pi/4, and lights lack properties.
+    if bpy.app.version < (5, 0):
+        end(MISSING, f"to_mitsuba: Blender is {bpy.app.version_string}; expected 5.0 or newer")
     if options.level is not None:
         try:
             bpy.ops.wm.open_mainfile(filepath=os.path.abspath(options.level))

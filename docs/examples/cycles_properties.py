@@ -56,7 +56,9 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
     `world` and each of `media`, by mesh, have `phase` and `inputs` of a node "Volume Coefficients",
     None where there is no medium. `materials`, by mesh, have `inputs` of a node "Diffuse BSDF" and
     say whether it is `two_sided`, black from behind otherwise. `objects` are properties of every
-    mesh. What Cycles does not have is a dictionary with `cannot`, the reason in words.
+    mesh, and `turn` is the matrix (4 x 4, rows) that brings a mesh of the glTF file, as Blender
+    imports it, back to the axes of the scene. What Cycles does not have is a dictionary with
+    `cannot`, the reason in words.
     """
     camera = described["camera"]
     width, height = camera["size"]
@@ -82,14 +84,24 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
             ),
         },
         "lights": [_light(light) for light in described["lights"]],
-        "world": None if medium is None else _volume(medium),
+        "world": _world(medium, described.get("sky")),
         "media": {bounded["name"]: _volume(bounded) for bounded in described["bounded_media"]},
         "materials": {surface["name"]: _material(surface) for surface in described["surfaces"]},
         "objects": {
             "cycles.shadow_terminator_offset": 0.0,
             "cycles.shadow_terminator_geometry_offset": 0.0,
         },
+        "turn": _turn(described["up"]),
     }
+
+
+def _turn(up: str) -> list[list[float]]:
+    """Return the matrix from Blender's axes to those of the scene: a glTF file has y for what is up
+    in the scene, and Blender turns its y to z.
+    """
+    upwards = np.eye(3)["xyz".index(up[-1])] * (-1 if up.startswith("-") else 1)
+    right = {"x": (0, -1, 0), "-x": (0, 1, 0)}.get(up, (1, 0, 0))
+    return _matrix(right, np.cross(upwards, right), upwards, (0, 0, 0))
 
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
@@ -100,6 +112,9 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
         return {"cannot": "area lights were not tried in Cycles"}
     if light["kind"] == "spot" and light["beam_angle"] < light["cutoff_angle"]:
         return {"cannot": "the edge of Blender's spots is another function of the angle"}
+    # Blender would take 1 degree in its place, and not say so.
+    if light["kind"] == "spot" and 2 * light["cutoff_angle"] < 1:
+        return {"cannot": "Blender's spots are at least a degree wide"}
     directional = light["kind"] == "directional"
     values = light["irradiance" if directional else "intensity"]
     brightest = max(values)
@@ -122,6 +137,13 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     place = light.get("position", (0.0, 0.0, 0.0))
     matrix = _matrix(side.tolist(), np.cross(backward, side).tolist(), backward, place)
     return {"type": _KINDS[light["kind"]], "data": data, "matrix_world": matrix}
+
+
+def _world(medium: dict[str, Any] | None, sky: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Return the medium of all space, None for a vacuum."""
+    if sky is not None:
+        return {"cannot": "the light of a sky was not tried"}
+    return None if medium is None else _volume(medium)
 
 
 def _volume(medium: dict[str, Any]) -> dict[str, Any]:

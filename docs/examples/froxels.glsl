@@ -35,5 +35,5 @@ vec3 airlight(Ray ray) {
     float slice = sqrt(min(ray.distance, FAR) / FAR);
     float z = slice * float(textureSize(summed_image, 0).z);
     vec3 at = vec3((vec2(ray.pixel) + 0.5) / vec2(resolution), (z - 0.5) / float(textureSize(summed_image, 0).z));
-    return texture(summed_image, at).rgb * min(z / 0.5, 1.0);
+    return texture(summed_image, at).rgb * min(z, 1.0);  // in the first cell the sum grows from 0
 }

@@ -8,7 +8,7 @@ vec4 coarse(Ray ray) {
     for (int i = 0; i < lights.length(); ++i) {
         Light light = lights[i];
         vec3 to = light.position - ray.origin;
-        float foot = dot(to, ray.direction), h = max(length(cross(to, ray.direction)), 1e-4);
+        float foot = dot(to, ray.direction), h = max(length(cross(to, ray.direction)), 1e-5 * length(to));
         float a = atan(-foot, h), width = (atan(ray.distance - foot, h) - a) / float(STEPS);
         for (int k = 0; k < STEPS; ++k) {
             float s = h * tan(a + (float(k) + shift) * width), r = length(vec2(s, h));

@@ -121,6 +121,7 @@ def shapes(properties: dict[str, Any], gltf: str) -> None:
             bpy.data.objects.remove(thing)  # camera and lights come from the description
             continue
         assign(thing, properties["objects"])
+        thing.data.transform(Matrix(properties["turn"]))
         material = bpy.data.materials.new(thing.name)
         material.node_tree.nodes.clear()
         output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")

@@ -29,6 +29,7 @@ def main() -> None:
     chosen = parser.parse_args()
     with open(chosen.described, encoding="utf-8") as stream:
         described = json.load(stream)["result"]
+    check(described)
     pyluxcore.Init()
     scene = pyluxcore.Scene()
     scene.Parse(properties(media(described) | camera(described) | lights(described["lights"])))
@@ -58,6 +59,21 @@ def main() -> None:
         session.UpdateStats()
     session.Stop()
     session.GetFilm().SaveOutputs()
+
+
+def check(described: dict) -> None:
+    """Stop before a scene of which LuxCore would be given a part alone."""
+    if described["sky"] is not None:
+        raise SystemExit("this script makes no sky: choose a scene without one")
+    medium = described["medium"]
+    if medium is not None and "sigma_s" not in medium:
+        raise SystemExit("this script makes homogeneous media alone: choose a scene with one")
+    for surface in described["surfaces"]:
+        if surface["textured"] or not surface["diffuse"]:
+            raise SystemExit(
+                f"surface {surface['name']} has a texture or is not diffuse: choose a scene of "
+                "diffuse surfaces with one colour each"
+            )
 
 
 def properties(values: dict) -> pyluxcore.Properties:

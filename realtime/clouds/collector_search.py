@@ -23,10 +23,9 @@ Where a cloud is no slab:
 
 * p above the filtered face: d = 0. The filter removes bumps of the cloud.
 * p deeper than the slab is thick: t = d. There is cloud down to p at least.
-* The sun below the tangent plane, or in it: mu_L is 0.02 at least, and n is turned towards the sun
-  until it is. Normals of a map face the light, so that the sun is never below the plane of their
-  mean; at silhouettes it comes close to the plane.
-* Opposed normals whose mean is 0 (both sides of a ridge): n is the direction towards the sun.
+* The sun low over the tangent plane: mu_L is 0.02 at least, and n is turned towards the sun until it
+  is. Normals of a map have a component towards the light, so that the sun is never below the plane
+  of their mean; at silhouettes it comes close to the plane.
 * The sun in the zenith: x is any horizontal direction, as the transport does not depend on it.
 
 `thickness=light` measures both lengths along the light, as printed: t = sigma_t Z and d/mu_L, the
@@ -88,7 +87,7 @@ import mitsuba as mi
 from airlight.realtime.clouds.canonical.transport_grid import Transport
 from airlight.realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
 
-_LEAST_LENGTH = 1e-4  #: of a mean of unit normals that has a direction
+_LEAST_LENGTH = 1e-4  #: of the horizontal part of a unit vector that has a direction
 
 
 @dataclass(frozen=True)
@@ -165,10 +164,7 @@ def tangent_slab(
 
 
 def _facing(normal: Any, axis: Any) -> tuple[Any, Any]:
-    """Return a unit normal that faces the light by a cosine of 0.02 at least, and its cosine."""
-    # Opposed normals may have a mean without direction: then n is the direction towards the sun.
-    length = dr.norm(normal)
-    normal = dr.select(length > _LEAST_LENGTH, normal / length, -axis)
+    """Return a unit normal turned until its cosine with the light is 0.02 at least, and this."""
     cosine = -dr.dot(normal, axis)
     # n + s (-w_L), whose cosine is c for s = c sqrt((1 - a^2)/(1 - c^2)) - a, a the cosine of n.
     least_cosine = 0.02  # of the sun over a tangent plane

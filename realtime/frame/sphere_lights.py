@@ -119,8 +119,12 @@ def _places(view: View, sphere: SampledSphere):
     way = sphere.centre - view.origin
     along = dr.dot(way, direction)
     away = dr.fma(direction, -along, way)
+    # Near the middle most of it may be rounding, which lies along the ray as well.
+    away = dr.fma(direction, -dr.dot(away, direction), away)
     height = dr.norm(away)
-    up = away / dr.maximum(height, 1e-12)
+    # A ray through the middle leaves no direction to it: then any across the ray serves.
+    helper = dr.select(dr.abs(direction.x) < 0.5, type(away)(1, 0, 0), type(away)(0, 1, 0))
+    up = dr.normalize(dr.select(height > 0, away, dr.cross(direction, helper)))
     side = dr.cross(direction, up)
     meets = height < radius
     front = along - dr.safe_sqrt(radius * radius - height * height)

@@ -97,7 +97,7 @@ from airlight.realtime.numerics.functions import (
 )
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.medium import Homogeneous, optical_reach
+from airlight.realtime.scene.media.medium import Homogeneous, half_angle, optical_reach
 from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.rule_reach import FEW_DEPTH, FEW_NODES, PANEL_DEPTH, PANEL_NODES
 
@@ -137,25 +137,13 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions):
         # p/r^2 is the same for all extinctions; only exp(-sigma_t (x + r)) differs.
         value = node_weight * dr.square(inverse)
         if not phase.constant:
-            value *= phase.evaluate_half(*_half_angle(s, r, inverse, height_squared))
+            value *= phase.evaluate_half(*half_angle(s, r, inverse, height_squared))
         path = x0 + (step + r)
         totals = [
             dr.fma(value, exp_bounded(-sigma_t * path), total)
             for sigma_t, total in zip(extinctions, totals)
         ]
     return [total * length for total in totals]
-
-
-def _half_angle(s, r, inverse, height_squared):
-    """Return sin^2 and cos^2 of half the scattering angle, (r +- s)/(2 r), the smaller
-    one without cancellation.
-    """
-    # (r - |s|)/(2 r) with h^2 = (r - |s|) (r + |s|): no difference is taken.
-    small = 0.5 * height_squared * inverse * dr.rcp(r + dr.abs(s))
-    large = 1 - small
-    # Behind the foot the light turns by more than a right angle: there sin^2 is the larger one.
-    behind = s > 0
-    return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
 #: no segment needs as many, but a loop over values that are not numbers must end too

@@ -24,7 +24,7 @@ from airlight.realtime.numerics.array_types import smallest
 from airlight.realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
+from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous, half_angle
 
 
 def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 100):
@@ -214,8 +214,8 @@ def _at_angle(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t,
 
 def _integrand(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, x, r):
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot."""
-    # cos_scatter is +1 forward: from the light before the foot, (foot - x)/r > 0.
-    value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
+    angle = half_angle(x - geometry.foot, r, dr.rcp(r), dr.square(geometry.height))
+    value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate_half(*angle)
     return value * geometry.falloff(light, x) if light.varies else value
 
 

@@ -19,8 +19,8 @@ f) sigma_t and the albedo a (1 - f)/(1 - a f); single scattering has P/(1 - a f)
 (TMS), so that nothing is counted twice. `peak=matched` takes the f of the phase function, `full`
 cuts nothing: only then the sets hold the orders of the medium as it is.
 
-For each cloud, a ray shows the light that leaves at its first entry; if the ray enters the same
-cloud again, the slab of the first entry stands for both.
+In the orders from 2 on, a ray shows the light that leaves where it first enters a cloud. The slab
+of this entry stands for all that the ray meets behind it, further clouds too.
 
 References
 ----------
@@ -308,10 +308,12 @@ def _fillings(
     albedos = albedos[:1] if grey else albedos
     fillings, factors = [], np.ones_like(albedos)
     # Each pair of a phase function and an albedo in any channel of any cloud is one medium of
-    # slabs, and one table of transport.
+    # slabs, and one table of transport. A cloud that scatters nothing, and has the albedo 0, needs none.
     for phase, albedo in sorted(
         {(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}
     ):
+        if not albedo:
+            continue
         phase_function = clouds.phases[phase]
         # Without the fraction f the density has the factor 1 - a f, and the albedo of the orders
         # from 2 on is a (1 - f)/(1 - a f).
@@ -531,7 +533,7 @@ def _many_times(
                 sets=len(SETS),
                 point=entry.point,
                 toward=-view.direction,
-                # A lane without the filling has read no extinction: 1 stands for it.
+                # 1 stands for the extinction of lanes without the filling.
                 extinction=dr.select(filled, sigma_t, 1),
                 behind=rays.depths[channel],
                 search=search,
@@ -548,7 +550,9 @@ def _many_times(
             )
             of_channel.append(light.collectors)
         collectors.append(tuple(of_channel))
-        sums.append([sum(parts) for parts in zip(*of_fillings)])
+        # No filling, and no light, in a channel in which no cloud scatters.
+        none = dr.zeros(Float, dr.width(view.distance))
+        sums.append([sum((by_set[n] for by_set in of_fillings), none) for n in range(len(SETS))])
     # A grey scene has one channel, which stands for all three.
     by_set = tuple(Color(*parts) for parts in zip(*(sums * (3 // len(sums)))))
     return OrdersLight(by_set, tuple(collectors))

@@ -264,10 +264,14 @@ def emitted_light(reference: ReferenceScene, distance: Array, route: Route | Non
             if light.kind == "mesh"
             else [_distance(light, reference)]
         )
-        for at in places:
-            # A surface as close to a light as 1e-4 of its distance is the light's own, or touches
-            # it. NaN, where the ray misses the light, compares as false.
-            rows = np.flatnonzero(at <= distance * (1 + 1e-4))
+        for at, slope in places:
+            # A surface that is before a light by no more than single precision, across both, is the
+            # light's own, or touches it: 16 roundings of all lengths, and of a sphere 4 of the
+            # square in its equation. NaN, where the ray misses the light, compares as false.
+            largest = np.abs(origin).max(axis=1) + np.abs(light.centre).max() + light.radius + at
+            if light.kind == "sphere":
+                largest += 0.25 * at * at / light.radius
+            rows = np.flatnonzero((at - distance) * slope <= 1e-6 * largest)
             depth = optical_depth(
                 reference, origin[rows], reference.direction[rows], np.zeros(len(rows)), at[rows]
             )
@@ -282,9 +286,11 @@ def emitted_light(reference: ReferenceScene, distance: Array, route: Route | Non
     return total
 
 
-def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
+def _mesh_distances(
+    light: ReferenceAreaLight, reference: ReferenceScene
+) -> Iterator[tuple[Array, Array]]:
     """Yield where rays meet a mesh from the side that emits, crossing after
-    crossing, (rays,) [m]; else NaN.
+    crossing, and the cosines to its normals there, as `_distance` does.
     """
     mesh = scene_from([light.shape])
     start, walking = np.zeros(len(reference.direction)), np.ones(len(reference.direction), bool)
@@ -297,22 +303,27 @@ def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Ite
         walking &= np.isfinite(at)
         # A black mesh hides what is behind its first crossing; through one of material `null` the
         # ray goes on, and may meet the emitting side again.
-        yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
+        emits = walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0)
+        slope = np.abs(np.sum(as_rows(mi.Vector3f(hit.n)) * reference.direction, axis=1))
+        yield np.where(emits, at, np.nan), slope
         walking &= not light.opaque
         # The next crossing is looked for 1e-5 of the distance and 1e-5 m beyond this one, which
         # float32 rays would otherwise meet again.
         start = np.where(walking, at * (1 + 1e-5) + 1e-5 * metre_of(mesh), start)
 
 
-def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
-    """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
+def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> tuple[Array, Array]:
+    """Return where rays meet the side of a light that emits, (rays,) [m], NaN where they do not,
+    and the cosines to its normal there, (rays,).
+    """
     origin, direction = reference.origin, reference.direction
     away = light.centre - origin
     if light.kind == "sphere":
         middle = np.sum(direction * away, axis=-1)
         miss = np.linalg.norm(away - middle[:, None] * direction, axis=1)
-        at = middle - half_chord(light.radius, miss)
-        return np.where((miss < light.radius) & (at > 0), at, np.nan)
+        half = half_chord(light.radius, miss)
+        at = middle - half
+        return np.where((miss < light.radius) & (at > 0), at, np.nan), half / light.radius
     rate = direction @ light.normal
     with np.errstate(divide="ignore", invalid="ignore"):
         at = (away @ light.normal) / rate
@@ -321,4 +332,4 @@ def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
     inside = (
         (np.abs(x) <= a) & (np.abs(y) <= b) if light.kind == "rectangle" else x * x + y * y <= a * a
     )
-    return np.where((rate < 0) & (at > 0) & inside, at, np.nan)
+    return np.where((rate < 0) & (at > 0) & inside, at, np.nan), np.abs(rate)

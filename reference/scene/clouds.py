@@ -94,7 +94,8 @@ class Cloud(ReferenceMedium):
 class CloudScene:
     """A scene of clouds as the reference sees it."""
 
-    scene: "mi.Scene"  #: all shapes
+    scene: "mi.Scene"  #: all shapes and lights
+    bodies: "mi.Scene"  #: the opaque shapes and the boundaries of clouds: all that rays meet
     occluders: "mi.Scene"  #: the opaque shapes alone
     width: int  #: [pixels]
     height: int  #: [pixels]
@@ -140,6 +141,7 @@ def read_clouds(scene: "mi.Scene") -> CloudScene:
     origin = camera_matrix(sensor)[:3, 3]
     return CloudScene(
         scene=scene,
+        bodies=scene_of([*opaque, *boundaries], scene),
         occluders=scene_of(opaque, scene),
         width=width,
         height=height,

@@ -74,7 +74,8 @@ def _read_sphere(shape: "mi.Shape", matrix: Array) -> Sphere:
         )
     if shape.has_flipped_normals():
         raise _refusal(shape, "is inside out", outwards(matrix))
-    return Sphere(matrix[:3, 3], float(lengths.mean()))
+    # Mitsuba takes the length of the first axis for the radius, see `reference.scene.shapes`.
+    return Sphere(matrix[:3, 3], float(lengths[0]))
 
 
 def _read_polyhedron(shape: "mi.Shape", vertices: Array, faces: Index) -> Polyhedron:

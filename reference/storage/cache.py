@@ -53,12 +53,19 @@ class Entry:
 def cache_folder() -> Path:
     """Return the folder of the cache: AIRLIGHT_CACHE_DIR, or `airlight` in
     the user's cache folder.
+
+    Raises InputError for a user without a home folder who names none.
     """
     chosen = os.environ.get("AIRLIGHT_CACHE_DIR")
     if chosen:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "airlight"
+    try:
+        return (Path(base) if base else Path.home() / ".cache") / "airlight"
+    except RuntimeError:
+        raise InputError(
+            "there is no home folder for the cache; expected AIRLIGHT_CACHE_DIR to name a folder"
+        ) from None
 
 
 def cache_limit() -> int:

@@ -4,12 +4,13 @@
 A module counts with all modules of ours that it imports, directly or not, as Python compiles them,
 without comments, docstrings and line numbers: a new wording of these makes no result old. Data
 count with the code that may read them: the files in the folders of these modules (tables of scenes,
-certified values, claims), and the files beside a module of the user's that the module names. The
-versions of Mitsuba, Dr.Jit, NumPy and SciPy count too.
+certified values, claims), and the files beside a module of the user's, or in folders there, that
+the module names. The versions of Mitsuba, Dr.Jit, NumPy and SciPy count too.
 """
 
 import hashlib
 import marshal
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
@@ -131,9 +132,14 @@ def _data(folder: Path) -> Iterator[Path]:
 
 
 def _named_data(folder: Path, names: Iterable[str]) -> Iterator[Path]:
-    """Yield the files beside a module of the user's that it names and that are no modules."""
-    for path in folder.iterdir():
-        if path.name in names and path.suffix not in _CODE and path.is_file():
+    """Yield the files beside a module of the user's, or in a folder there, that it names and that
+    are no modules.
+    """
+    # A path may stand in one word, 'tables/a.csv', or in two, a folder and a name.
+    words = [name for name in names if name and not os.path.isabs(name) and ".." not in name]
+    folders = [folder, *(folder / name for name in words if os.path.isdir(folder / name))]
+    for path in {place / name for place in folders for name in words}:
+        if path.suffix not in _CODE and os.path.isfile(path):  # False for words that are no path
             yield path
 
 

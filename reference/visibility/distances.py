@@ -109,9 +109,9 @@ def exact_distance(
     triangle that each ray met; `distance`: the distances that were cast, (rays,), infinite where
     nothing is hit [m]; `shapes`: the result of `read_shapes`, by default read here.
 
-    Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on
-    triangles seen edge-on, the distance stays what it was. It also stays on spheres that a ray
-    misses in float64, which happens at tangents.
+    Valid where a ray meets its triangle or disk in float64 too, or the plane of it within 1e-4 of
+    the distance; elsewhere, beside edges seen edge-on, the distance stays what it was. It also
+    stays on spheres that a ray misses in float64, which happens at tangents.
     """
     hit = np.isfinite(distance)
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
@@ -128,36 +128,53 @@ def exact_distance(
         if isinstance(part, Sphere):
             refined[ray] = _to_sphere(part, reference.origin, direction, cast)
         elif isinstance(part, Disks):
-            refined[ray] = _along(part.centre - reference.origin, part.normal, direction, cast)
+            refined[ray] = _to_disk(part, reference.origin, direction, cast)
         else:
-            # A rectangle counts as one primitive; both its triangles lie in one plane.
-            triangle = part[0 * ray if is_rectangle(shape) else primitive[ray]]
-            refined[ray] = to_plane(triangle - reference.origin, direction, cast)
+            # A rectangle counts as one primitive, of four corners.
+            corners = np.append(part[0], part[1, 2:], axis=0)[None] if is_rectangle(shape) else part
+            own = corners[0 * ray if is_rectangle(shape) else primitive[ray]]
+            refined[ray] = to_plane(own - reference.origin, direction, cast)
     return refined
 
 
 def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
-    """Return how far rays go to the planes of triangles, (rays,) [m]; for rays that graze them the
-    given distance.
+    """Return how far rays go to the planes of polygons, (rays,) [m]; for rays that graze the plane
+    beside the polygon the given distance.
 
-    `corner`: of the triangles, from the origin of the rays, (rays, 3, 3) [m]; `direction`: unit
-    vectors, (rays, 3); `distance`: as it was cast, (rays,) [m].
+    `corner`: of convex polygons, from the origin of the rays, (rays, corners, 3) [m]; `direction`:
+    unit vectors, (rays, 3); `distance`: as it was cast, (rays,) [m].
     """
-    return _along(
-        corner[:, 0],
-        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]),
-        direction,
-        distance,
-    )
+    # A line that has all sides on the same hand meets the polygon.
+    side = np.cross(corner, np.roll(corner, -1, axis=1))
+    hand = np.sum(side * direction[:, None], axis=2)
+    meets = np.all(hand > 0, axis=1) | np.all(hand < 0, axis=1)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return _chosen(_along(corner[:, 0], normal, direction), meets, distance)
 
 
-def _along(place: Array, normal: Array, direction: Array, distance: Array) -> Array:
+def _to_disk(disk: Disks, origin: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays go to a disk, as `to_plane` does."""
+    centre = disk.centre - origin
+    exact = _along(centre, disk.normal, direction)
+    with np.errstate(invalid="ignore"):  # infinite on a ray parallel to the disk
+        beside = np.linalg.norm(exact[:, None] * direction - centre, axis=1)
+    return _chosen(exact, beside < disk.radius, distance)
+
+
+def _along(place: Array, normal: Array, direction: Array) -> Array:
     """Return how far rays go to planes through places."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        # For a grazing ray this is the quotient of two small numbers: a result further than 1e-4
-        # from the cast distance is not taken.
-        exact = np.sum(normal * place, axis=1) / np.sum(normal * direction, axis=1)
-    return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
+        exact: Array = np.sum(normal * place, axis=1) / np.sum(normal * direction, axis=1)
+    return exact
+
+
+def _chosen(exact: Array, meets: NDArray[np.bool_], distance: Array) -> Array:
+    """Return the exact distances of rays that meet their shape, and where these are within 1e-4 of
+    the cast ones; else the cast ones.
+    """
+    # For a grazing ray beside the shape the exact one is the quotient of two small numbers.
+    near = np.abs(exact - distance) < 1e-4 * distance
+    return np.where(near | (meets & (exact > 0)), exact, distance)
 
 
 def _to_sphere(sphere: Sphere, origin: Array, direction: Array, distance: Array) -> Array:

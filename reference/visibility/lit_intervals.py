@@ -13,7 +13,7 @@ from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.convex_bounds import Sphere
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.shape_roles import scene_of
-from airlight.reference.scene.shapes import Shapes, read_shapes
+from airlight.reference.scene.shapes import Disks, Shapes, read_shapes
 from airlight.reference.visibility.candidates import Ball, Near, near_shapes
 from airlight.reference.visibility.certificate import LitIntervals, certified
 from airlight.reference.visibility.distances import crossings
@@ -74,14 +74,24 @@ def before_light(
         reference = replace(reference, occluders=scene_of(others, reference.scene))
     occluders = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
+        disks = occluders.disks
         largest = max(
             occluders.metre(light.centre, reference.origin),
             float(np.abs(occluders.triangles).max(initial=0)),
+            float((np.abs(disks.centre).max(axis=1) + disks.radius).max(initial=0)),
             float(np.abs(light.centre).max()),
         )
-        # A triangle stays if any corner is before the plane by more than rounding.
+        # A triangle stays if any corner is before the plane by more than rounding, and a disk if
+        # its rim is.
         before = (occluders.triangles - light.centre) @ light.normal > IN_PLANE * largest
-        occluders = replace(occluders, triangles=occluders.triangles[before.any(axis=1)])
+        lean = np.linalg.norm(np.cross(disks.normal, light.normal), axis=1)
+        rim = (disks.centre - light.centre) @ light.normal + disks.radius * lean
+        stay = rim > IN_PLANE * largest
+        occluders = replace(
+            occluders,
+            triangles=occluders.triangles[before.any(axis=1)],
+            disks=Disks(disks.centre[stay], disks.normal[stay], disks.radius[stay]),
+        )
     return reference, occluders
 
 

@@ -214,7 +214,7 @@ def _files(path: Path, only: Sequence[str], margin: float | None) -> RelationsKe
 
     given = read_check(path)
     folder = path if path.is_dir() else path.parent
-    asked = _chosen(given.relations, only)
+    asked = _chosen(given.relations, only, given.again)
     names = dict.fromkeys((*given.again, *(name for each in asked for name in each.frames)))
     frames = {name: _layers(read_exr(folder / name).layers) for name in names}
     kept = judge(
@@ -235,11 +235,18 @@ def _layers(layers: Mapping[str, Any]) -> "dict[str, Array]":
     return {**layers, "total": layers["airlight"] + layers["surface"]}
 
 
-def _chosen(asked: "Sequence[Asked]", only: Sequence[str]) -> "list[Asked]":
-    found = [each for each in asked if not only or each.name in only]
-    if not found:
-        raise InputError(f"only: {', '.join(only)} is none of the relations that are asked for")
-    return found
+def _chosen(asked: "Sequence[Asked]", only: Sequence[str], again: Sequence[str]) -> "list[Asked]":
+    """Return the relations that are asked for by name; `again` is judged wherever it has frames."""
+    names = list(dict.fromkeys([*(["again"] if again else []), *(each.name for each in asked)]))
+    if not names:
+        raise InputError("check.json asks for no relation; expected some, see docs/checks.md")
+    missing = [name for name in only if name not in names]
+    if missing:
+        raise InputError(
+            f"only: {', '.join(missing)} is none of the relations that are asked for here: "
+            f"{', '.join(names)}"
+        )
+    return [each for each in asked if not only or each.name in only]
 
 
 def _method(
@@ -362,7 +369,7 @@ def _rendered(
     from airlight.validation.check.variants import variants
 
     made = variants(scene, size, falloff)
-    asked = _chosen(made.asked, only)
+    asked = _chosen(made.asked, only, made.again)
     names = dict.fromkeys((*made.again, *(name for each in asked for name in each.frames)))
     frames, refused = {}, dict[str, str]()
     for number, name in enumerate(names):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from airlight.errors import InputError
 from airlight.reports.api.inputs import File, exclude
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table
@@ -45,15 +46,22 @@ def diff(
     """
     from airlight.reports.data.records import read_report
     from airlight.reports.diff.compare import compare_reports
-    from airlight.reports.engines.record import engines_file
+    from airlight.reports.engines.record import FILE, engines_file
 
+    # Both kinds of report have one folder by default: neither may be passed over in silence.
+    for given in (Path(old), Path(new)):
+        if all((given / name).is_file() for name in ("report.json", FILE)):
+            raise InputError(
+                f"{given} has two reports, on methods and on engines; name report.json or {FILE} "
+                "in it"
+            )
     # Reports on engines have no times.
     on_engines = engines_file(Path(old)), engines_file(Path(new))
     if on_engines[0] and on_engines[1]:
         from airlight.reports.api.engines import difference_of_engines
 
-        given = {"time_tolerance": time_tolerance not in (_TIME_TOLERANCE, math.inf)}
-        exclude("diff", "reports on engines have no times", given)
+        of_times = {"time_tolerance": time_tolerance not in (_TIME_TOLERANCE, math.inf)}
+        exclude("diff", "reports on engines have no times", of_times)
         moved = difference_of_engines(on_engines[0], on_engines[1])
         return ReportDifference(old=str(old), new=str(new), difference=moved)
     # An infinite tolerance leaves times out.

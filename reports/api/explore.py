@@ -89,9 +89,10 @@ def describe(
     files = output_files(output, ".glb", ".pbrt", ".vol")
     check_scene(scene)
     changes, chosen = changes_of(change), chosen_model(model)
+    from airlight.reference.storage.files import write_text
     from airlight.reports.api.scenes import opened
     from airlight.reports.interchange.gltf import write_gltf
-    from airlight.reports.interchange.pbrt import write_pbrt
+    from airlight.reports.interchange.pbrt import pbrt_scene
     from airlight.reports.interchange.scene import describe_scene
     from airlight.validation.scenes.changes import change_words
 
@@ -102,9 +103,12 @@ def describe(
         ending: [path for path in files if path.suffix.lower() == ending]
         for ending in (".glb", ".pbrt", ".vol")
     }
-    pbrt = [str(each) for path in by_ending[".pbrt"] for each in write_pbrt(path, loaded)]
-    grids = [_write_grid(path, loaded.scene) for path in by_ending[".vol"]]
+    # A scene may fit one kind of file alone: it is refused before any is written.
+    pbrt = {str(path): pbrt_scene(loaded) for path in by_ending[".pbrt"]}
+    grids = [_write_grid(path, loaded) for path in by_ending[".vol"]]
     written = [write_gltf(path, loaded) for path in by_ending[".glb"]]
+    for path, text in pbrt.items():
+        write_text(path, text)
     note(progress, described["notes"])
     return Description(
         described=described,
@@ -263,13 +267,13 @@ def _variants(scene: Any, size: Any, output: Sequence[Any]) -> Variants:
     return Variants(scene=str(scene), folder=folder, frames=names, relations=relations)
 
 
-def _write_grid(path: Path, scene: Any) -> str:
-    from airlight.reference.scene.read import read_reference
+def _write_grid(path: Path, loaded: "LoadedScene") -> str:
     from airlight.reference.scene.varying import GridMedium, HeightMedium
     from airlight.reports.interchange.fog_grid import write_fog_grid
+    from airlight.reports.interchange.scene import scene_as_it_is
 
     # A homogeneous medium needs no grid: its numbers stand in the description.
-    medium = read_reference(scene).medium
+    medium = scene_as_it_is(loaded).medium
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
             f"output: got {path}, and the medium is no height fog and no grid; expected a name "

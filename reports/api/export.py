@@ -180,7 +180,9 @@ def export(
     code = kernel_text(kernel, named_phase(phase), language, rows)
     # The head says the error of the text as it was measured, and does not promise one that was not.
     error, words = _measured(kernel, phase)
-    text = _head(kernel, language, phase, words) + code
+    command = f"airlight export {kernel} --language {language} --phase {phase}"
+    command += " --test" if test else ""
+    text = _head(kernel, language, phase, command, words) + code
     for path in files:
         write_text(path, text)
     return Exported(kernel, language, phase, text, error, tuple(map(str, files)))
@@ -198,9 +200,9 @@ def _kit(folder: Path) -> Kit:
     return Kit(str(folder), written.files, tuple(groups), tuple(scenes))
 
 
-def _head(kernel: str, language: str, phase: str, measured: str) -> str:
+def _head(kernel: str, language: str, phase: str, command: str, measured: str) -> str:
     return f"""// The airlight of a point light in homogeneous fog: kernel {kernel}, phase function {phase}, {language}.
-// Written by airlight {build().words} (airlight export {kernel} --language {language} --phase {phase}).
+// Written by airlight {build().words} ({command}).
 // SPDX-License-Identifier: MIT-0. Copy, change and sell it without a notice; there is no warranty.
 // Lengths in m, extinction in 1/m, intensity in W/sr, radiance in W/(m^2 sr).
 // Range: 0 <= x0 <= x1, sigma_t >= 0, -1 < g < 1. A ray that meets the light gives a large number.

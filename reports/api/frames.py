@@ -130,6 +130,8 @@ def rendered_animation(
     loaded, read, renderer, _ = _ready(asked, frames, layers, progress)
     animation = loaded.animation if moved_by is None else replace(loaded.animation, moves=moved_by)
     _warnings(renderer)
+    for path in files:
+        _remove_older(path, frames)
     # Per frame: milliseconds to move the scene and to render it, and the changes that NAME.json
     # repeats.
     costs: list[tuple[float, float]] = []
@@ -148,7 +150,9 @@ def rendered_animation(
                 renderer, moved, reusable, **moved_parts(animation)
             )
             costs.append((to_move, to_render))
-            changes_by_frame.append(frame_changes(moved, animation))
+            # Changes of the scene hold in each frame; those that move go before them.
+            named = frame_changes(moved, animation)
+            changes_by_frame.append(None if named is None else {**asked.changes, **named})
             curve = curve or tone_curve(frame.airlight + frame.surface)
             for path in files:
                 write_image(
@@ -264,6 +268,30 @@ def _write_frames(
     )
     write_text(path.with_suffix(".json"), record.text() + "\n")
     return (str(path.with_suffix(".json")),)
+
+
+def _remove_older(path: Path, frames: int) -> None:
+    """Remove what an earlier run left under this name and the new one will not replace: its record
+    of changes, and the last frames of a longer one; files of other programs stay.
+    """
+    from airlight.validation.motion.frames_file import SCHEMA
+
+    record, is_exr = path.with_suffix(".json"), path.suffix.lower() == ".exr"
+    if is_exr and SCHEMA.encode() in _head(record):
+        record.unlink()
+    # A frame of ours names its method, a picture of ours its program.
+    mark, number = b"airlight:method" if is_exr else b"Software\0airlight", frames + 1
+    while mark in _head(older := _numbered(path, number, frames)):
+        older.unlink()
+        number += 1
+
+
+def _head(path: Path) -> bytes:
+    """Return the beginning of a file, which says what made it; nothing where there is none."""
+    if not path.is_file():
+        return b""
+    with path.open("rb") as stream:
+        return stream.read(1 << 16)
 
 
 def _numbered(path: Path, number: int, frames: int) -> Path:

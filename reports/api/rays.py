@@ -55,7 +55,9 @@ def rays(scene: SceneLike, size: Size | None = None) -> CameraRays:
     from airlight.reference.visibility.distances import exact_distance
     from airlight.reports.api.scenes import opened
 
-    read = read_reference(opened(scene, size).scene)
+    loaded = opened(scene, size)
+    # A model may have light where physics has none.
+    read = read_reference(loaded.scene, loaded.model)
     hits = surface_hits(read)
     distance = exact_distance(read, hits.interaction, hits.distance)
     shape = read.height, read.width

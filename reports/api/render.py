@@ -124,7 +124,8 @@ def render(
         measured at pixel centres.
     frames
         Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the
-        changes of lights, colours or a homogeneous medium, for `compare --frames`.
+        changes of lights, colours or a homogeneous medium, for `compare --frames`. Further frames
+        of an earlier run by this name are removed.
     animate
         The motion: light, objects, medium, colour, or several with commas; the
         scene's animation by default.

@@ -92,8 +92,10 @@ class LayeredImage(Pictured, OfScene):
 
     @cached_property
     def total(self) -> Array:
-        """All light, airlight, surface and the sky behind [W/(m^2 sr)], (height, width, 3)."""
-        # The sky is a layer of its own only where a scene has one.
+        """Airlight, surface and the sky behind clouds [W/(m^2 sr)], (height, width, 3); the layer
+        `emitted` of a reference, light that the camera sees of lamps and skies, is no part of it.
+        """
+        # The sky is a layer of its own only in references of clouds.
         background = self.image.layers.get("background")
         return read_only(self.airlight + self.surface + (0.0 if background is None else background))
 
@@ -264,17 +266,24 @@ class Reference(LayeredImage):
 
     @property
     def standard_error(self) -> Array | None:
-        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3);
-        None for the quadrature.
+        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3); None
+        where nothing is sampled.
         """
         return self.image.layers.get("airlight_se")
 
     @property
     def surface_standard_error(self) -> Array | None:
-        """The standard error of the surface [W/(m^2 sr)], (height, width, 3);
-        None for the quadrature.
+        """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None
+        where nothing is sampled.
         """
         return self.image.layers.get("surface_se")
+
+    @property
+    def emitted_standard_error(self) -> Array | None:
+        """The standard error of the light that the camera sees of area lights and the sky
+        [W/(m^2 sr)], (height, width, 3); None but for means over pixels.
+        """
+        return self.image.layers.get("emitted_se")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields of the record, the means of the layers, and what the
@@ -318,8 +327,8 @@ class Reference(LayeredImage):
         if "batches" not in made:
             return lines
         batches = int(made["batches"])
-        # A quadrature traces nothing: it has batches only where there are area
-        # lights, and they have no seeds.
+        # A quadrature traces nothing: it has batches only where lights or positions are
+        # sampled, and they have no seeds.
         if "spp" in made:
             kind = "batches"
             lines.append(
@@ -327,7 +336,8 @@ class Reference(LayeredImage):
             )
         else:
             kind = "sets"
-            lines.append(f"  standard errors from {batches} independent sets of light samples")
+            drawn = "positions in each pixel" if made.get("pixel") == "area" else "light samples"
+            lines.append(f"  standard errors from {batches} independent sets of {drawn}")
         # Merged files have batches and no run: cache and target belong to runs.
         if isinstance(how, MonteCarloReference):
             lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []

@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,16 +141,27 @@ def sweep(
         return SweepFindings(page=page, said=said)
     from airlight.reports.cluster.connect import parse_place
     from airlight.validation.study.rows import RowStore
+    from airlight.validation.study.settings import Measure
     from airlight.validation.study.study import default_study, read_study
 
     # A number stands for so many random scenes, 100 by default; anything else is a study file.
     place = parse_place(cluster)
     number = str(100 if study is None else study)
     chosen = default_study(int(number)) if number.isdecimal() else read_study(Path(number))
-    if dropped := chosen.asked_of("half", "points", "checks", "growth", "stability"):
+    # Stages of frames belong to reports: a sweep would time none of these.
+    usual, asked = Measure(), chosen.measure
+    dropped = ["times = 'stages'"] if asked.times == "stages" else []
+    dropped += [
+        name
+        for name in ("timed_size", "seconds", "slow")
+        if getattr(asked, name) != getattr(usual, name)
+    ]
+    dropped += chosen.asked_of("half", "points", "checks", "growth", "stability")
+    if dropped:
         raise InputError(
             f"study {number}: got {', '.join(dropped)}, but a sweep measures methods alone, each "
-            f"scene in the sizes of the study: leave them out, or airlight report {number}"
+            "scene in the sizes of the study, and frames as wholes: leave them out, or airlight "
+            f"report {number}"
         )
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
@@ -217,7 +229,9 @@ def _run(
     # table has every cell.
     def with_errors(outcome: Any) -> list[dict[str, Any]]:
         (cell, key), done = outcome.task.arguments, outcome.status == "done"
-        row = outcome.value if done else row_without_numbers(cell, key, outcome)
+        # A row that says why has a date too: of several rows of a cell the newest counts.
+        now = {"origin.started": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")}
+        row = outcome.value if done else row_without_numbers(cell, key, outcome) | now
         return [row | {"study": study.name, "attempts": outcome.attempts}]
 
     def with_times(outcome: Any) -> list[dict[str, Any]]:
@@ -231,7 +245,7 @@ def _run(
     # Images that nobody times are rendered once: their kernels compile longer than they run.
     # Errors do not depend on how long a kernel takes, so that kernels are compiled quickly where
     # nothing is timed with them.
-    quick = study.measure.times not in ("with", "stages")
+    quick = study.measure.times != "with"
     groups = list(cell_groups(study, made, store=store, scenes=scenes))
     counts = _part(study, store, place, groups, with_errors, quick=quick, **how)
     # of rows that are there by now

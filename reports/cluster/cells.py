@@ -34,7 +34,8 @@ _DONE = ("done", "refused", "left out")  #: what is not computed again
 
 
 def reference_of(cell: Cell) -> Reference:
-    """Return the reference of a cell's image."""
+    """Return the reference of a cell's image, the first task of its group."""
+    _forget()
     return cell_reference(_opened(cell.image)[0])
 
 
@@ -63,6 +64,7 @@ def times_of(cells: Mapping[str, Cell]) -> dict[str, dict[str, Any]]:
     """
     from distributed import get_worker
 
+    _forget()
     image = next(iter(cells.values())).image
     scene, alone = _opened(image)[1], is_alone(get_worker())
     columns = {}
@@ -144,10 +146,18 @@ def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any
     )
 
 
+def _forget() -> None:
+    """Let the next image be loaded from its file: a worker may live for several runs, between which
+    a file may change.
+    """
+    _opened.cache_clear()
+    _properties.cache_clear()
+
+
 @lru_cache(maxsize=1)
 def _opened(image: Cell) -> tuple[LoadedScene, Scene]:
     """Return the scene of an image, loaded and as methods read it; that of the
-    last cell is there already.
+    last cell of the group is there already.
     """
     loaded = load_cell(image)
     return loaded, read_scene(loaded.scene)

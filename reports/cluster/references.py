@@ -7,6 +7,7 @@ workers did not deliver, for any reason, are computed here.
 """
 
 import pickle
+import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
@@ -75,10 +76,12 @@ def bring_references(
     groups = [
         Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()
     ]
-    # The value goes to the cache under the key that this process computed, together with the time
-    # that it took the worker.
-    for name, (reference, spent) in _done(cluster, groups):
-        keep(inputs_of(named[name]), reference, spent, ReferenceImage)
+    # The value goes to the cache together with the time that it took the worker, unless the file of
+    # that name is another one there.
+    for name, (key, reference, spent) in _done(cluster, groups):
+        inputs = inputs_of(named[name])
+        if key == inputs.key:
+            keep(inputs, reference, spent, ReferenceImage)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -110,9 +113,11 @@ def tracing(
 
     The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
-    # As bytes, by which a worker knows again what it has prepared.
+    # As bytes, by which a worker knows again what it has prepared; of this run alone, as the file of
+    # the scene may change before the next.
     kind = pickle.dumps(
         (
+            uuid.uuid4().hex,
             image,
             estimator,
             {"samples": samples, "orders": orders, "counts": counts, "model": model},
@@ -139,12 +144,12 @@ def spread(cluster: Client, image: Cell) -> ElsewhereFor:
 
 def _reference(
     image: Cell, pixel: str, points: int | None, model: Model, since: float | None
-) -> tuple[ReferenceImage, Spent]:
+) -> tuple[str | None, ReferenceImage, Spent]:
     with fresh_results(since):
         scene = load_cell(image).scene
         inputs = ReferenceInputs(scene_content(scene), pixel=pixel, points=points, model=model)
         found = reference_result(scene, inputs)
-    return found.value, found.spent
+    return inputs.key, found.value, found.spent
 
 
 def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:
@@ -154,5 +159,5 @@ def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:
 
 @lru_cache(maxsize=1)
 def _tracer(kind: bytes) -> Trace:
-    image, estimator, given = pickle.loads(kind)
+    _, image, estimator, given = pickle.loads(kind)
     return batch_tracer(load_cell(image).scene, estimator, **given)[1]

@@ -161,8 +161,15 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
         return None
     # Each error is that of the mean absolute value, so the means differ by at most the sum of both.
     # A dark reference has no relative error: its mean is 0.
-    errors = [each for scene in (old, new) if (each := scene.reference.relative_error) is not None]
+    stated = [scene.reference.relative_error for scene in (old, new)]
+    errors = [each for each in stated if each is not None]
     if abs(after - before) > (sum(errors) + FLOORS["mean"]) * abs(before):
+        # An error that is not known may be as large as the difference.
+        if len(errors) < len(stated) and before > 0 and after > 0:
+            words = (
+                "errors not compared: the reference has another mean, and its error is not known"
+            )
+            return Finding("note", old.name, "", words, before, after)
         words = (
             "the reference moved (mean radiance): another scene by this name, or another reference; "
             "errors not compared"
@@ -199,6 +206,7 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
         fresh: Change = ("note", f"{prefix}error is new", None, None)
         return [gone] if old else [fresh] if new else [], 0
     changes: list[Change] = []
+    compared = 0
     for name in _ERRORS:
         # A number that is NaN in one report alone is a difference: something became, or stopped
         # being, not finite.
@@ -208,6 +216,7 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
             if before is not after:  # JSON writes NaN as null
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
+        compared += 1
         # The band is the part that differs without a cause; the half intervals of two independent
         # estimates add in quadrature.
         band = error_band(name, before, pixels=old["pixels"], rmse=old["relative_rmse"])
@@ -216,7 +225,7 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
         grown = abs(after) - abs(before)
         if abs(grown) > band:
             changes.append(("worse" if grown > 0 else "better", what, before, after))
-    return changes, len(_ERRORS)
+    return changes, compared
 
 
 def _flip(old: Row, new: Row) -> tuple[list[Change], int]:

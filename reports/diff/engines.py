@@ -58,11 +58,16 @@ def _cell(old: Cell, new: Cell) -> tuple[list[Finding], int]:
         if other is None:
             findings.append(Finding("worse", scene, engine, f"{layer.layer} gone"))
             continue
-        compared += len(layer.blocks)
+        # A number that is not known cannot be compared.
+        compared += sum(None not in (was, other.blocks[name]) for name, was in layer.blocks.items())
         findings += [
             Finding(verdict, scene, engine, what, was, now)
             for verdict, what, was, now in _layer(layer, other)
         ]
+    for layer in new.layers:
+        if old.layer(layer.layer) is None:
+            said = "right by its equation" if layer.right else "not right by its equation"
+            findings.append(Finding("note", scene, engine, f"{layer.layer} new, {said}"))
     return findings, compared
 
 
@@ -74,9 +79,11 @@ def _layer(old: LayerErrors, new: LayerErrors) -> Iterator[Change]:
     for name, was in old.blocks.items():
         now = new.blocks[name]
         if was is None or now is None:
-            if was is not now:
-                yield "worse", f"{old.layer} {name}", was, now
-        elif abs(now - was) > _ABSOLUTE + _RELATIVE * was:
-            # Another equation is neither worse nor better.
-            verdict = "note" if name == "equation" else "worse" if now > was else "better"
+            moved, worse = was is not now, now is None
+        else:
+            moved, worse = abs(now - was) > _ABSOLUTE + _RELATIVE * was, now > was
+        if moved:
+            # Another equation is neither worse nor better, but for one of which nothing is known.
+            is_note = name == "equation" and now is not None
+            verdict = "note" if is_note else "worse" if worse else "better"
             yield verdict, f"{old.layer} {name}", was, now

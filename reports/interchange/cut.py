@@ -21,7 +21,7 @@ def cut_by(mesh: ShapeMesh, bounds: Polyhedron) -> tuple[ShapeMesh, ShapeMesh]:
     corners = rows[mesh.faces]
     height = mesh.vertices @ bounds.normal.T - bounds.offset
     # A corner nearer to a plane than this is in it: coordinates have seven digits.
-    margin = 1e-6 * (1.0 + np.abs(mesh.vertices).max(initial=0.0))
+    margin = 1e-6 * max(np.abs(mesh.vertices).max(initial=0.0), np.abs(bounds.offset).max())
     above = (height > margin)[mesh.faces]
     below = (height < -margin)[mesh.faces]
     # Whole triangles: in front of one plane, or in front of none.

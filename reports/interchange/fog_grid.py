@@ -77,6 +77,8 @@ def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
     """Return the densities of height fog, (z, y, x) [1/m], and corner and
     size of their box, (3,) [m].
     """
+    import mitsuba as mi
+
     # The axis along which the fog falls, and whether it falls upwards along it.
     density, height = fog_grid(medium), medium.cap - medium.floor
     axis = int(np.argmax(np.abs(medium.up)))
@@ -84,9 +86,12 @@ def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
     # Mitsuba's volumes are (z, y, x): the axis counts from the end.
     shape = [1, 1, 1]
     shape[2 - axis] = len(density)
-    # Across the axis nothing varies: one voxel is as wide as a thousand heights on either side,
-    # beyond which the wrap mode clamps.
-    size, corner = np.full(3, 2e3 * height), np.full(3, -1e3 * height)
+    # Across the axis nothing varies: one voxel is as wide as the box that Mitsuba has for the fog,
+    # about the middle of the file's own. Beyond its box a grid of Mitsuba is vacuum.
+    parts = mi.traverse(medium.plugin).hierarchy
+    box = next(part for part in parts if "H_1" in mi.traverse(part)).bbox()
+    corner, high = (np.array(end, dtype=np.float64).ravel() for end in (box.min, box.max))
+    size = high - corner
     size[axis], corner[axis] = height, medium.floor if upwards else -medium.cap
     return (density if upwards else density[::-1]).reshape(shape), corner, size
 

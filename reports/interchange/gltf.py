@@ -138,7 +138,7 @@ def _document(
             }
         ],
         "nodes": nodes,
-        "cameras": [_camera(camera)],
+        "cameras": [_camera(camera, _near(described, shapes))],
     }
     if punctual:
         document["extensions"] = {
@@ -165,7 +165,18 @@ def _scene_extras(described: dict[str, Any], turn: Array) -> dict[str, Any]:
     }
 
 
-def _camera(camera: dict[str, Any]) -> dict[str, Any]:
+def _near(described: dict[str, Any], shapes: list[ShapeMesh]) -> float:
+    """Return the distance of the near plane, which glTF requires [m]: a millimetre, or a
+    thousandth of the way to the farthest place of a scene that is smaller than a metre.
+    """
+    eye = np.array(described["camera"]["position"])
+    places = [light["position"] for light in described["lights"] if "position" in light]
+    points = np.concatenate([np.reshape(places, (-1, 3)), *(mesh.vertices for mesh in shapes)])
+    farthest = float(np.linalg.norm(points - eye, axis=1).max(initial=0.0))
+    return 1e-3 * min(1.0, farthest or 1.0)
+
+
+def _camera(camera: dict[str, Any], near: float) -> dict[str, Any]:
     # glTF takes the vertical angle of view, Mitsuba gives the horizontal one.
     width, height = camera["size"]
     tangent = np.tan(0.5 * np.deg2rad(camera["fov_horizontal"]))
@@ -175,8 +186,8 @@ def _camera(camera: dict[str, Any]) -> dict[str, Any]:
         "perspective": {
             "yfov": float(2 * np.arctan(tangent * height / width)),
             "aspectRatio": width / height,
-            # glTF requires a near plane [m]; the medium begins at the pinhole all the same.
-            "znear": 1e-3,
+            # The medium begins at the pinhole all the same.
+            "znear": near,
         },
         "extras": {"size": camera["size"], "fov_horizontal_degrees": camera["fov_horizontal"]},
     }

@@ -94,7 +94,10 @@ def _words(value: Any, name: str = "") -> str:
     if isinstance(value, list | tuple) and len(value) > _LISTED:
         return f"{len(value)} values"
     if isinstance(value, list | tuple):
-        return f"({', '.join(map(_words, value))}) {_UNITS.get(name, '')}".rstrip()
+        # The size of an image is in pixels, that of a light that was drawn in metres.
+        metres = name == "size" and any(isinstance(each, float) for each in value)
+        unit = "m" if metres else _UNITS.get(name, "") if value else ""
+        return f"({', '.join(map(_words, value))}) {unit}".rstrip()
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
     return (

@@ -9,6 +9,7 @@ from typing import Any
 
 from airlight.reports.data.records import Scene
 from airlight.reports.plotting.figure import (
+    drawn_error,
     has_point,
     legend_below,
     new_figure,
@@ -51,8 +52,7 @@ def scene_chart(scenes: Sequence[Scene], place: int) -> str:
             name = f"point-{number}"
             points[entry.label].set_gid(name)
             assert entry.times
-            assert entry.error
-            time, error = entry.times.frame.median_ms, entry.error.relative_rmse
+            time, error = entry.times.frame.median_ms, drawn_error(entry)
             titles[name] = escape(f"{entry.label}: {time:.3g} ms, relative RMSE {error:.2g}")
     # The first variant of a method stands for all: the strip of the errors beside
     # the chart names every one.

@@ -85,6 +85,15 @@ def has_point(entry: Row) -> bool:
     return bool(entry.times and entry.error and entry.error.relative_rmse)
 
 
+def drawn_error(entry: Row) -> float:
+    """Return the relative RMSE at which a method with a point stands: of one that draws random
+    numbers the mean over its runs.
+    """
+    assert entry.error
+    assert entry.error.relative_rmse is not None
+    return entry.error.relative_rmse if entry.noise is None else entry.noise.rmse
+
+
 def speed_chart(
     scenes: Sequence[Scene], width: float, *, across: int, tallest: float, **marks: Any
 ) -> "Figure":
@@ -143,16 +152,13 @@ def speed_panel(
     points = {}
     for entry in filter(has_point, entries):
         assert entry.times
-        assert entry.error
-        assert entry.error.relative_rmse is not None
         # Distances to the quartiles, which matplotlib takes as lengths of bars.
-        frame, error = entry.times.frame, entry.error.relative_rmse
+        frame, error = entry.times.frame, drawn_error(entry)
         spread = [[frame.median_ms - frame.low_ms], [frame.high_ms - frame.median_ms]]
         style = {**styles[entry.label], "linestyle": "none"}
         # A noisy method would get better with every frame averaged: its point is the error of one
         # frame, its bar reaches to the bias that remains.
         if noise := entry.noise:
-            error = noise.rmse
             bias = noise.most_bias if noise.root_bias is None else noise.root_bias
             if bias is not None:
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]

@@ -19,7 +19,12 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from airlight.realtime.methods.shader.source import is_users
 from airlight.reports.data.records import Claim, Scene
-from airlight.reports.tables.agreement import margin_words, verdict, worst_interval
+from airlight.reports.tables.agreement import (
+    margin_words,
+    shown_interval,
+    verdict,
+    worst_interval,
+)
 from airlight.reports.tables.costs import WORK, cliffs
 from airlight.reports.tables.methods import published_as, runs_of
 from airlight.validation.metrics.errors import known
@@ -140,7 +145,7 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
         # The interval that fills most of its margin shows how close the decision was.
         filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
-        low, high = (100 * known(end) for end in worst.statistics.relative_bias_ci)
+        low, high = (100 * known(end) for end in shown_interval(worst.statistics))
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: "
             "every 95 % interval "
@@ -162,8 +167,10 @@ def _place(scene: str, entry: Agreement) -> str:
 
 
 def _left_out(scenes: Scenes) -> Claim:
+    left_out = [(scene.name, scene.multiple.medium.value) for scene in scenes]
     fractions = "; ".join(
-        f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes
+        f"{name} {'unknown' if value is None else f'{100 * value:.2g} %'}"
+        for name, value in left_out
     )
     text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {fractions}."
     return _claim("left-out", text)

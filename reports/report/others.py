@@ -76,14 +76,14 @@ class StabilityInputs(Inputs):
     modules = ("airlight.validation.kernels.stability",)
     rays: int
     added: Mapping[str, tuple[Content, ...]]  #: kernels of the user, with their code
+    machine: Mapping[str, str]  #: single precision rounds otherwise on another
 
 
 def _stability_part(rays: int) -> OtherPart:
     added = {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
     compute = partial(_stability, rays, list(added))
-    return OtherPart(
-        "stability", "stability", 20.0, StabilityInputs(rays, added), compute, list[Stability]
-    )
+    inputs = StabilityInputs(rays, added, machine())
+    return OtherPart("stability", "stability", 20.0, inputs, compute, list[Stability])
 
 
 def _stability(rays: int, added: list[str], progress: Progress) -> list[Stability]:

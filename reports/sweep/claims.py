@@ -4,10 +4,10 @@ of a scene goes with it.
 
 A scene counts as within an error if its image was made, all its pixels are finite, and the relative
 RMSE is at most the error. A refusal is no try: refused scenes are counted apart, and so are scenes
-that have no reference. A cell that failed, hung or died is a try that missed. Where the target and
-the error differ by less than the error of the reference nothing is decided. Such a scene is within
-at the upper end of the interval and not at the lower one: the interval holds the fraction whatever
-an exact reference would have said.
+that have no reference, and those that were left out for their time. A cell that failed, hung or
+died is a try that missed. Where the target and the error differ by less than the error of the
+reference nothing is decided. Such a scene is within at the upper end of the interval and not at the
+lower one: the interval holds the fraction whatever an exact reference would have said.
 
 Properties are correlated with errors by ranks, as neither has a natural scale. A property that
 correlates with an error need not cause it. Properties correlate with one another too (more lights,
@@ -39,6 +39,7 @@ class Claim:
     undecided: int  #: of these, with an error nearer to the target than the reference is exact
     refused: int  #: scenes beside these
     untold: int  #: further scenes that have no reference
+    left_out: int  #: further scenes of which a frame would take too long
     fraction: float | None  #: of the scenes that are within the error for sure; None without scenes
     low: float
     high: float
@@ -57,6 +58,7 @@ class Claim:
                 f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
             )
         words += f"; {self.refused} more refused" if self.refused else ""
+        words += f"; {self.left_out} more left out for their time" if self.left_out else ""
         return words + (f"; no reference of {self.untold} more" if self.untold else "")
 
 
@@ -83,6 +85,7 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
         undecided=at_most - within,
         refused=sample.count("refused"),
         untold=sample.count(UNTOLD),
+        left_out=sample.count("left out"),
         fraction=within / tries if tries else None,
         low=binomial_interval(within, tries, level)[0],
         high=binomial_interval(at_most, tries, level)[1],

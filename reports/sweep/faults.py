@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Refusals with their reasons, faults of rows at any error, and the scenes with the largest errors.
 
-Refusals and faults are of all rows, drawn scenes and named ones.
+Refusals and faults are of all rows, drawn scenes and named ones. Faults of a method that
+reproduces a paper with its errors is no fault, and counted apart.
 
 Reasons are counted after their numbers were taken out: "light 3 of 8" and
 "light 1 of 2" are one reason.
@@ -13,8 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airlight.reports.sweep.samples import FAULTS, Sample, Sweep
+from airlight.reports.tables.methods import published
 from airlight.validation.columns import column
 from airlight.validation.study.row import PROPERTY
 
@@ -26,7 +29,12 @@ CHECKS = (
         "surface_error.nonfinite",
         "pixels of the lit surfaces that are NaN or infinite",
     ),
-    ("negative", "error.negative", "pixels with a negative value"),
+    ("negative", "error.negative", "pixels of the airlight with a negative value"),
+    (
+        "surface negative",
+        "surface_error.negative",
+        "pixels of the lit surfaces with a negative value",
+    ),
     (
         "outside of the bound",
         "stated.outside",
@@ -68,12 +76,13 @@ class Check:
     scenes: int = column()
     faulty_rows: int = column("images at fault")
     faulty_scenes: int = column("scenes at fault")
+    published: int = column("more as a paper has it")
     meaning: str = column("which means")
 
 
 def reasons(sweep: Sweep) -> list[Reason]:
     """Return why cells have no numbers, each reason once, the most frequent first."""
-    statuses = ["refused", *FAULTS]
+    statuses = ["refused", "left out", *FAULTS]
     groups: dict[tuple[str, str], list[int]] = {}
     # Rows of one status and one reason without its numbers are one group.
     texts, status, scenes = sweep["reason"], sweep["status"], sweep["scene"]
@@ -105,11 +114,12 @@ def without_numbers(reason: str, scene: str) -> str:
 
 def checks(sweep: Sweep) -> list[Check]:
     """Return how many images were checked for each fault, and how many have it."""
-    made = []
+    made, apart = [], _published(sweep)
     for name, counted, meaning in CHECKS:
         pixels, scenes = sweep[counted], sweep["scene"]
         # NaN: the row was not checked, for instance as its method states no bound.
-        says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
+        wrong = np.nan_to_num(pixels) > 0
+        says, bad = np.isfinite(pixels) & ~apart, wrong & ~apart
         made.append(
             Check(
                 name,
@@ -117,6 +127,7 @@ def checks(sweep: Sweep) -> list[Check]:
                 len(set(scenes[says])),
                 int(bad.sum()),
                 len(set(scenes[bad])),
+                int((wrong & apart).sum()),
                 meaning,
             )
         )
@@ -128,9 +139,9 @@ def faults(sweep: Sweep) -> list[Fault]:
     labels, scenes, commands, of = (
         sweep[name] for name in ("label", "scene", "command", "error.pixels")
     )
-    made = []
+    made, apart = [], _published(sweep)
     for name, counted, _ in CHECKS:
-        pixels = np.nan_to_num(sweep[counted])
+        pixels = np.where(apart, 0.0, np.nan_to_num(sweep[counted]))
         for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
             # An image without a finite pixel compares none.
             whole = 0 if np.isnan(of[row]) else int(of[row])
@@ -138,6 +149,12 @@ def faults(sweep: Sweep) -> list[Fault]:
                 Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or "")
             )
     return made
+
+
+def _published(sweep: Sweep) -> NDArray[np.bool_]:
+    """Return which rows are of methods that reproduce a paper with its errors."""
+    configurations = zip(*(sweep[name] for name in ("method", "kernel", "parameters")))
+    return np.array([bool(published(*each)) for each in configurations], dtype=bool)
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,10 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
         charts[name] = svg_text(figure, name)
         write_text(folder / FIGURES / f"{name}.svg", charts[name])
         write_bytes(folder / FIGURES / f"{name}.pdf", file_bytes(figure, ".pdf", dpi=320))
+    # A figure for which these rows have no data would be that of earlier ones.
+    for name in _DRAWN.keys() - charts.keys():
+        for ending in (".svg", ".pdf"):
+            (folder / FIGURES / f"{name}{ending}").unlink(missing_ok=True)
     write_text(
         folder / CLAIMS,
         json.dumps(plain(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
@@ -229,11 +233,14 @@ def medians(said: Summary) -> "Figure | None":
     return figure
 
 
+_DRAWN = {"sweep-errors": distribution, "sweep-medians": medians}
+
+
 def drawn_figures(said: Summary) -> Iterator[tuple[str, "Figure"]]:
     """Yield the figures that the sweep has data for, with the names of their files and
     their places on the page.
     """
-    for name, draw in (("sweep-errors", distribution), ("sweep-medians", medians)):
+    for name, draw in _DRAWN.items():
         figure = draw(said)
         if figure is not None:
             yield name, figure

@@ -222,7 +222,8 @@ class Sample:
     #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN
     #: where nothing was measured.
     errors: Numbers = field(repr=False)
-    #: the reference's own, over its mean [1]: infinite where it is not known, 0 where it is black
+    #: The reference's own, over its mean [1]: infinite where it is not known, 0 where it is black;
+    #: more where that of another medium lets a smaller error reach farther.
     reference_errors: Numbers = field(repr=False)
     nonfinite: Numbers = field(repr=False)  #: pixels with NaN or infinity, in all cells of a scene
     times: Numbers = field(repr=False)  #: of a frame [ms], see `comparable_times`; NaN elsewhere
@@ -294,12 +295,28 @@ def samples(sweep: Sweep) -> list[Sample]:
                 rows=worst,
                 statuses=tuple(statuses[places]),
                 errors=errors[places],
-                reference_errors=reference_errors[places],
+                reference_errors=np.array(
+                    [
+                        _reach(errors[rows], reference_errors[rows], float(errors[place]))
+                        for rows, place in zip(group.values(), worst)
+                    ]
+                ),
                 nonfinite=np.array([nonfinite[rows].sum() for rows in group.values()]),
                 times=times[places],
             )
         )
     return made
+
+
+def _reach(errors: Numbers, reference_errors: Numbers, worst: float) -> float:
+    """Return by how much the largest error of a scene's cells may exceed the worst that was
+    measured, as far as their references tell.
+    """
+    if not np.isfinite(worst):
+        return 0.0
+    # A scene is within an error only where each of its cells is.
+    tried = ~np.isnan(errors)
+    return float(np.max(reference_errors[tried] - (worst - errors[tried])))
 
 
 def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:

@@ -73,8 +73,9 @@ class Summary:
     reasons: tuple[Reason, ...]
     checks: tuple[Check, ...]
     faults: tuple[Fault, ...]
-    #: of the references themselves: median and largest, over the mean [1]
+    #: of the references themselves: median and largest of those that are known, over the mean [1]
     reference_errors: tuple[float, float] | None
+    reference_unknown: int  #: cells with light whose reference states no error
     versions: Mapping[str, tuple[str, ...]]
     statuses: Mapping[str, int]  #: rows that ended so
     scenes: int  #: that claims are about
@@ -96,7 +97,9 @@ def summary_of(sweep: Sweep) -> Summary:
     drawn = drawn_at_random(sweep)
     # Errors of the references themselves, in which no method has a part.
     reference_errors = sweep["reference.error"]
-    reference_errors = reference_errors[np.isfinite(reference_errors)]
+    known = np.isfinite(reference_errors)
+    unknown = int(np.count_nonzero(~known & (sweep["reference.mean"] > 0)))
+    reference_errors = reference_errors[known]
     # Everything is worked out here, so that page, tables and JSON say the same.
     said = Summary(
         sweep=sweep,
@@ -119,6 +122,7 @@ def summary_of(sweep: Sweep) -> Summary:
         reference_errors=(float(np.median(reference_errors)), float(reference_errors.max()))
         if reference_errors.size
         else None,
+        reference_unknown=unknown,
         versions={name: tuple(sorted(set(sweep[f"origin.{name}"]) - {None})) for name in _VERSIONS},
         statuses=dict(Counter(sweep["status"].tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
@@ -167,6 +171,12 @@ def _headlines(said: Summary) -> list[Headline]:
     for check in said.checks:
         if check.faulty_rows:
             add(check.check.capitalize(), check_words(check), False)
+        if check.published:
+            add(
+                "As published",
+                f"{check.published} images of methods that reproduce a paper with its errors have "
+                f"{check.meaning}.",
+            )
     # Without a fault the page says how many might have been missed.
     if not any(check.faulty_rows for check in said.checks):
         add("Sound", sound_words(said), True)
@@ -210,9 +220,11 @@ def sound_words(said: Summary) -> str:
     # interval of 0 of n.
     most = 100 * binomial_interval(0, checked["not finite"].scenes)[1]
     stated = checked["outside of the bound"].rows
+    apart = any(check.published for check in said.checks)
+    beside = ", those of published methods left out," if apart else ""
     bound = f", or outside of the bound that {stated} of them state" if stated else ""
     return (
-        f"no image of {checked['not finite'].rows} has a pixel that is not finite or "
+        f"no image of {checked['not finite'].rows}{beside} has a pixel that is not finite or "
         f"negative{bound}; of scenes alike "
         f"at most {most:.2g} % may have one, at {100 * LEVEL:.0f} % confidence."
     )

@@ -38,7 +38,7 @@ def errors_table(said: Summary) -> Table:
         *numbers(
             median="median error", most="95 % of scenes below", how={"digits": 2, "fraction": True}
         ),
-        *numbers(scenes="scenes", refused="refused", untold="no reference"),
+        *numbers(scenes="scenes", refused="refused", left_out="left out", untold="no reference"),
         Column("lost", "not done", alarm=True),
     )
     rows = []
@@ -49,6 +49,7 @@ def errors_table(said: Summary) -> Table:
             "scenes": len(sample.scenes),
             "refused": sample.count("refused"),
             "untold": sample.count(UNTOLD),
+            "left_out": sample.count("left out"),
             "lost": sample.count(*FAULTS),
             "median": values[0].value if values else None,
             "most": values[1].value if values else None,
@@ -61,7 +62,8 @@ def errors_table(said: Summary) -> Table:
     explanation = (
         "Error: relative RMSE of the airlight. Each fraction has its interval at 95 % confidence. "
         "Scenes that are "
-        "refused or have no reference are in no fraction; those that failed, hung or have pixels "
+        "refused, left out for their time or have no reference are in no fraction; those that "
+        "failed, hung or have pixels "
         "that are not finite "
         "are not within."
     )
@@ -72,7 +74,8 @@ def errors_table(said: Summary) -> Table:
         explanation=explanation,
     )
     # A column of zeros, or of the same count in every row, says nothing.
-    empty = {key for key in ("refused", "untold", "lost") if not any(row[key] for row in rows)}
+    counts = ("refused", "left_out", "untold", "lost")
+    empty = {key for key in counts if not any(row[key] for row in rows)}
     empty |= {"scenes"} if len({row["scenes"] for row in rows}) == 1 else set()
     return made.only(*(column.key for column in columns if column.key not in empty))
 

@@ -19,7 +19,7 @@ from airlight.reports.tables.table import (
     table,
     words,
 )
-from airlight.validation.statistics.records import Agreement, Statistics
+from airlight.validation.statistics.records import Agreement, Ends, Statistics
 
 _PERCENT = {"percent": True, "sign": True}
 #: Columns of what estimators say of the reference.
@@ -53,11 +53,26 @@ def verdict(compared: Agreement) -> bool | None:
     if compared.finished:
         return False
     # The run stopped early: without an interval nothing is decided; an interval that overlaps the
-    # margin is undecided, and one that lies outside is against the reference.
-    low, high = statistics.relative_bias_ci
-    if low is None or high is None or statistics.margin is None:
+    # margin is undecided, and only intervals that lie outside are against the reference.
+    intervals, margin = _intervals(statistics), statistics.margin
+    if not intervals or margin is None:
         return None
-    return None if low <= statistics.margin and high >= -statistics.margin else False
+    return None if any(low <= margin and high >= -margin for low, high in intervals) else False
+
+
+def _intervals(statistics: Statistics) -> list[tuple[float, float]]:
+    """Return the 95 % intervals of the relative bias that are known, from the errors of pixels and
+    from batch means: agreement asks for both inside the margin.
+    """
+    both = (statistics.relative_bias_ci, statistics.relative_bias_ci_batches or (None, None))
+    return [(low, high) for low, high in both if low is not None and high is not None]
+
+
+def shown_interval(statistics: Statistics) -> Ends:
+    """Return that of these intervals which reaches farther from zero; two None where none is
+    known.
+    """
+    return max(_intervals(statistics), key=lambda ends: max(map(abs, ends)), default=(None, None))
 
 
 def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
@@ -69,7 +84,7 @@ def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
 
     def reach(comparison: Agreement) -> float:
         # The end that is farther from zero, in margins.
-        (low, high), margin = comparison.statistics.relative_bias_ci, comparison.statistics.margin
+        (low, high), margin = shown_interval(comparison.statistics), comparison.statistics.margin
         return (
             float("inf")
             if low is None or high is None or not margin
@@ -152,7 +167,7 @@ def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
         verdicts = [verdict(entry) for entry in compared]
         good = False if False in verdicts else None if None in verdicts else True
         worst = worst_interval(compared)[0].statistics
-        values[name] = Interval.of(worst.relative_bias_ci)
+        values[name] = Interval.of(shown_interval(worst))
         values[f"{name} agrees"] = Verdict(good, margin_words(worst))
     return Row(values)
 
@@ -173,7 +188,7 @@ def _values(name: str, comparison: Agreement) -> dict[str, Value]:
         **vars(comparison.statistics),
         **vars(comparison),
         "name": name,
-        "relative_bias_ci": Interval.of(comparison.statistics.relative_bias_ci),
+        "relative_bias_ci": Interval.of(shown_interval(comparison.statistics)),
         "effort": "{width} x {height} pixels, {batches} x {samples} spp".format(**vars(comparison)),
         "agrees": Verdict(verdict(comparison)),
     }

@@ -306,11 +306,12 @@ def published_as(entry: CellRow) -> str:
     """Return which paper a method of report.json reproduces with its errors, and
     what is wrong; else nothing.
     """
-    values = (
-        _VALUES.get((name, str(value)), "") for name, value in json.loads(entry.parameters).items()
-    )
+    return published(entry.method, entry.kernel, entry.parameters)
+
+
+def published(method: str, kernel: str | None, parameters: str) -> str:
+    """Return the same of a method with its kernel and its parameters as JSON."""
+    values = (_VALUES.get((name, str(value)), "") for name, value in json.loads(parameters).items())
     return (
-        next(filter(None, values), "")
-        or _METHODS.get(entry.method, "")
-        or _KERNELS.get(entry.kernel or "", "")
+        next(filter(None, values), "") or _METHODS.get(method, "") or _KERNELS.get(kernel or "", "")
     )

@@ -69,8 +69,10 @@ _PER_ENTRY = (_ENTRIES - 1) / _BRIGHTEST
 
 def _drawn(levels, pixel, surface, airlight, airlight_weight, surface_weight):
     # The levels of the three channels are packed into one integer, with an opaque alpha in its
-    # upper byte. One channel that is not finite makes the pixel magenta.
-    color = surface * surface_weight + airlight * airlight_weight
+    # upper byte. One channel that is not finite makes the pixel magenta, where its layer is shown.
+    color = dr.select(surface_weight > 0, surface * surface_weight, 0) + dr.select(
+        airlight_weight > 0, airlight * airlight_weight, 0
+    )
     picture, finite = mi.UInt32(0xFF000000), mi.Bool(True)
     wrong = mi.UInt32(0xFF000000)
     for channel, value in enumerate(color):

@@ -336,7 +336,6 @@ class Session:
                 parameter_widgets(live.chosen, area_lights=bool(live.scene.area_lights))
             ),
             changeable=plain(list(live.there.values())),
-            changed=list(live.changes),
             commands={name: state.command(name) for name in ("view", "render", "reference")},
             notes=list(live.scene.features.notes),
         )

@@ -147,7 +147,7 @@ BOTH, EEVEE = ENGINES, ("eevee",)
         ("windows", {}, (), ""),
         ("mist", {}, BOTH, "height fog and grids were not tried in Cycles"),
         ("penumbra-plane", {}, BOTH, "area lights were not tried in Cycles"),
-        ("open-fog", {"sky": {"sun": [1, 1, 1]}}, BOTH, "the adapter brings no sky"),
+        ("open-fog", {"sky": {"sun": [1, 1, 1]}}, BOTH, "the light of a sky was not tried"),
         ("sphere-spot", {"beam_angle": 10}, BOTH, "the edge of Blender's spots is another funct"),
         ("three-media", {}, EEVEE, "EEVEE: it has no phase function rayleigh"),
         ("open-fog", {"phase": {"name": "rayleigh"}}, EEVEE, "it has no phase function rayleigh"),

@@ -265,6 +265,31 @@ def interpreter(renderer):
     return sys.executable
 
 
+def test_scripts_of_engines_refuse_what_they_leave_out(monkeypatch):
+    """A sky, height fog and a texture: the image would lack them, or the script would end."""
+    monkeypatch.syspath_prepend(str(DOCS / "examples"))
+    monkeypatch.setitem(
+        sys.modules, "pyluxcore", types.SimpleNamespace(Properties=object, Scene=object)
+    )
+    luxcore, cycles = map(importlib.import_module, ("render_luxcore", "cycles_properties"))
+    fog = {"sigma_s": [0.1] * 3, "sigma_a": [0.0] * 3, "phase": {"name": "isotropic"}}
+    floor = {"name": "floor", "reflectance": [0.5] * 3, "two_sided": True, "diffuse": True}
+    plain = {"sky": None, "medium": fog, "surfaces": [floor | {"textured": False}]}
+    luxcore.check(plain)
+    for change, words in (
+        ({"sky": {"radiance": [1.0] * 3}}, "no sky"),
+        ({"medium": {"layers": [], "phase": {"name": "isotropic"}}}, "homogeneous media alone"),
+        ({"surfaces": [floor | {"textured": True}]}, "surface floor has a texture"),
+    ):
+        with pytest.raises(SystemExit, match=words):
+            luxcore.check(plain | change)
+    axes = {"right": [1, 0, 0], "up": [0, 0, 1], "forward": [0, 1, 0], "position": [0, 0, 0]}
+    scene = plain | {"up": "z", "lights": [], "bounded_media": []}
+    scene |= {"camera": axes | {"size": [4, 3], "fov_horizontal": 50.0}}
+    assert "phase" in cycles.cycles_properties(scene)["world"]
+    assert "sky" in cycles.cycles_properties(scene | {"sky": {}})["world"]["cannot"]
+
+
 @pytest.mark.slow
 @pytest.mark.claim("engine-renderers", "engine-pixels", "engine-verdict")
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
@@ -219,6 +220,27 @@ def test_volumes_are_those_of_cycles_and_add_up(parts):
         both + parts.Medium(np.ones(3), np.zeros(3))
 
 
+def socket(value=None, node=None):
+    """An input of a node of Blender, with a value or linked to a node."""
+    links = [SimpleNamespace(is_muted=False, from_node=node)]
+    return SimpleNamespace(is_linked=node is not None, links=links, default_value=value)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_sum_with_one_volume_is_that_volume(parts, first):
+    """An Add Shader whose other input is empty."""
+    module = importlib.import_module("blender_parts")
+    sys.modules.pop("blender_parts")
+    inputs = {"Color": socket((1.0, 0.5, 0.25, 1.0)), "Density": socket(2.0)}
+    inputs |= {"Anisotropy": socket(0.3)}
+    kind = {"bl_idname": "ShaderNodeVolumeScatter", "phase": "HENYEY_GREENSTEIN", "mute": False}
+    ends = [socket(node=SimpleNamespace(inputs=inputs, **kind)), socket()]
+    both = SimpleNamespace(bl_idname="ShaderNodeAddShader", inputs=ends if first else ends[::-1])
+    medium = module.medium_of(both, 1.0)
+    assert (medium.sigma_s.tolist(), medium.sigma_a.tolist()) == ([2.0, 1.0, 0.5], [0.0] * 3)
+    assert (medium.phase, medium.g) == ("hg", 0.3)
+
+
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 #: The faces of a cube, counter-clockwise from outside.
 CUBE = np.array(
@@ -300,6 +322,20 @@ def test_a_wrong_command_line_is_told_in_a_line(words, status, why, tmp_path, mo
     assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (status, "", 1)
     assert why in ended.stderr
     assert not (tmp_path / "out.xml").exists()
+
+
+def test_an_older_blender_is_refused(tmp_path, monkeypatch):
+    """Its area lights have another radiance."""
+    (tmp_path / "level.blend").write_bytes(b"")
+    older = "from types import SimpleNamespace\n"
+    older += "app = SimpleNamespace(version=(4, 5, 3), version_string='4.5.3')\n"
+    (tmp_path / "bpy.py").write_text(older)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    words = [sys.executable, str(SCRIPT), "level.blend", "out.xml"]
+    ended = subprocess.run(words, capture_output=True, text=True)
+    why = "to_mitsuba: Blender is 4.5.3; expected 5.0 or newer\n"
+    assert (ended.returncode, ended.stderr) == (3, why)
 
 
 # With Blender.

@@ -162,7 +162,7 @@ def render(path: str, samples: int) -> None:
     camera = {"size": SIZE, "fov_horizontal": 60.0, "right": (1, 0, 0), "up": (0, 1, 0)}
     camera |= {"forward": (0, 0, -1), "position": (0, 0, 0)}
     lists: dict[str, Any] = {"lights": [], "bounded_media": [], "surfaces": []}
-    properties = cycles_properties({"camera": camera, "medium": None, **lists})
+    properties = cycles_properties({"camera": camera, "medium": None, "up": "z", **lists})
     size = {"render.resolution_x", "render.resolution_y", "render.resolution_percentage"}
     values = {key: value for key, value in properties["scene"].items() if key not in size}
     narrow = {"cycles.pixel_filter_type": "GAUSSIAN", "cycles.filter_width": 0.01}

@@ -9,8 +9,9 @@ is linear in the sources and in the albedo, knows no place but those of its ligh
 belongs to a ray, not to a pixel. No relation needs a number of the scene:
 
 - *again*: one input, one image; how far two differ is the floor of all other relations;
-- *intensity*: k times the sources, k times the image; *sum*: sources add up; *black-light*: a source
-  of no strength adds nothing; *colours*: channels do not mix; *exposure*: one factor for everything;
+- *intensity*: k times the sources, k times the image, apart from light that is there without them;
+  *sum*: sources add up; *black-light*: a source of no strength adds nothing; *colours*: channels do
+  not mix; *exposure*: one factor for everything;
 - *units*: all lengths times k, sigma / k, I times k^2, E as it is: x sigma and I/r^2 dx sigma stay;
 - *moved*: the world with its camera elsewhere, turned, or mirrored;
 - *pan*: a camera that turns about its own place sees the same rays, in other pixels;
@@ -73,7 +74,9 @@ def _same(frames: Sequence[Array], asked: Asked) -> Sides:
 
 
 def _scaled(frames: Sequence[Array], asked: Asked) -> Sides:
-    return Sides(frames[1], asked.factor * frames[0])
+    base, brighter, *none = frames
+    # Light that is there without any lamp stays as it is.
+    return Sides(brighter, asked.factor * base - (asked.factor - 1) * (none[0] if none else 0.0))
 
 
 def _summed(frames: Sequence[Array], asked: Asked) -> Sides:
@@ -193,6 +196,7 @@ RELATIONS: dict[str, Relation] = {
             "light that is lit density (1 - exp), a tone curve, clipping, automatic exposure, or "
             "intensities that are decoded as colours",
             _scaled,
+            (2, 3),
         ),
         Relation(
             "sum",

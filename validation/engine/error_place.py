@@ -28,7 +28,7 @@ class ErrorPlace:
     #: column and row of the pixel with the largest error, from the upper left
     worst: tuple[int, int]
     kind: str  #: 'lamp', 'edge' or '' for neither
-    relative_rmse_without: float  #: the relative rmse of all other pixels
+    relative_rmse_without: float  #: that of all other pixels; NaN by a black reference
     few: bool  #: whether they are less than a hundredth of the image
 
     @property
@@ -44,13 +44,15 @@ class ErrorPlace:
         single = self.pixels == 1
         place = f"{kinds[self.kind]}, " if self.kind else ""
         at = "" if single else "the worst "
-        return (
+        words = (
             f"{100 * self.fraction:.3g} % of the squared error in {self.pixels} "
             f"pixel{'s' * (not single)} ({place}{at}"
-            f"in column {self.worst[0]}, row {self.worst[1]}); without "
-            f"{'it' if single else 'them'} the relative rmse "
-            f"is {100 * self.relative_rmse_without:.3g} %"
+            f"in column {self.worst[0]}, row {self.worst[1]})"
         )
+        if math.isnan(self.relative_rmse_without):
+            return words
+        rest = f"{100 * self.relative_rmse_without:.3g} %"
+        return f"{words}; without {'it' if single else 'them'} the relative rmse is {rest}"
 
 
 def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPlace | None:
@@ -81,9 +83,8 @@ def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPla
     light = np.where(np.isfinite(reference), reference, 0.0).sum(axis=2)
     lamp, edge = (light_pixels[chosen] < _BESIDE).mean() > 0.5, at_edges(light)[chosen].mean() > 0.5
     kind = "lamp" if lamp else "edge" if edge else ""
-    rmse_without = (
-        math.sqrt(float(rest.mean()) / reference.shape[2]) / mean if len(rest) and mean > 0 else 0.0
-    )
+    square = float(rest.mean()) / reference.shape[2] if len(rest) else 0.0
+    rmse_without = math.sqrt(square) / mean if mean > 0 else math.nan
     # A hundredth of the pixels counts as few.
     return ErrorPlace(
         count,
@@ -113,9 +114,10 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
     row, column = np.divmod(predictor.pixels, width)
     regions: list[tuple[str, Bools]] = []
     for words, angle in _angles(reference):
-        # `step` is the usual angle between neighbouring pixels, by which pixels are measured.
+        # `step` is the usual angle between neighbouring pixels, by which pixels are measured; those
+        # of a single column are neighbours up and down.
         pixel = angle.reshape(height, width)
-        step = float(np.median(np.abs(np.diff(pixel, axis=1)))) or math.inf
+        step = float(np.median(np.abs(np.diff(pixel, axis=1 if width > 1 else 0)))) or math.inf
         regions.append((f"beside {words}", (angle < 2 * _BESIDE * step)[predictor.pixels]))
     # One over the depth is linear in the image of a plane: what bends it is an outline.
     depth = surface_hits(reference).distance * (reference.direction @ predictor.view.axis)

@@ -55,14 +55,16 @@ class Number:
     step: float = 0.0
     #: of the first search along the axes, for what moves shadows; 0: there is none
     stride: float = 0.0
+    #: the value of a plain number at the place 1: a length of the scene, where it is one
+    unit: float = 1.0
 
     def inward(self, value: float) -> float:
         """Return the place on the whole line where a value is looked for."""
-        return SCALES[self.scale][0](value)
+        return SCALES[self.scale][0](value / self.unit)
 
     def outward(self, place: float) -> float:
         """Return the value that a place on the whole line stands for."""
-        return SCALES[self.scale][1](float(place))
+        return self.unit * SCALES[self.scale][1](float(place))
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,17 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import REPLICATES
-from airlight.reference.scene.model import Model
+from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import read_reference
-from airlight.reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
+from airlight.reference.storage.exr import (
+    BATCHES,
+    BOUND,
+    NOTE,
+    TOTAL,
+    Attribute,
+    Image,
+    read_exr,
+)
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.comparison.images import Comparison, compare_images, read_mask
 from airlight.validation.engine.error_place import ErrorPlace, error_place
@@ -57,6 +65,7 @@ from airlight.validation.estimates.quadrature import (
     off_by,
     reference_error,
     reference_layer,
+    stated_error,
 )
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import UNCHANGED, Changes
@@ -193,12 +202,16 @@ def compare_scene(
         orders = other_orders(
             loaded, at_size, judged.holds, compared.comparison.metrics.relative_bias
         )
-        compared = compared if orders is None else _with_orders(compared, orders)
+        compared = compared if orders is None else _with_orders(compared, orders, chosen)
     compared = with_model(compared, judged, loaded, chosen, progress)
-    return compared if margin_total is None else _within_total(compared, margin_total)
+    if margin_total is None:
+        return compared
+    return _within_total(compared, judged, loaded, chosen, margin_total, progress)
 
 
-def _with_orders(compared: EngineComparison, orders: OtherOrders) -> EngineComparison:
+def _with_orders(
+    compared: EngineComparison, orders: OtherOrders, mask: Bools | None
+) -> EngineComparison:
     """Return a comparison that says which orders of scattering the image may hold.
 
     Where these dominate, no factor of single scattering says anything of the image.
@@ -206,6 +219,8 @@ def _with_orders(compared: EngineComparison, orders: OtherOrders) -> EngineCompa
     words = (orders.words,) if orders.dominate else (*compared.hints.words, orders.words)
     hints = replace(compared.hints, words=words)
     correct, image = (np.asarray(v, dtype=np.float64) for v in (compared.reference, compared.image))
+    # Pixels outside of the mask count nowhere.
+    image = image if mask is None else np.where(np.asarray(mask)[:, :, None], image, np.nan)
     verdict = judge(correct, image, hints, compared.comparison.failures)
     return replace(compared, hints=hints, verdict=verdict)
 
@@ -249,16 +264,42 @@ def errors_of(
     )
 
 
-def _within_total(compared: EngineComparison, margin: float) -> EngineComparison:
+def _within_total(
+    compared: EngineComparison,
+    judged: JudgedLayer,
+    loaded: LoadedScene,
+    mask: Bools | None,
+    margin: float,
+    progress: Progress | None,
+) -> EngineComparison:
     """Return a comparison that fails where the bias against the physical equation is beyond a
-    margin, or is not known.
+    margin, with what the reference and a noisy image may be off, or is not known.
     """
-    total = compared.model and compared.model.total
-    bias = total.mean if total else None
-    if bias is not None and abs(bias) <= margin:
-        return compared
-    said = "is not known" if bias is None else f"is {bias:+.3g}"
-    words = f"the relative bias against physics {said}, not within +-{margin:.3g}"
+    errors = compared.model
+    assert errors is not None, "a margin against physics is refused without a model"
+    bias = None if errors.total is None else errors.total.mean
+    words = f"the relative bias against physics is not known, not within +-{margin:.3g}"
+    if bias is not None:
+        tell = _telling(progress)
+        physical = reference_image(
+            loaded.scene, pixel=compared.pixel, model=PHYSICAL, progress=tell
+        )
+        off = off_by(physical, judged.holds, emitted=judged.emitted, mask=mask)[0]
+        statistics = compared.comparison.statistics
+        if statistics is not None:
+            # The interval is relative to the mean of the model's reference.
+            low, high = statistics.relative_bias_ci
+            equation = None if errors.against_physics is None else errors.against_physics.mean
+            if low is None or high is None or equation is None:
+                off = math.inf
+            else:
+                off += (high - low) / 2 * (1 + equation)
+        if abs(bias) + off <= margin:
+            return compared
+        shown = "" if abs(bias) > margin else f"shown to be (it may be off by {off:.2g}) "
+        words = (
+            f"the relative bias against physics is {bias:+.3g}, not {shown}within +-{margin:.3g}"
+        )
     comparison = compared.comparison
     failed = replace(comparison, failures=(*comparison.failures, words))
     return replace(compared, comparison=failed)
@@ -318,8 +359,16 @@ def judge_image(
         # Where no path of the image arrived it has no standard error: the reference alone
         # must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
+    made: dict[str, Attribute] = {BATCHES: REPLICATES}
+    if with_errors and margin is not None:
+        # A margin holds the error of the reference that is no noise, too; NaN where nobody knows it.
+        stated = stated_error(fitting, judged.holds)
+        expected[f"{name}_bound"] = (
+            np.full(correct.shape, math.nan) if stated is None else stated[0]
+        )
+        made[BOUND] = "estimated" if stated is None else stated[1]
     comparison = compare_images(
-        Image(expected, attributes={BATCHES: REPLICATES}),
+        Image(expected, attributes=made),
         Image(layers, attributes=image.attributes),
         layer=name,
         mask=mask,
@@ -465,10 +514,12 @@ def _fits(reference: Array, image: Array) -> bool:
     """Return whether an image fits so well that nothing can fit better: to a relative rmse of
     0.1 %.
     """
-    finite = np.isfinite(reference)
-    difference = (image - reference)[finite]
-    power = float(np.mean(reference[finite] ** 2)) if finite.any() else 0.0
-    return bool(np.isfinite(difference).all() and np.mean(difference**2) <= 1e-3**2 * power)
+    # Pixels outside of a mask are NaN, and count nowhere.
+    finite = np.isfinite(reference) & np.isfinite(image)
+    if not finite.any():
+        return False
+    difference, power = (image - reference)[finite], float(np.mean(reference[finite] ** 2))
+    return bool(np.mean(difference**2) <= 1e-3**2 * power)
 
 
 def _error(reference: Array, image: Array, where: Bools) -> float:

@@ -20,7 +20,7 @@ from airlight.reference.quadrature.surface import emitted_light, surface_hits
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.varying import GridMedium
-from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names
+from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names, read_exr
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.estimates.quadrature import reference_layer
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
@@ -103,6 +103,19 @@ def judged_layer(
     return JudgedLayer(
         chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted
     )
+
+
+def whole_layer(
+    path: str | os.PathLike[str], *, name: str | None = None, holds: str | None = None
+) -> tuple[Image, JudgedLayer]:
+    """Return one of several images that are judged together, with its layer, see `judged_layer`.
+
+    Raises InputError for a file that holds a part of its frame: the rest is no black image.
+    """
+    image = read_exr(path)
+    if image.with_data() is not None:
+        raise InputError(f"{path} holds a part of its frame alone; expected all pixels of it")
+    return image, judged_layer(image, path, name=name, holds=holds)
 
 
 def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
@@ -455,3 +468,10 @@ def scene_of_size(
     loaded = loaded if model is None else replace(loaded, model=model)
     words = " and ".join(change_words(changes))
     return replace(loaded, name=f"{loaded.name} with {words}") if changes else loaded
+
+
+def model_notes(loaded: LoadedScene) -> tuple[str, ...]:
+    """Return whose equation the references of a scene solve; nothing for the physical one."""
+    if loaded.model.is_physical:
+        return ()
+    return (f"judged by the equation of {loaded.model.title}, which is not the physical one",)

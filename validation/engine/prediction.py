@@ -154,6 +154,7 @@ def _sight(observation: Observation) -> tuple[Hashable, ...]:
         observation.samples,
         observation.rays,
         observation.steps,
+        observation.apart,
         observation.used.tobytes(),
         observation.cut_off.tobytes(),
     )

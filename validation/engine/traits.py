@@ -15,6 +15,8 @@ def traits(predictor: Predictor) -> dict[str, bool]:
     shapes = bool(reference.occluders.shapes())
     spots = [light for light in reference.lights if light.axis is not None]
     right, model = predictor.unchanged, predictor.observation.equation
+    # A pixel that is infinite, as of a lamp in a file of halves, says nothing of colours.
+    finite = values[np.isfinite(values).all(axis=1)]
     # Henyey and Greenstein's phase functions have a g, which is a number.
     lobes = any(isinstance(g, float) for g in fog.phase)
     # The pairs of extinction and albedo of all channels of all media.
@@ -51,7 +53,7 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "square": predictor.shape[0] == predictor.shape[1],
         "oblong": predictor.shape[0] != predictor.shape[1],
         "colours": bool(
-            np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))
+            np.ptp(finite, axis=1).max(initial=0.0) > 1e-6 * np.abs(finite).max(initial=0.0)
         ),
         "stop": bool(stopped(values).any()),  # of many values
         # More light than there should be: higher orders take none away. Those of another equation

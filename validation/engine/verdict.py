@@ -36,7 +36,9 @@ class Verdict:
     reasons: tuple[str, ...]  #: why it is not; empty if it is
     block: int  #: side of a block [pixels]
     block_error: float  #: relative error of block means; NaN where no block is lit
-    block_noise: float  #: the relative error of block means that scatter of pixels alone makes
+    #: the relative error of block means that scatter of pixels alone makes; NaN where single pixels
+    #: are blocks, whose scatter nobody sees
+    block_noise: float
 
     @property
     def noise_alone(self) -> bool:
@@ -53,8 +55,11 @@ class Verdict:
         size = (
             "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
         )
+        within = f"right: {size} are within {100 * self.block_error:.2g} %"
+        if math.isnan(self.block_noise):
+            return within
         scatter = f"the scatter of single pixels alone makes {100 * self.block_noise:.2g} %"
-        return f"right: {size} are within {100 * self.block_error:.2g} % ({scatter})"
+        return f"{within} ({scatter})"
 
 
 def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
@@ -114,7 +119,7 @@ def all_but_few(reference: Array, image: Array, mask: Bools | None = None) -> st
 
 def block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
     """Return the relative error of the means of lit blocks, and the error that
-    the scatter of pixels within them alone would make.
+    the scatter of pixels within them alone would make; NaN for single pixels.
     """
     # Sums over blocks, of each channel: pixels that count, light of the reference, light of the
     # image, and their difference and its square.
@@ -140,6 +145,5 @@ def block_errors(reference: Array, image: Array, side: int) -> tuple[float, floa
     scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
     # Without the worst hundredth of the blocks; of less than a hundred, none may be wrong.
     best = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
-    return math.sqrt(float(np.mean(error[best] ** 2))), math.sqrt(
-        float(np.mean((scatter / scale**2)[best]))
-    )
+    noise = math.nan if side == 1 else math.sqrt(float(np.mean((scatter / scale**2)[best])))
+    return math.sqrt(float(np.mean(error[best] ** 2))), noise

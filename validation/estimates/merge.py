@@ -125,6 +125,11 @@ def _read(name: str, image: Image) -> _Part:
             f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; "
             "compute it again"
         )
+    if not _of(header, "batch_spp").isdecimal():
+        raise InputError(
+            f"{name}: its header names {_of(header, 'batch_spp')} samples a pixel of a batch; "
+            "expected a whole number: compute it again"
+        )
     return _Part(name, image, seeds)
 
 

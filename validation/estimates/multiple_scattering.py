@@ -62,14 +62,17 @@ def multiple_scattering_fraction(
 
 def left_out(part: Array, whole: Array) -> Fraction:
     """Return 1 - part/whole with its 95 % interval, from image means of paired batches,
-    (batches,); 0 without light.
+    (batches,); unknown where no path found light.
     """
     count = len(whole)
     # Written so that NaN counts as no light.
     if not whole.mean() > 0:
-        return Fraction(0.0, (0.0, 0.0))
+        return Fraction(None, (None, None))
     # R and s_R of the module, over the batches b.
     ratio = float(part.mean() / whole.mean())
     error = float((part - ratio * whole).std(ddof=1) / np.sqrt(count) / whole.mean())
+    # Batches without any path of further orders do not say how rare these are.
+    if error == 0:
+        return Fraction(1 - ratio, (None, None))
     half = student_quantile(0.975, count - 1) * error
     return Fraction(1 - ratio, (1 - ratio - half, 1 - ratio + half))

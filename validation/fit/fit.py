@@ -9,7 +9,6 @@ import numpy as np
 
 from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
-from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.engine.observation import (
@@ -250,19 +249,11 @@ def _solved(
         # A light does not move any more where its step is less than a millionth of its distance
         # from the camera, or a fiftieth of a standard error, which the interval would not show.
         error = np.sqrt(np.maximum(np.diag(solution.covariance), 0))
-        still = np.maximum(1e-6 * _size(predictor.reference), 0.02 * error)
+        still = np.maximum(1e-6, 0.02 * error)
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
         model = replace(model, at=inner, predictor=_predictor(predictor.observation))
     return _Solved(model, free, groups, solution)
-
-
-def _size(reference: ReferenceScene) -> float:
-    """Return the distance from the camera to the farthest point or spot light [m]."""
-    return max(
-        (float(np.linalg.norm(light.position - reference.origin)) for light in reference.lights),
-        default=1.0,
-    )
 
 
 def _relative_residual(solution: Solution) -> Array:

@@ -17,7 +17,8 @@ Where a scene has several media or lights, the name of one follows after a colon
 each. In a medium whose channels differ `sigma_t` and `albedo` stand for three parameters.
 
 Positive parameters are looked for by their logarithms, g by artanh g: all values are allowed that
-are possible, and a step is a relative change.
+are possible, and a step is a relative change. A coordinate of a light counts in distances from the
+camera to the farthest lamp, a base in scale heights: a fit of a scene in other units is the same.
 """
 
 import math
@@ -83,9 +84,12 @@ def _unknown(
     paths: tuple[Path, ...],
     scene: float,
     meaning: Callable[[float], float | PhaseLaw] = float,
+    unit: float = 1.0,
 ) -> Unknown:
-    """Return a number of a fog; `meaning` is what the fog has for its value."""
-    number = Number(*_RANGES[_KINDS[kind][0]], starts=(scene,), scale=_KINDS[kind][0])
+    """Return a number of a fog; `meaning` is what the fog has for its value, `unit` that of a plain
+    one.
+    """
+    number = Number(*_RANGES[_KINDS[kind][0]], starts=(scene,), scale=_KINDS[kind][0], unit=unit)
 
     def change(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         fog = guess.fog
@@ -119,7 +123,9 @@ def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> 
         guess = change(predictor, guess, at)
         return replace(guess, fog=guess.fog.put(path, p[0] - at[0]))
 
-    number = Number(*_RANGES["plain"], starts=(scene,))
+    # The distance from the camera to the farthest lamp; one at the camera has none.
+    away = max(float(np.linalg.norm(place - reference.origin)) for place in places)
+    number = Number(*_RANGES["plain"], starts=(scene,), unit=away or 1.0)
     return Unknown(
         name,
         f"{name} is {{0:.6g}}",
@@ -187,14 +193,10 @@ def _read(name: str, reference: ReferenceScene, fog: Fog, model: Model) -> list[
         part, layer = _PARTS[kind[:-2]], int(kind[-1]) - 1
         if layer < 0:
             return [_unknown(kind, kind, (("height", "constant"),), fog.height.constant)]
-        return [
-            _unknown(
-                kind,
-                kind,
-                (("height", "layers", layer, part),),
-                getattr(fog.height.layers[layer], part),
-            )
-        ]
+        own = fog.height.layers[layer]
+        unit = own.scale_height if part == "base" else 1.0
+        path: Path = ("height", "layers", layer, part)
+        return [_unknown(kind, kind, (path,), getattr(own, part), unit=unit)]
     # The exposure belongs to the image; all other kinds belong to a medium or a light, and without
     # a place there is an unknown for each.
     if kind == "exposure":

@@ -64,7 +64,11 @@ class RunsError:
 
     runs: int = column("runs", "1", "independent renders of the frame, each image once")
     bias: float = column("bias", "1", "mean over the runs")
-    bias_within: float = column("bias within", "1", "half of the 95 % interval of the bias")
+    bias_within: float = column(
+        "bias within",
+        "1",
+        "half of the 95 % interval of the bias, wider by the reference's own error",
+    )
     rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
     rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
     root_bias: float | None = column(
@@ -76,7 +80,8 @@ class RunsError:
     most_bias: float | None = column(
         "at most",
         "1",
-        "root of the upper end of that interval; null where fewer than three runs do not tell it",
+        "root of the upper end of that interval, and the reference's own error; null where fewer "
+        "than three runs do not tell it",
     )
 
 

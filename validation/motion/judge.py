@@ -29,7 +29,7 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.camera import film_positions
 from airlight.reference.scene.read import ReferenceScene, read_reference
-from airlight.reference.storage.exr import NOTE, read_exr
+from airlight.reference.storage.exr import NOTE
 from airlight.reference.storage.files import temporary_folder
 from airlight.validation.arrays import Array, Bools, Index, Progress
 from airlight.validation.engine.judge import lamp_distance
@@ -37,9 +37,10 @@ from airlight.validation.engine.observation import (
     PIXELS,
     JudgedLayer,
     expected_layer,
-    judged_layer,
+    model_notes,
     pixel_kinds,
     scene_of_size,
+    whole_layer,
 )
 from airlight.validation.estimates.quadrature import known_to, known_words, relative_error
 from airlight.validation.motion.blocks import BLOCK
@@ -164,10 +165,13 @@ def compare_frames(
             'filter, as an earlier history is in them; expected more frames, or "resets": [0]'
         )
     paths = frame_paths(pattern, record, str(about))
-    first = read_exr(paths[0])
-    judged = judged_layer(first, paths[0], name=layer or record.layer, holds=holds)
+    first, judged = whole_layer(paths[0], name=layer or record.layer, holds=holds)
     kinds = pixel_kinds(first, pixel or record.pixel)
-    named = scene_of_size(scene, judged.size, paths[0], changes).name
+    loaded = scene_of_size(scene, judged.size, paths[0], changes)
+    # Notes are what a reader of the numbers must know; they fail nothing. The scene goes: shadow
+    # rays look at all shapes that are alive.
+    named, notes = loaded.name, model_notes(loaded)
+    del loaded
     with temporary_folder() as folder:
         # The measures read each frame and each reference several times. They lie in a folder, so
         # that memory holds one frame at a time. All frames are read before the first reference,
@@ -194,8 +198,8 @@ def compare_frames(
                 f"{pattern}: the reference of every frame is dark: nothing is relative to it"
             )
         shifts = _shifts(frames.sequence("all"))
-    # Notes are what a reader of the numbers must know; they fail nothing.
-    notes: tuple[str, ...] = ()
+    if record.scene is not None and Path(record.scene).stem != Path(scene).stem:
+        notes += (f"{about} is of the scene {record.scene}: its frames are judged by {scene}",)
     if len(kinds) > 1:
         notes += (
             'judged at pixel centres: the files do not say; expected "pixel": '
@@ -283,9 +287,7 @@ class _Frames:
 
     def take(self, n: int, path: Path) -> None:
         """Keep a frame, which must have the size of the first."""
-        values = judged_layer(
-            read_exr(path), path, name=self._judged.name, holds=self._judged.holds
-        ).values
+        values = whole_layer(path, name=self._judged.name, holds=self._judged.holds)[1].values
         if values.shape != self._judged.values.shape:
             sizes = [
                 " x ".join(str(side) for side in each.shape[1::-1])
@@ -317,13 +319,13 @@ class _Frames:
                 loaded = load_scene(self._scene, self._judged.size, {**self._changes, **changes})
                 move_shapes(loaded.scene, moves)
                 shift_film(loaded.scene, *jitter)
-                image = reference_image(loaded.scene, pixel=self._pixel)
+                image = reference_image(loaded.scene, pixel=self._pixel, model=loaded.model)
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
             self._same_as.append(n)
             # One error stands for the references of all frames: the largest relative one.
             known = known_to(image, self._judged.holds, emitted=self._judged.emitted)
-            self.known = max(self.known, known, key=_doubt)
+            self.known = max(self.known, known, key=doubt)
             np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
             self._beside[n] = lamp_distance(loaded, image) <= 1.0  # [pixels]
             self._uncover(image.distance, read_reference(loaded.scene))
@@ -388,7 +390,7 @@ class _Frames:
         )
 
 
-def _doubt(known: Estimate) -> float:
+def doubt(known: Estimate) -> float:
     """Return the relative error of a reference: infinite where it is not known, and -1, less than
     any other, where all is dark.
     """
@@ -417,17 +419,18 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
     """
     shifts = range(-2, 4)
     frames = range(max(shifts), sequence.frames + min(shifts))
-    sums, light = dict.fromkeys(shifts, 0.0), 0.0
+    sums, light, count = dict.fromkeys(shifts, 0.0), 0.0, 0
     for n in frames:
+        # Values that are not finite count nowhere.
         frame = sequence.frame(n)
-        light += float(sequence.reference(n).mean())
+        finite = np.isfinite(frame)
+        light, count = light + float(sequence.reference(n)[finite].sum()), count + int(finite.sum())
         for shift in shifts:
-            error = frame - sequence.reference(n - shift)
-            finite = error[np.isfinite(error)]
-            sums[shift] += float(np.mean(finite**2)) if finite.size else 0.0
+            error = frame[finite] - sequence.reference(n - shift)[finite]
+            sums[shift] += float(np.sum(error**2))
     if not light:
         return {}
-    return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
+    return {shift: math.sqrt(sums[shift] * count) / light for shift in shifts}
 
 
 def motion_verdict(measures: Measures, reference_error: float | None = None) -> MotionVerdict:

@@ -58,15 +58,15 @@ from scipy.optimize import brentq
 from scipy.stats import nct
 
 from airlight.errors import InputError
-from airlight.reference.storage.exr import read_exr
 from airlight.validation.arrays import Array, Progress
 from airlight.validation.engine.images import image_times
 from airlight.validation.engine.judge import fitting_kind, references
 from airlight.validation.engine.observation import (
     expected_layer,
-    judged_layer,
+    model_notes,
     pixel_kinds,
     scene_of_size,
+    whole_layer,
 )
 from airlight.validation.estimates.quadrature import known_to, known_words, off_by
 from airlight.validation.motion.blocks import estimates, parts_of_error, products
@@ -135,8 +135,14 @@ class Noise:
     def words(self) -> str:
         """Return the verdict on bias and noise."""
         low, high = (100 * end for end in self.bias_ci)
+        is_right = low <= 0 <= high and self.root_bias is None
+        if math.isinf(high):
+            return "whether there is a bias cannot be told: the error of the reference is unknown"
+        if self.runs == 1 and is_right:
+            return "no random numbers: no error beyond that of the reference"
         if self.runs == 1:
-            return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
+            middle = 100 * (self.bias.value or 0.0)
+            return f"no random numbers: all of its error is bias, {middle:+.3g} % in the mean"
         if self.correlated:
             return (
                 "whether there is a bias cannot be told: runs are not independent, and averages of "
@@ -152,7 +158,7 @@ class Noise:
             )
         # The mean may be right while parts of the image are too bright and parts too dark: the
         # squared bias sees that.
-        if low <= 0 <= high and self.root_bias is None:
+        if is_right:
             return (
                 f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would "
                 "have been found"
@@ -210,7 +216,7 @@ def measure_noise(
     noise = Noise(
         runs=count,
         bias=fact(bias),
-        bias_ci=(bias, bias),
+        bias_ci=(bias - off[0], bias + off[0]),
         squared_bias=fact(square),
         relative_rmse=math.sqrt(square),
         blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
@@ -431,12 +437,10 @@ def compare_runs(
     """
     check_margin(margin)
     paths = run_paths(pattern)
-    images = [read_exr(path) for path in paths]
-    layers = [
-        judged_layer(image, path, name=layer, holds=holds)
-        for image, path in zip(images, paths, strict=True)
-    ]
-    first = layers[0]
+    # All files must have the layer of the first: airlight and all light are no runs of one image.
+    image, first = whole_layer(paths[0], name=layer, holds=holds)
+    rest = (whole_layer(path, name=first.name, holds=first.holds) for path in paths[1:])
+    layers = [first, *(each for _, each in rest)]
     for path, each in zip(paths, layers, strict=True):
         if each.size != first.size:
             raise InputError(
@@ -454,7 +458,7 @@ def compare_runs(
 
     # The mean over the runs has the least noise: it tells pixel centres from means over areas.
     mean = replace(first, values=np.where(finite, runs, np.nan).mean(axis=0))
-    kind, _ = fitting_kind(mean, reference_of, pixel_kinds(images[0], pixel))
+    kind, _ = fitting_kind(mean, reference_of, pixel_kinds(image, pixel))
     fitting = reference_of(kind.pixel)
     reference = expected_layer(fitting, first)
     time = image_times(paths[0])
@@ -491,7 +495,7 @@ def compare_runs(
         noise=noise,
         nonfinite=nonfinite,
         device="" if time is None else time[1],
-        notes=tuple(notes),
+        notes=(*model_notes(loaded), *notes),
         failures=tuple(failures),
     )
 

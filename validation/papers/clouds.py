@@ -65,12 +65,7 @@ def clouds_figures() -> Figures:
     # Fig. 11a: only the pixels in which another part of the cloud shades the surface are compared.
     loaded = shown(GAP, SIZE)
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
-    shaded_ratio = figures["gap, shaded"] = _ratio(*pair, shaded)
-    # The light of these pixels as a fraction of all light, by light paths [%]. The lost light is
-    # this fraction times (1 - ratio). A larger ratio loses less: the ends change places.
-    part = 100 * float(pair[1][shaded].sum() / pair[1].sum())
-    value, most, least = (part * (1 - ratio) for ratio in shaded_ratio[:3])
-    figures["gap, lost"] = Figure(value, least, most, INTERVAL)
+    figures["gap, shaded"], figures["gap, lost"] = _ratio(*pair, shaded), _lost(*pair, shaded)
     loaded = shown(LOBES, SIZE)
     # Fig. 11b: the pixels in which both searches found light at different places.
     two = _two_collectors(loaded)
@@ -89,6 +84,21 @@ def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> Figure
     half = student_quantile(0.5 + LEVEL / 2, math.inf) * np.sqrt((error[where].sum(-1) ** 2).sum())
     value, low, high = (float(light / at) for at in (expected, expected + half, expected - half))
     return Figure(value, low, high, INTERVAL)
+
+
+def _lost(image: Array, reference: Array, error: Array, where: Bools) -> Figure:
+    """Return what an image lacks in some pixels, over all light of the reference [%], with its
+    95 % interval.
+    """
+    whole = float(reference.sum())
+    lost = float((reference - image)[where].sum()) / whole
+    # The derivative by the light of the reference in a pixel: (1 - lost)/whole in these pixels,
+    # -lost/whole in the others. Errors of colours are added as in `_ratio`.
+    slopes = (where - lost) / whole
+    half = student_quantile(0.5 + LEVEL / 2, math.inf) * float(
+        np.sqrt(((error.sum(-1) * slopes) ** 2).sum())
+    )
+    return Figure(100 * lost, 100 * (lost - half), 100 * (lost + half), INTERVAL)
 
 
 def cloud_frames() -> Figures:

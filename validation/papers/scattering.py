@@ -18,6 +18,7 @@ too dark by about exp(-0.45 sigma_t radius).
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from statistics import median
 from typing import Any
@@ -59,10 +60,10 @@ def multiple_scattering() -> Figures:
     resize(scene, _SIZE)
     thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
     # In thin fog the second scattering is a fraction in proportion to the optical depth.
-    low, high = thin.interval
+    value, low, high = (math.nan if each is None else each for each in (thin.value, *thin.interval))
     return {
         "left over": max(map(_left_over, _SCENES)),
-        "thin": Figure(thin.value, low, high, INTERVAL),
+        "thin": Figure(value, low, high, INTERVAL),
     }
 
 

@@ -93,8 +93,12 @@ def _overlap(first: Body, second: Body) -> bool:
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:
     """Return the radius of the largest sphere in two convex meshes."""
+    # In radii of the smaller body, about its centre: the tolerances of the solver are 1e-7 of
+    # whatever unit there is.
+    small = min(first, second, key=lambda each: each.radius)
     normals = np.concatenate([first.normals, second.normals])
-    return largest_ball(normals, np.concatenate([first.offsets, second.offsets]))
+    offsets = np.concatenate([first.offsets, second.offsets]) - normals @ small.centre
+    return small.radius * largest_ball(normals, offsets / small.radius)
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:

@@ -290,17 +290,22 @@ def _change_camera(sensor: mi.Sensor, changed: Mapping[str, Values]) -> None:
 def _looking(like: mi.Transform4f, origin: Values, target: Values, up: Values) -> mi.Transform4f:
     """Return the transform of a camera that looks from a point at another, of the type of the
     transform `like`.
+
+    It is made here in float64: Mitsuba's `look_at` takes the difference of float32 coordinates, and
+    a target a metre away, 10 km from the origin, would turn the camera by half a milliradian.
     """
     forward = np.subtract(target, origin)
-    # Up and forward must span a plane: else `look_at` divides by zero. 1e-9 is the sine of the
-    # angle between both.
+    # Up and forward must span a plane. 1e-9 is the sine of the angle between both.
     left = np.cross(up, forward)
     if not np.linalg.norm(left) > 1e-9 * np.linalg.norm(up) * np.linalg.norm(forward):
         raise InputError(
             "camera: got a target at the origin, or straight up from it; expected another "
             "camera.target or camera.up"
         )
-    return type(like)().look_at(origin=list(origin), target=list(target), up=list(up))
+    forward, left = forward / np.linalg.norm(forward), left / np.linalg.norm(left)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
+    return type(like)(matrix)
 
 
 # Lights -------------------------------------------------------------------------------------------
@@ -400,7 +405,7 @@ def _of_medium(prefix: str, medium: mi.Medium) -> Iterable[Changeable]:
         yield from _of_layers(
             prefix, {name: _values(parameters[f"sigma_t.{name}"]) for name in NUMBERS}
         )
-    else:
+    elif "sigma_t.value.value" in parameters:  # else a grid, which readers refuse
         # Mitsuba's extinction is the product of the colour and `scale`; only the product is
         # changed.
         sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(
@@ -408,8 +413,9 @@ def _of_medium(prefix: str, medium: mi.Medium) -> Iterable[Changeable]:
         )
         sizes = (1, 3) if len(sigma_t) == 3 else (1,)
         yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
-    albedo = _values(parameters["albedo.value.value"])
-    yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
+    if "albedo.value.value" in parameters:
+        albedo = _values(parameters["albedo.value.value"])
+        yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
     if "phase_function.g" in parameters or _is_isotropic(medium):
         # An isotropic phase function has no parameter g; its mean cosine is 0, and
         # `scene_with_lobes` can give it another. At |g| = 1 the lobe is a delta function, hence
@@ -488,8 +494,9 @@ def _set_colour(parameters: mi.SceneParameters, key: str, values: Values) -> Non
 def scene_with_lobes(description: Plugin, lobes: Mapping[str, float]) -> mi.Scene:
     """Return the scene of a dictionary, see `give_lobes`."""
     config = mi.parser.ParserConfig(mi.variant())
-    # Merged meshes would lose their names, as in `load_scene`.
-    config.merge_meshes = False
+    # Merged meshes would lose their names, and media with one phase function change together; a
+    # built-in scene is loaded without merging, too.
+    config.merge_meshes = config.merge_equivalent = False
     state = mi.parser.parse_dict(config, description)
     give_lobes(state, lobes)
     # The digest describes the scene with its new phase functions, and is taken before Mitsuba's

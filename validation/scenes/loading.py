@@ -16,6 +16,7 @@ from types import MappingProxyType
 import mitsuba as mi
 
 from airlight.errors import InputError
+from airlight.realtime.scene.rounding import check_rounding
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
@@ -61,8 +62,8 @@ def load_scene(
 
     `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a
     scene file of Mitsuba, or of pbrt, which ends in .pbrt; `size`: width and height of the image
-    [pixels], by default the size that the scene has; `changes`: values by name that replace those
-    of the scene, see `validation.scenes.changes`.
+    [pixels], by default the size that the scene has; another one keeps the horizontal angle of
+    view; `changes`: values by name that replace those of the scene, see `validation.scenes.changes`.
 
     Raises InputError for an unknown name, a missing or malformed file, a size that no image can
     have, and a change that the scene cannot have. Whether methods and reference support the scene
@@ -118,6 +119,7 @@ def load_scene(
     _check_films(loaded)
     if changes:
         change_scene(loaded.scene, changes)
+        check_rounding(loaded.scene)
     return loaded
 
 

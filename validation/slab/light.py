@@ -8,7 +8,8 @@
              "total": {"reflectance", "transmittance", "flux": [{"depth", "up", "down"}],
                        "radiance": [{"depth", "mu", "phi", "value"}]}}
 
-Each number of `error` and `standard_error` is the error of the same number of the light.
+Each number of `error` and `standard_error` is the error of the same number of the light, None
+where it is not known.
 
 The computation runs twice, the second time with three quarters of the streams and two nodes fewer
 in each panel of depth. The change is the error that is printed. It belongs to the coarser run, so
@@ -168,8 +169,12 @@ def _exit(moments: Array, unit: float) -> Exit:
 
 def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> Numbers:
     """Return the values of photons for 0, or their standard errors for 1."""
+    moments = estimate.exits[which].copy()
+    if which:
+        # Where no photon came by nothing is known of the error of the amount.
+        moments[estimate.exits[0][..., 0] == 0, 0] = np.nan
     exits, totals, flux = (
-        part[which].tolist() for part in (estimate.exits, estimate.totals, estimate.flux)
+        part.tolist() for part in (moments, estimate.totals[which], estimate.flux[which])
     )
     orders: list[Part] = [
         _order_row(name, request.depths, reflected, transmitted, fluence)

@@ -95,10 +95,10 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Fraction:
-    """A fraction of the light, with its 95 % interval."""
+    """A fraction of the light, with its 95 % interval; None where it is not known."""
 
-    value: float
-    interval: tuple[float, float]
+    value: Number
+    interval: Ends
 
 
 @dataclass(frozen=True, kw_only=True)

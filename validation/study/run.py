@@ -227,15 +227,21 @@ def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
     # the reference's own error on.
     products = errors @ errors.T / errors.shape[1]
     squared, _ = parts_of_error(products)
-    bias, rmse = (student(each) for each in (errors.mean(axis=1), np.sqrt(np.diag(products))))
+    bias, within = student(errors.mean(axis=1))
     ends = squared.ends()
-    own = float(np.mean((reference.error[counts] / mean) ** 2))
+    # The reference may be off by what it states. Its mean is off by the mean of that at most, and a
+    # root mean square by that of it (Minkowski's inequality).
+    own = reference.error[counts] / mean
+    square = float(np.mean(own**2))
     return RunsError(
         len(errors),
-        *bias,
-        *rmse,
-        math.sqrt(squared.value) if squared.value and squared.exceeds(own) is Answer.YES else None,
-        None if ends is None else math.sqrt(max(ends[1], 0.0)),
+        bias,
+        within + float(own.mean()),
+        *student(np.sqrt(np.diag(products))),
+        math.sqrt(squared.value)
+        if squared.value and squared.exceeds(square) is Answer.YES
+        else None,
+        None if ends is None else math.sqrt(max(ends[1], 0.0)) + math.sqrt(square),
     )
 
 

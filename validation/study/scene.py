@@ -137,13 +137,12 @@ def configurations_for(
 
     Variants of the shadows are left out if nothing casts a shadow. The published treatment of
     bounded media is left out if the scene has none, or if they do not lie in vacuum, and so are
-    light samples where there is no area light.
+    light samples where there is no area light. Where nothing else is asked for, all stay.
     """
     # Names of parameters that change nothing here: a configuration that sets one of them renders
     # the same image as the configuration without it.
     without_effect = set() if scene.features.shadows else {"shadow", "order", "map"}
     without_effect |= set() if scene.medium.clear else {"media"}
     without_effect |= set() if scene.area_lights else {"points", "pattern"}
-    return tuple(
-        chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters))
-    )
+    kept = [each for each in configurations if not without_effect & set(dict(each.parameters))]
+    return tuple(kept or configurations)

@@ -11,7 +11,7 @@ import numpy as np
 
 from airlight.reference.quadrature.reference import ReferenceInputs
 from airlight.reference.scene.model import Model
-from airlight.reference.storage.exr import TOTAL, Image
+from airlight.reference.storage.exr import TOTAL, Image, read_exr
 from airlight.reference.storage.store import Inputs, stored
 from airlight.validation.columns import record_of
 from airlight.validation.study.configuration import Configuration
@@ -67,6 +67,7 @@ def _measured_image(
     """Return the row of an image with its layers."""
     from airlight.validation.engine.images import measure_image, notes_of
     from airlight.validation.engine.judge import references
+    from airlight.validation.engine.observation import AIRLIGHT, SURFACE
 
     # An image of a model is judged by the reference of its own equation.
     loaded = replace(study.loaded, model=model)
@@ -90,11 +91,14 @@ def _measured_image(
         times=None if times is None else FrameTimes(times[0]),
     )
     # FLIP compares all light. An image of the airlight alone has it only where the surfaces are
-    # dark, or where it has a layer of them.
+    # dark, or where it has a layer of them; one of surfaces alone has it nowhere. Pixels that a file
+    # does not hold are black, and no error: such an image has none.
     reference, whole = judged.layers, None
-    if judged.expected == TOTAL:
+    is_held = read_exr(shown.path).with_data() is None
+    is_lit = AIRLIGHT in layers and (SURFACE in layers or not np.any(reference.surface > 0))
+    if is_held and judged.expected == TOTAL:
         whole = judged.reference
-    elif "surface" in layers or not np.any(reference.surface > 0):
+    elif is_held and is_lit:
         whole = reference.airlight + reference.surface
     image = Image(
         layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name}

@@ -156,7 +156,8 @@ class Study(Settings):
             return self
         # A quarter of the pixels needs four times the samples for as many paths.
         size, checked = (
-            (width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size)
+            (max(1, width // 2), max(1, height // 2))
+            for width, height in (self.sizes[0], self.checks.size)
         )
         samples = {
             name: (4 if name == "volpath" else 1) * count

@@ -29,14 +29,20 @@ from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.reference import reference_image
 from airlight.validation.arrays import Array, Counted
 from airlight.validation.clock import Piece, in_turns
-from airlight.validation.estimates.quadrature import off_by
-from airlight.validation.motion.judge import motion_verdict
+from airlight.validation.estimates.quadrature import (
+    known_to,
+    off_by,
+    reference_error,
+    relative_error,
+)
+from airlight.validation.motion.judge import doubt, motion_verdict
 from airlight.validation.motion.measures import Measures, mean_measures, measure
 from airlight.validation.motion.measures import Sequence as Frames
 from airlight.validation.motion.noise import Noise, measure_noise
 from airlight.validation.scenes.animation import animate, frame_changes
 from airlight.validation.scenes.changes import change_scene
 from airlight.validation.scenes.registry import Animation
+from airlight.validation.statistics.estimate import INTERVAL, Estimate, fact
 from airlight.validation.study.configuration import Configuration, prepared
 from airlight.validation.study.frame_times import Turn, brief_turn, timed_image
 
@@ -50,9 +56,9 @@ class MethodNoise:
     label: str
     noise: Noise
     reference: Array = field(repr=False)  #: (height, width, 3) [W/(m^2 sr)]
-    mean: Array = field(
-        repr=False
-    )  #: of the runs; the reference where it is within two standard errors, (height, width, 3)
+    #: of the runs; the reference where it is within two standard errors and the reference's own
+    #: error, (height, width, 3) [W/(m^2 sr)]
+    mean: Array = field(repr=False)
     deviation: Array = field(repr=False)  #: of a run, (height, width, 3) [W/(m^2 sr)]
 
 
@@ -73,6 +79,9 @@ def method_noise(
         raise InputError(f"runs: got {runs}, expected at least two")
     read, image = read_scene(scene), reference_image(scene)
     reference, off = image.airlight, off_by(image, "airlight")
+    # By how much a pixel of the reference may be off: standard errors count twice, as in `off_by`.
+    drawn = reference_error(image, "airlight")
+    own = image.airlight_error + (0.0 if drawn is None else INTERVAL * drawn)
     # All runs of all methods first. A method that draws no random numbers has one run, and so has
     # one whose runs turn out to be the same.
     rendered, turns = [], list[Turn]()
@@ -93,9 +102,9 @@ def method_noise(
             np.mean(images, axis=0),
             np.std(images, axis=0, ddof=min(1, len(images) - 1)),
         )
-        # A mean within two standard errors of the reference is shown as the reference: a picture of
-        # the difference shows bias alone.
-        biased = np.abs(mean - reference) > 2.0 / math.sqrt(count) * deviation
+        # A mean within two standard errors of the reference, and the error of that, is shown as the
+        # reference: a picture of the difference shows bias alone.
+        biased = np.abs(mean - reference) > 2.0 / math.sqrt(count) * deviation + own
         rendered.append((images, np.where(biased, mean, reference), deviation))
     # All methods take turns, 0.2 s each: their times are compared.
     spent = in_turns([Piece(turn, 0.2) for turn in turns])
@@ -155,7 +164,7 @@ def method_motion(
     )
     total = frames * (1 + len(configurations))
     report = None if progress is None else lambda number, what: progress(number, total, what)
-    references = light_references(scene, places, moves, report)
+    references, known = light_references(scene, places, moves, report)
     everywhere = np.ones(references[0].shape[:2], dtype=bool)
     rows = []
     for number, chosen in enumerate(configurations):
@@ -174,7 +183,8 @@ def method_motion(
         measured = [each for each in several if each is not None]
         mean = mean_measures(measured) if measured else None
         # The verdict is that on the numbers beside it.
-        words = motion_verdict(mean).words if mean else "the reference is dark"
+        own = relative_error(known)
+        words = motion_verdict(mean, own).words if mean else "the reference is dark"
         rows.append(MethodMotion(chosen.label, mean, words))
     return rows
 
@@ -184,9 +194,9 @@ def light_references(
     places: Sequence[Scene],
     moves: Animation,
     progress: Callable[[int, str], None] | None = None,
-) -> list[Array]:
-    """Return the airlight of the reference of each frame, (height, width, 3) [W/(m^2 sr)]; in the
-    end the scene is as it was.
+) -> tuple[list[Array], Estimate]:
+    """Return the airlight of the reference of each frame, (height, width, 3) [W/(m^2 sr)], and the
+    mean of that which is known worst; in the end the scene is as it was.
 
     `places`: the scene of each frame, of which `moves` says what moves,
     the first as it is now; `progress`: called with the number of a frame and what. Raises
@@ -204,14 +214,16 @@ def light_references(
         )
     # One scene is changed in place from frame to frame. The last change brings it back to the
     # first frame, as the caller gave it.
-    references: list[Array] = []
+    references, known = list[Array](), fact(0.0)
     for number, change in enumerate([*changes, changes[0]]):
         change_scene(scene, change)
         if number < len(places):
             if progress is not None:
                 progress(number, "references")
-            references.append(reference_image(scene).airlight)
-    return references
+            image = reference_image(scene)
+            references.append(image.airlight)
+            known = max(known, known_to(image, "airlight"), key=doubt)
+    return references, known
 
 
 def method_frames(renderer: FrameRenderer, places: Sequence[Scene]) -> list[Array]:

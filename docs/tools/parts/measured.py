@@ -2,6 +2,7 @@
 """Tables of what was measured, from the report and the records in `docs/data`."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -189,8 +190,11 @@ def left_out() -> str:
 
 
 def _percent(found: Fraction) -> str:
-    low, high = (100 * end for end in found.interval)
-    return f"{100 * found.value:.1f} % ({low:.1f}..{high:.1f})"
+    value, low, high = (
+        math.nan if each is None else 100 * each for each in (found.value, *found.interval)
+    )
+    interval = "" if math.isnan(low) else f" ({low:.1f}..{high:.1f})"
+    return "an unknown part" if math.isnan(value) else f"{value:.1f} %{interval}"
 
 
 def scenes() -> str:

@@ -258,11 +258,11 @@ class _Run:
         beam order - 1 times before.
         """
         slab = self.slab
-        # The fraction of the peak to the sixth power is below rounding.
-        beam_orders, no_peak = 6, 1e-9
-        if order > beam_orders or (order > 1 and abs(slab._peak) < no_peak):
+        # This much of the beam's light counts as none: a sharp phase function keeps half of it in the
+        # peak, and thirty scatterings in the peak are then possible.
+        times, no_light = order - 1, 1e-9
+        if abs(slab._peak) ** times < no_light:
             return np.zeros(1, slab._type)
-        times = order - 1
         # Poisson's distribution: n scatterings in the peak over the way s have (albedo f s)^n/n!
         # exp(-s).
         strength = (

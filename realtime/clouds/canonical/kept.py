@@ -13,6 +13,7 @@ an image would depend on earlier ones.
 """
 
 import os
+import re
 import uuid
 import zipfile
 import zlib
@@ -56,7 +57,17 @@ def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        AttributeError,
+        TypeError,  # from a single array, which is no archive
+        RuntimeError,  # from an archive that seems encrypted, or compressed in an unknown way
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
         return None
     with suppress(OSError):
         os.utime(path)  # what was used longest ago is dropped first
@@ -64,13 +75,15 @@ def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
 
 
 def _keeps() -> bool:
-    return os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip() != "0"
+    # '0', and 0 of any unit, such as '0MB'.
+    size = os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip().lower()
+    return re.fullmatch(r"[0.]+\s*[a-z]*", size) is None
 
 
 def _path(digest: str, medium: Array) -> Path:
-    return (
-        _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
-    )
+    # One digest of 32 digits: the names of the cache have that form, and others are never removed.
+    name = blake2b(digest.encode() + medium.tobytes(), digest_size=16).hexdigest()
+    return _folder() / f"canonical-{name}.npz"
 
 
 def keep(digest: str, medium: Array, arrays: Mapping[str, Any]) -> None:

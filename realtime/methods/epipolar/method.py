@@ -248,6 +248,12 @@ def _interpolated(airlight: LitRays, samples: Samples, fractions, heights: Slice
     of its own where the samples do not fit.
     """
     fraction, fits = between_samples(samples, fractions, point, airlight.rays.distance)
+    # All channels have to fit. In one in which the pixel's ray meets no light nothing is needed, and
+    # samples may have no fraction.
+    whole = airlight.gamma(airlight.rays.distance)
+    fits |= whole == 0
+    if dr.depth_v(fits) > 1:
+        fits = dr.all(fits)
     # Next to a light, samples gather most of their airlight at other places than the pixel, and
     # where it lies on a surface they end before it, or beyond. Within 6 pixels of the light's image
     # nothing is interpolated: height over foot is the tangent of the ray's angle with the light,
@@ -257,4 +263,4 @@ def _interpolated(airlight: LitRays, samples: Samples, fractions, heights: Slice
     fits &= airlight.geometry.height > least_pixels * pixel * dr.abs(airlight.geometry.foot)
     # `~fits` masks the segments, so that pixels with an interpolated fraction do not walk.
     pixel_integral = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
-    return dr.select(fits, fraction * airlight.gamma(airlight.rays.distance), pixel_integral)
+    return dr.select(fits, fraction * whole, pixel_integral)

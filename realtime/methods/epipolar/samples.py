@@ -141,7 +141,7 @@ def sample_ray(samples: Samples, sample):
 
 def no_value(like):
     """Return the mark in place of a value for a sample whose ray meets no light, an
-    array `like` the values.
+    array `like` the values; a colour has it in each channel by itself.
     """
     # Fractions are not negative: `_on_slice` tells by the sign.
     return type(like)(-1.0)
@@ -152,12 +152,12 @@ def between_samples(samples: Samples, values, point, depth):
 
     `samples`: the samples; `values`: the values of the marked samples, by sample; `point`: image
     points (i, j) of the pixels; `depth`: their distances [m]. Returns `value`: the weighted mean;
-    `fits`: whether enough of the samples agree in their depth.
+    `fits`: by channel, whether enough of the samples agree in their depth.
     """
     # The pixel lies between slice `low` and the next one, by its place on the border.
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)
-    total, weights = type(values)(0), type(depth)(0)
+    total, weights = type(values)(0), type(values)(0)
     for step, fraction in ((0, 1 - (place - low)), (1, place - low)):
         number = neighbour(samples.slices, mi.Int32(low) + step)
         # Two samples on each of two slices: nearness across slices times the weight along the
@@ -187,8 +187,9 @@ def _on_slice(samples: Samples, values, number, point, depth):
         dr.gather(type(values), values, number * samples.count + at) for at in (left, right)
     )
     # Where one of the two has no value, since its ray meets no light, the other stands for both;
-    # where neither has one, the weights are 0.
-    has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
+    # where neither has one, the weights are 0. That is by channel: a ray that meets media without
+    # red has values in green and blue alone.
+    has_left, has_right = left_value >= 0, right_value >= 0
     left_value, right_value = (
         dr.select(has_left, left_value, right_value),
         dr.select(has_right, right_value, left_value),
@@ -200,7 +201,8 @@ def _on_slice(samples: Samples, values, number, point, depth):
     for step, near in ((0, 1 - fraction), (1, fraction)):
         value = left_value + (right_value - left_value) * (type(along)(k + step - left) * pace)
         agreement = _agreement(depth, _sample_depth(samples, ends, mi.Int32(k) + step))
-        weighted.append((value, dr.select(has_left | has_right, near * agreement, 0)))
+        weight = type(values)(near * agreement)
+        weighted.append((value, dr.select(has_left | has_right, weight, 0)))
     return weighted
 
 
@@ -249,8 +251,3 @@ def _agreement(first, second):
     # 1 up to the difference that is no break; beyond it, it falls with the fourth power.
     close = dr.minimum(AGREES / dr.maximum(_difference(first, second), 1e-6), 1)
     return dr.square(dr.square(close))
-
-
-def _first(value):
-    """Return a value, or the first channel of a colour."""
-    return value if dr.depth_v(type(value)) == 1 else value.x

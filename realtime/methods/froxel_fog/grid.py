@@ -52,6 +52,9 @@ from airlight.realtime.numerics.functions import between_entries
 from airlight.realtime.scene.camera import Camera, row_and_column
 from airlight.realtime.scene.media.medium import Medium, Rays
 
+#: Keeps a grid from having no depth at all [m]: far below any scene, and its square is a float32.
+_LEAST_DEPTH = 1e-15
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -92,14 +95,6 @@ class Grid:
             + camera.up * (camera.height * (0.5 - v))
         )
 
-    def place(self, point: Any) -> tuple[Any, Any, Any]:
-        """Return u, v and the depth [m] of points [m]; u and v mean nothing
-        where that is not above 0.
-        """
-        camera = self.camera
-        across, upward, depth = camera.project(point - camera.origin)
-        return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
-
 
 def view_grid(view: View, *, size: tuple[int, int, int], far: float) -> Grid:
     """Return the grid of a view: froxels across, down and in depth, up to a depth [m];
@@ -132,16 +127,15 @@ def _frame_depth(view: View) -> Metres:
     surfaces = dr.max(dr.select(met, depth, 0))
     medium_end = medium.last_depth(view.camera.origin, forward)
     if medium_end is not None:
-        return dr.maximum(
-            dr.select(dr.all(met), dr.minimum(surfaces, medium_end), medium_end), 1e-3
-        )
-    # In an unbounded medium the farthest reach of all lights counts. The bound of 0.001 m keeps the
-    # grid from having no depth at all.
+        end = dr.select(dr.all(met), dr.minimum(surfaces, medium_end), medium_end)
+        return dr.maximum(end, _LEAST_DEPTH)
+    # In an unbounded medium the farthest reach of all lights counts.
     beyond = Float(0)
     for table in view.tables:
         reach = _reach(view, table[dr.arange(mi.UInt32, table.count)].position, medium)
         beyond = dr.maximum(beyond, reach if table.count == 1 else dr.max(reach))
-    return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)
+    end = dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond))
+    return dr.maximum(end, _LEAST_DEPTH)
 
 
 def _reach(view: View, position: Any, medium: Medium) -> Metres:

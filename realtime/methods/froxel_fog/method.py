@@ -139,9 +139,10 @@ class FroxelFog(Method):
 
         With a column for each pixel the columns make no error; the error of the slices remains.
         """
+        width, height = (max(side, 2) for side in size)  # a grid has two columns and rows at least
         return (
             ("map", {"shadow": "ray"}),
-            ("resolution", {"width": size[0], "height": size[1]}),
+            ("resolution", {"width": width, "height": height}),
             ("steps", None),
         )
 

@@ -3,6 +3,8 @@ r"""Clouds by collectors as Bouthors 2008 has them, also with its equations as t
 
 Slabs are as thick as the cloud is along the light (`thickness=light`), the density is half
 (`peak=half`), and a sky is a beam from above (`sky=beams`). Two equations can be had as printed.
+The mean slopes of light maps, the cover of collectors and the depth behind points are those of
+`cloud-collectors`.
 
 **The opacity of clouds along a ray**, eq. 2, with the extinctions kappa_i of
 the stretches in clouds:

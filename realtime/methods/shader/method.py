@@ -17,6 +17,7 @@ from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.shader.client import ShaderHost
 from airlight.realtime.methods.shader.prelude import phase_text, stage_text
 from airlight.realtime.methods.shader.scene_arrays import (
+    check_ends,
     check_scene,
     light_array,
     map_array,
@@ -95,6 +96,7 @@ class Shader(Method):
         are not finite are refused.
         """
         host, maps = state
+        check_ends(view.medium, f"{self.shader.path.name} renders a homogeneous medium")
         arrays: dict[str, Any] = ray_arrays(
             view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words)
         )

@@ -20,8 +20,8 @@ from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import host_numbers
 from airlight.realtime.scene.camera import read_camera
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
-from airlight.realtime.scene.phase import HenyeyGreenstein, Tabulated
+from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous, Medium
+from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic, Rayleigh, Tabulated
 from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 
@@ -49,11 +49,12 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(
             f"the medium {what}: {wanted}; use ray-march, or write the method in Python"
         )
-    # A ray that meets nothing ends where little of its light is left: never, in a vacuum.
-    if medium.vacuum:
+    check_ends(medium, wanted)
+    # The text of every other phase function would read an empty table, which is black.
+    if not isinstance(medium.phase, Isotropic | Rayleigh | HenyeyGreenstein | Tabulated):
         raise InputError(
-            f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t "
-            "above 0"
+            f"the phase function is {medium.phase.name!r}: {wanted}, whose phase function is "
+            "isotropic, rayleigh, hg or a table; use ray-march, or write the method in Python"
         )
     if scene.area_lights:
         raise InputError(
@@ -66,6 +67,18 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(
             f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: expected "
             f"{most}"
+        )
+
+
+def check_ends(medium: Medium, wanted: str) -> None:
+    """Refuse a medium in which rays that meet nothing have no end, by `InputError`; the
+    extinction may change from frame to frame.
+    """
+    # They end where little of their light is left: never, in a vacuum.
+    if medium.vacuum:
+        raise InputError(
+            f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t "
+            "above 0"
         )
 
 

@@ -31,7 +31,7 @@ _FORMATS = ("rgba16f", "rgba32f", "r32f")
 _DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(\w+)[ \t]*(.*?)[ \t]*$")
 _PARAMETER = re.compile(r'(\w+)\s+([^\s"]+)(?:\s+"([^"]*)")?$')
 _PASS = re.compile(r"(\w+)\s+size=([\w/]+)(?:\s+format=(\w+))?$")
-_TERM = re.compile(r"(?:(\d+)|([WH])(?:/(\d+))?)$")
+_TERM = re.compile(r"(?:(0*[1-9]\d*)|([WH])(?:/(0*[1-9]\d*))?)$")
 # Mesa '0:14(12): error: ..', NVIDIA '0(14) : error C1008: ..', others 'ERROR: 0:14: ..'
 _ERRORS = (
     re.compile(r"^\d+:(\d+)\(\d+\): (?:preprocessor )?error: (.*)$", re.MULTILINE),
@@ -39,7 +39,7 @@ _ERRORS = (
     re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE),
 )
 # a uniform's initial value
-_INITIAL = r"(?<!airlight )\buniform\b[^;]*\b{}\s*(?:\[[^\]]*\]\s*)?=(?!=)"
+_INITIAL = r"\buniform\b[^;]*\b{}\s*(?:\[[^\]]*\]\s*)?=(?!=)"
 _WAYS_OUT = {
     "texture2D": "add `#define texture2D texture`",
     "texture3D": "add `#define texture3D texture`",
@@ -229,10 +229,12 @@ class _Reader:
                 continue
             if word == "extension":
                 self.extensions.append(f"#extension {rest}")
-            elif word == "pragma" and rest.split(None, 1)[:1] == ["airlight"]:
+            ours = word == "pragma" and rest.split(None, 1)[:1] == ["airlight"]
+            if ours:
                 self._pragma(rest.removeprefix("airlight").strip(), place)
-            # `#version` and extensions stand at the top of the whole text; their lines stay, empty.
-            out.append("" if word in ("version", "extension") else code)
+            # `#version` and extensions stand at the top of the whole text, and our lines are no
+            # code: all of them stay, empty.
+            out.append("" if ours or word in ("version", "extension") else code)
         return "\n".join(out)
 
     def _pragma(self, text: str, place: str) -> None:
@@ -299,15 +301,18 @@ def _evaluated(term: str, width: int, height: int) -> int:
     matched = _TERM.match(term)
     assert matched is not None
     if matched[1]:
-        return max(int(matched[1]), 1)
+        return int(matched[1])
     # W/n and H/n are rounded up.
-    return -(-(width if matched[2] == "W" else height) // max(int(matched[3] or 1), 1))
+    return -(-(width if matched[2] == "W" else height) // int(matched[3] or 1))
 
 
 def _without_comments(text: str) -> str:
-    """Return the text with spaces in place of comments; lines stay where they are."""
+    """Return the text with spaces in place of comments; lines stay where they are, and so does
+    what stands in quotes, such as an address in the help of a parameter.
+    """
 
-    def blank(comment: re.Match[str]) -> str:
-        return re.sub(r"[^\n]", " ", comment[0])
+    def blank(found: re.Match[str]) -> str:
+        return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
 
-    return re.sub(r"//[^\n]*|/\*.*?(?:\*/|\Z)", blank, text, flags=re.DOTALL)
+    parts = r'"[^"\n]*"|//[^\n]*|/\*.*?(?:\*/|\Z)'
+    return re.sub(parts, blank, text, flags=re.DOTALL)

@@ -111,6 +111,20 @@ class BoundedMedia(Homogeneous):
             depths = self._with_length(depths, bounded, dr.select(end > begin, end - begin, 0))
         return tuple(depths)
 
+    def length_of(self, depth):
+        """Return a length that has the depth wherever it lies, in thinner media too [m]."""
+        if self.clear:
+            return super().length_of(depth)
+        lengths = []
+        for channel, around in enumerate(self.sigma_t):
+            # A ray through a thinner medium lacks so much of the depth at most: along 2 R of it.
+            lacking = (
+                2 * bounded.radius * dr.maximum(around - bounded.medium.sigma_t[channel], 0)
+                for bounded in self.bounded_media
+            )
+            lengths.append(sum(lacking, type(around)(depth)) / around)
+        return reduce(dr.maximum, lengths)
+
     def last_depth(self, origin, forward):
         """Return the depth at which the last medium in vacuum ends [m]."""
         if not self.clear:

@@ -156,6 +156,11 @@ class PieceRays(LitRays):
         return _MOST + 2 * sum(path.bounded.count for path in self.paths)
 
     @property
+    def size(self):
+        """The radius of the largest bounded medium [m]."""
+        return reduce(dr.maximum, [bounded.radius for bounded in self.medium.bounded_media])
+
+    @property
     def phase(self):
         """The phase function of the piece."""
         return self.piece.medium.phase
@@ -170,7 +175,7 @@ class PieceRays(LitRays):
 
     def begin(self, x):
         """Return the envelopes at x [m]."""
-        return [path.envelopes_at(beyond(x)) for path in self.paths]
+        return [path.envelopes_at(beyond(x, self.size)) for path in self.paths]
 
     def shines(self, envelopes):
         """Return true: segments end where nothing is left."""
@@ -183,7 +188,7 @@ class PieceRays(LitRays):
         x, end = start.x, start.end(self._rate(start, envelopes))
         # The next place at which a facet takes over, or a path passes an edge: beyond a rounding
         # error of x. The panel ends there. Spheres have no envelopes.
-        at = beyond(x)
+        at = beyond(x, self.size)
         changes = [
             lines and path.next_change(lines, at) for path, lines in zip(self.paths, envelopes)
         ]
@@ -224,7 +229,7 @@ class PieceRays(LitRays):
             bending = dr.maximum(bending, 1 / smooth)
         # Paths along a facet change without limit where they pass its edge: a panel shorter than a
         # rounding error of x would end where it begins.
-        least = beyond(start.x) - start.x
+        least = beyond(start.x, self.size) - start.x
         return dr.minimum(dr.maximum(rate * (1 / CHANGE), bending), dr.rcp(least))
 
 

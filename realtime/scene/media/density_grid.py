@@ -68,13 +68,15 @@ class GridMedium(VaryingMedium):
         enter, leave = rays.crossed
         x0, x1 = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
         start, length = rays.at(x0), dr.maximum(x1 - x0, 0)
-        # A place moves by `rates` voxels a metre along each axis of the grid. A step has a
-        # thousandth of a voxel at least: it goes over a face that rounding has left just ahead.
-        at, beyond = (
-            self.density.rows_at(point, mi.UInt32(0), True)
-            for point in (start, start + rays.direction)
-        )
-        rates = [after - before for before, after in zip(at, beyond, strict=True)]
+        # A place moves by `rates` voxels a metre along each axis of the grid: the rows of the
+        # transform without its shift. A difference of two places would be all rounding where voxels
+        # are large. A step has a thousandth of a voxel at least: it goes over a face that rounding
+        # has left just ahead.
+        at, way = self.density.rows_at(start, mi.UInt32(0), True), rays.direction
+        rates = [
+            dr.fma(x, way.x, dr.fma(y, way.y, z * way.z))
+            for x, y, z in (self.density.rows[n : n + 3] for n in (0, 4, 8))
+        ]
         least = 1e-3 / dr.maximum(dr.maximum(dr.abs(rates[0]), dr.abs(rates[1])), dr.abs(rates[2]))
 
         def walk(x, total):

@@ -549,11 +549,13 @@ def paths_from(
     return paths
 
 
-def beyond(x):
+def beyond(x, size):
     """Return a distance a rounding error beyond x [m]: there the line
     counts that took over at x.
+
+    `size` is that of the media [m]: coordinates are as large at the camera too, where x is 0.
     """
-    return x + 64 * dr.epsilon(type(x)) * (x + 1)
+    return x + 64 * dr.epsilon(type(x)) * (x + size)
 
 
 def chord(bounded: BoundedMedium, origin, direction) -> tuple[Any, Any]:

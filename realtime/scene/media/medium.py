@@ -413,12 +413,13 @@ class LitRays:
 
     def angle(self, s, r) -> Angle:
         """Return the angle by which light is scattered at s = x - foot and r from the light [m]."""
-        # Light travels away from the light, so the cosine of the scattering angle is -s/r.
+        # Narrow lobes need both halves of the angle: 1 - cos has lost them.
         if self.light.w:
-            return lambda phase: phase.evaluate(-s / r)
-        # Narrow lobes need both halves of the angle between ray and light, which is one for a ray.
-        axis, direction = self.light.axis, self.rays.direction
-        down, up = (0.25 * dr.squared_norm(v) for v in (axis + direction, axis - direction))
+            down, up = half_angle(s, r, dr.rcp(r), dr.square(self.geometry.height))
+        else:
+            # The angle between ray and light is one for a ray.
+            axis, direction = self.light.axis, self.rays.direction
+            down, up = (0.25 * dr.squared_norm(v) for v in (axis + direction, axis - direction))
         return lambda phase: phase.evaluate_half(down, up)
 
     def radiance(self, integral):
@@ -517,6 +518,18 @@ class HomogeneousRays(LitRays):
         return self.kernel(
             self.geometry, *self.geometry.lit_segment(x0, x1), self.medium, self.light
         )
+
+
+def half_angle(s, r, inverse, height_squared):
+    """Return sin^2 and cos^2 of half the scattering angle, (r +- s)/(2 r), the smaller
+    one without cancellation; `inverse` is 1/r.
+    """
+    # (r - |s|)/(2 r) with h^2 = (r - |s|) (r + |s|): no difference is taken.
+    small = 0.5 * height_squared * inverse * dr.rcp(r + dr.abs(s))
+    large = 1 - small
+    # Behind the foot the light turns by more than a right angle: there sin^2 is the larger one.
+    behind = s > 0
+    return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
 def optical_reach(Float) -> float:

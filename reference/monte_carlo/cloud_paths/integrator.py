@@ -81,7 +81,7 @@ def cloud_paths_batch(
             rays = mi.Ray3f(mi.Point3f(*clouds.origin.tolist()), directions)
             dr.make_opaque(rays)  # one kernel for all cameras
             side = SIDE if scene.has_suns else 0.0  # flights are drawn about suns
-            walked, _ = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)
+            walked = walk(scene, targets, sampler, rays, samples=samples // streams, side=side)
             for channel in channels:
                 lanes = np.array(walked[channel], dtype=np.float64).reshape(
                     targets.count, len(part), streams

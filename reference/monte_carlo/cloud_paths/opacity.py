@@ -43,14 +43,14 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
     corners = [
         triangles_of(cloud.shape) if cloud.shape.is_mesh() else None for cloud in clouds.clouds
     ]
-    reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
+    reach = float(np.abs(np.array([clouds.bodies.bbox().min, clouds.bodies.bbox().max])).max())
     step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
     while active.size:
         # The next crossing of the rays that have not met an opaque surface yet.
         way = clouds.direction[active]
         start = cast[active]
         ray = mi.Ray3f(mi.Point3f((clouds.origin + start[:, None] * way).T), mi.Vector3f(way.T))
-        si = clouds.scene.ray_intersect(ray)
+        si = clouds.bodies.ray_intersect(ray)
         dr.eval(si)
         shape = np.array(dr.reinterpret_array(mi.UInt32, si.shape))
         hit = np.array(si.is_valid(), dtype=bool)

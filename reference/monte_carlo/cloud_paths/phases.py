@@ -85,7 +85,8 @@ class Tabulated:
 
     def value(self, down: "mi.Float", up: "mi.Float") -> "mi.Float":
         """Return p, as `WalkPhase` says."""
-        place = up * self._last
+        # Rounding may have `up` above 1, where a table that ends in 0 would be negative.
+        place = dr.minimum(up, 1) * self._last
         cell = dr.clip(mi.Int32(place), 0, self._last - 1)
         low, high = (
             dr.gather(mi.Float, self._values, cell),

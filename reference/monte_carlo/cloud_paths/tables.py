@@ -163,7 +163,7 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     }
     last = max(
         int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
-        for shape in clouds.scene.shapes()
+        for shape in clouds.bodies.shapes()
     )
     kinds = np.zeros(last + 1, dtype=np.uint32)
     kinds[list(numbers)] = list(numbers.values())
@@ -178,11 +178,11 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     # The next ray starts 4e-7 of the largest coordinate past a crossing, a few roundings of
     # float32.
     reach = max(
-        np.abs(np.array(clouds.scene.bbox().min)).max(),
-        np.abs(np.array(clouds.scene.bbox().max)).max(),
+        np.abs(np.array(clouds.bodies.bbox().min)).max(),
+        np.abs(np.array(clouds.bodies.bbox().max)).max(),
     )
     return WalkScene(
-        scene=clouds.scene,
+        scene=clouds.bodies,
         camera_medium=clouds.camera_cloud + 1,
         kinds=mi.UInt32(kinds),
         sigma_t=mi.Float([0.0, *(float(each.sigma_t[channel]) for each in clouds.clouds)]),

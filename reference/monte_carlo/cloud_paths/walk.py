@@ -102,7 +102,6 @@ class Paths:
     value: "mi.Color3f"  #: radiance at the start of a shadow ray [W/(m^2 sr)]
     target: "mi.UInt32"  #: the layer to which this radiance goes
     remaining: "mi.UInt32"  #: how many paths the lane has to follow, this one among them
-    casts: "mi.UInt32"  #: how many rays were cast
 
 
 def walk(
@@ -113,9 +112,8 @@ def walk(
     *,
     samples: int,
     side: float,
-) -> "tuple[list[mi.Float], mi.UInt32]":
-    """Return the sums over samples, (layers x lanes) for each channel, and how many rays each lane
-    cast.
+) -> "list[mi.Float]":
+    """Return the sums over samples, (layers x lanes) for each channel.
 
     `scene`: the scene as tables; `targets`: the layer of each order; `sampler`: seeded, as wide as
     there are lanes; `rays`: where paths start at the eye, and their unit directions, one a lane;
@@ -140,18 +138,22 @@ def walk(
         value=mi.Color3f(0),
         target=mi.UInt32(0),
         remaining=mi.UInt32(samples),
-        casts=mi.UInt32(0),
     )
     # A lane starts with its first path: a flight of random length from the eye. The loop ends when
     # all lanes have followed all of their paths.
     turn = partial(_turn, scene=scene, targets=targets, sums=sums, rays=rays, side=side)
-    paths, _ = dr.while_loop(
+    dr.while_loop(
         state=(paths, sampler),
         cond=lambda paths, _: paths.remaining > 0,
         body=turn,
         label="paths through clouds",
     )
-    return sums, paths.casts
+    return sums
+
+
+def _counted_fraction(of_path: "mi.Float", of_suns: "mi.Float", side: float) -> "mi.Float":
+    """Return p_a/(p_a + side p_s); 0 where both are 0, as at the end of a table that u = 0 draws."""
+    return of_path / dr.maximum(of_path + side * of_suns, dr.smallest(mi.Float))
 
 
 def _turn(
@@ -306,7 +308,7 @@ def _turn(
     new = scene.scattered(cloud, about, sampler, resumes | turns_aside)
     of_path = scene.phase_value(cloud, w, new, resumes | turns_aside)
     of_suns = scene.phase_about_suns(cloud, new, resumes | turns_aside)
-    fraction = dr.select(resumes | turns_aside, of_path / (of_path + side * of_suns), fraction)
+    fraction = dr.select(resumes | turns_aside, _counted_fraction(of_path, of_suns, side), fraction)
     fraction = dr.select(reflected, 1.0, fraction)
 
     # Russian roulette below a weight of 0.05: the weight of a path falls by absorption and at
@@ -363,6 +365,5 @@ def _turn(
         value,
         target,
         remaining=dr.select(over, paths.remaining - 1, paths.remaining),
-        casts=paths.casts + dr.select(active, mi.UInt32(1), mi.UInt32(0)),
     )
     return following, sampler

@@ -358,10 +358,15 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
 
 
 def _point_lights(emitters: Sequence["mi.Emitter"], falloff: Falloff | None) -> PointSource:
-    # A point light sends the same in all directions: its emitter is asked once.
+    # A point light sends the same in all directions: its emitter is asked once, from beside it, since
+    # its irradiance is infinite where it is.
     places, intensities = np.empty((2, 3, len(emitters)))
     for number, emitter in enumerate(emitters):
-        sample, irradiance = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+        beside = dr.zeros(mi.Interaction3f)
+        place = emitter.sample_direction(beside, mi.Point2f(0.5))[0].p
+        size = dr.max(dr.abs(place))
+        beside.p = mi.Point3f(place.x + dr.select(size > 0, size, 1), place.y, place.z)
+        sample, irradiance = emitter.sample_direction(beside, mi.Point2f(0.5))
         places[:, number] = np.ravel(sample.p)
         intensities[:, number] = np.ravel(irradiance * sample.dist * sample.dist)
     # An array for each coordinate: cut out of one, their kernels would hold how many there are.

@@ -167,7 +167,7 @@ const pan = (across, upward) => {
 };
 const dolly = (fraction) => {
   const arm = times(add(camera.origin, camera.target, -1), Math.exp(fraction));
-  if (length(arm) > 1e-3) camera.origin = add(camera.target, arm);
+  if (length(arm) > 1e-3 * camera.reach) camera.origin = add(camera.target, arm);
   aimed();
 };
 const fly = (along, across, upward) => {
@@ -371,22 +371,26 @@ hear.state = (said) => {
   redraw($("#lights"), of(false));
   redraw($("#camera"), of(true));
   const there = Object.fromEntries(said.changeable.map(({name, value}) => [name, value]));
-  if (!camera.moved && !drag && !camera.held.size) takeCamera(there, said.changed.includes("camera.target"));
+  if (!camera.moved && !drag && !camera.held.size) takeCamera(there);
   $("#notes").hidden = !said.notes.length;
   $("#notes p").textContent = said.notes.join("; ");
   commands = said.commands;
   tellCommand();
   document.documentElement.dataset.told = String(Number(document.documentElement.dataset.told ?? 0) + 1);
 };
-// A camera as it was read has a target one metre away: the mouse turns about one that lies as far as the light.
-const takeCamera = (there, aims) => {
-  const own = camera.started && length(add(camera.origin, there["camera.origin"], -1)) < 1e-4 * (1 + length(camera.origin));
-  camera.origin = there["camera.origin"];
-  const aim = unit(add(there["camera.target"], camera.origin, -1));
+// A camera as it was read has a target one metre away: the mouse turns about one that lies as deep in the view as the
+// light, or as far away where the light is beside it or behind.
+const takeCamera = (there) => {
+  const place = there["camera.origin"], aim = unit(add(there["camera.target"], place, -1));
+  // What the page has sent comes back rounded; another place or aim was typed.
+  const near = (a, b, scale) => length(add(a, b, -1)) < 1e-4 * scale;
+  const own = camera.started && near(place, camera.origin, camera.reach + length(place))
+    && near(aim, forward(), 1 + length(place) / camera.reach);
+  camera.origin = place;
   if (!own) {
     const light = there["light.position"];
-    const reach = light ? dot(add(light, camera.origin, -1), aim) : 0;
-    camera.reach = reach > 0.1 ? reach : 3;
+    const way = light ? add(light, camera.origin, -1) : [0, 0, 0], depth = dot(way, aim);
+    camera.reach = depth > 0.1 * length(way) ? depth : length(way) || 3;
     const axis = there["camera.up"].map(Math.abs);
     const largest = axis.indexOf(Math.max(...axis));
     camera.vertical = axis.map((_, i) => i === largest ? Math.sign(there["camera.up"][i]) : 0);

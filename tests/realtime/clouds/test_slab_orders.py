@@ -260,6 +260,33 @@ def test_bins_of_directions_are_those_of_photons():
         assert math.sqrt(np.mean(off**2)) < 1.35
 
 
+class _Peaked:
+    """Isotropic, but for a fraction that goes straight on."""
+
+    def __init__(self, fraction):
+        self._fraction = fraction
+
+    def moments(self, count):
+        return np.append(1.0, np.full(count - 1, self._fraction))
+
+
+def test_what_goes_straight_on_is_in_the_light_of_some_order():
+    """All orders together are those of a medium without the peak, as much thinner."""
+    streams, tau, mu0, fraction = 6, 2.0, 0.5, 0.7
+    rule, reflected = double_gauss(streams), []
+    up = rule.mu > 0
+    mu, fluxes = rule.mu[up], 2 * np.pi * (rule.weights * rule.mu)[up]
+    for peak, t in ((fraction, tau), (0.0, (1 - fraction) * tau)):
+        slabs = DirectionalMoments(
+            _Peaked(peak), 1.0, rule.mu, streams=streams, modes=1, nodes=4, single=False
+        )
+        radiance = slabs(t, [mu0], [0.0, t])[:, 0, 0, 0, 0].sum(0)[up]
+        # Order 1, which is in no set: the part that the peak does not take.
+        radiance += (1 - peak) / (4 * np.pi) * mu0 / (mu0 + mu) * -np.expm1(-t * (1 / mu0 + 1 / mu))
+        reflected.append(float(radiance @ fluxes))
+    assert reflected[0] == pytest.approx(reflected[1], rel=2e-4)
+
+
 # A uniform sky ------------------------------------------------------------------------------------
 
 

@@ -334,6 +334,17 @@ def test_fog_beside_a_sphere_light_has_the_closed_form(variant):
     assert relative_rmse(frame.airlight[~beside], many.airlight[~beside]) < 0.05
 
 
+def test_a_ray_through_the_middle_of_a_sphere_light_is_as_bright_as_those_beside_it(variant):
+    """Nothing says which way is across such a ray: its pixel was 13 times too bright."""
+
+    def airlight(aside):
+        light = lamp("sphere", radiance=(1, 1, 1), center=[aside, 0.0, FAR], radius=RADIUS)
+        scene = read(lit_scene(size=(1, 1), medium=fog(SIGMA_T, 1.0), lamp=light))
+        return render(scene, "unshadowed", points=16).airlight
+
+    assert airlight(0.0) == pytest.approx(airlight(1e-3), rel=1e-3)
+
+
 def test_what_is_in_the_shadow_of_a_sphere_light_stays_dark(variant):
     box = {
         "type": "cube",

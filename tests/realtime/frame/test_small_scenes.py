@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.helpers.frames import render
+from tests.helpers.frames import relative_rmse, render
 from tests.helpers.scenes import tiny_scene
 
 SMALL = 2.0**-10  # a scene of millimetres
@@ -53,3 +53,12 @@ def test_a_millimetre_is_lit_as_a_metre(variant, method):
         assert np.array_equal(values, expected), layer
     # Below the plate the floor is in its shadow.
     assert np.any(np.all(np.array(large.surface) == 0, axis=-1))
+
+
+def test_a_grid_of_froxels_is_as_deep_as_a_scene_of_some_micrometres(variant):
+    """It began at a millimetre: all of the scene lay in the first slices."""
+    large, small = (
+        render(scene(length, lamp(length)), "froxel-fog", width=16, height=12).airlight
+        for length in (1.0, 2.0**-18)
+    )
+    assert relative_rmse(small, large) < 1e-3

@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import airlight.realtime.methods.cloud_collectors as method
 from airlight.realtime.clouds.canonical.coordinates import fraction_of_peak
 from airlight.realtime.frame.image import image_frame, render_frame
 from airlight.realtime.frame.incremental import next_frame
@@ -119,6 +120,24 @@ def test_coloured_clouds_are_three_grey_ones(variant):
     for channel, value in enumerate(sigma):
         grey = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | {"sigma_t": value})))
         np.testing.assert_allclose(coloured[..., channel], grey[..., channel], rtol=1e-4, atol=1e-7)
+
+
+def test_what_does_not_scatter_has_no_light_and_needs_no_transport(variant, monkeypatch):
+    """A channel without extinction is read with the albedo 0; a black cloud has it in all."""
+    asked = []
+    monkeypatch.setattr(method, "canonical_transport", lambda phase, albedo: asked.append(albedo))
+    clear = {
+        "sigma_t": {"type": "rgb", "value": [0.05, 0.03, 0.0]},
+        "has_spectral_extinction": True,
+    }
+    image = _airlight(_scene(sun=_sun(ALONG), slab=_slab(medium=DROPLETS | clear)))
+    assert np.isfinite(image).all()
+    assert image[..., 0].max() > 0
+    assert image[..., 1].max() > 0
+    assert not image[..., 2].any()
+    black = _slab(medium=DROPLETS | {"sigma_t": EXTINCTION, "albedo": 0.0})
+    assert not _airlight(_scene(sun=_sun(ALONG), slab=black)).any()
+    assert set(asked) == {1.0}
 
 
 def test_the_peak_lowers_the_density(variant):

@@ -41,6 +41,7 @@ from tests.helpers.lamps import lamp_scene
             "got a parameter 'tessellation'.*see light-volumes-2010",
         ),
         ("shadow-planes", {"order": "paper"}, "got a parameter 'order'.*see shadow-planes-2006"),
+        ("shadow-planes-2006", {"rows": 2000}, "rows: got 2000, expected .* from 2 to 64"),
         ("shadow-planes", {"points": 0}, "points: got 0, expected a whole number from 1 to 4096"),
         (
             "shadow-planes",

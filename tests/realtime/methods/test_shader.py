@@ -3,6 +3,7 @@
 and its faults have the user's file and line."""
 
 import math
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -17,7 +18,9 @@ from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.client import ShaderHost
 from airlight.realtime.methods.shader.source import Pass, read_shader
+from airlight.realtime.scene.animate import thicker_medium
 from airlight.realtime.scene.camera import read_camera
+from airlight.realtime.scene.phase import named_phase
 from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.frames import reference_of, relative_rmse, render
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
@@ -231,6 +234,8 @@ def test_messages_of_other_drivers_are_read(tmp_path, log, words):
             "no function vec4 half",
         ),
         ("#pragma airlight pass half size=2W\n", "line 1: got `pass half size=2W`, expected"),
+        ("#pragma airlight pass half size=W/0xH\n", "line 1: got `pass half size=W/0xH`, expected"),
+        ("#pragma airlight pass cells size=8x0x8\n", "line 1: got `pass cells size=8x0x8`"),
         ("\n#pragma airlight set STEPS many\n", "line 2: got `set STEPS many`, expected"),
         ("#pragma airlight step 3\n", "line 1: got `#pragma airlight step 3`, expected"),
         (f"#pragma airlight set render 3\n{_BLACK}", "cannot be called render"),
@@ -242,6 +247,16 @@ def test_what_no_driver_must_see_is_found_in_the_text(tmp_path, text, words):
     (tmp_path / "fog.glsl").write_text(text)
     with pytest.raises(InputError, match=words):
         find_method(str(tmp_path / "fog.glsl"))
+
+
+def test_the_help_of_a_parameter_is_no_code_and_may_hold_an_address(tmp_path):
+    """Text behind its two slashes was a comment, and `frame` a word of the code."""
+    path = tmp_path / "fog.glsl"
+    path.write_text(f'#pragma airlight set N 3 "a frame, see http://a.b/c" // "d"\n{_BLACK} // "e')
+    source = read_shader(path)
+    assert [each.help for each in source.parameters] == ["a frame, see http://a.b/c"]
+    assert not {"frame", "d", "e"} & source.words
+    assert source.text.splitlines()[1:] == ["", f"{_BLACK}      "]
 
 
 def test_a_byte_order_mark_before_the_text_changes_nothing(drawn):
@@ -312,6 +327,24 @@ def test_scenes_out_of_scope_are_refused_by_name_before_the_driver_starts(
         scene |= {"sensor": camera, "body": body}
     with pytest.raises(InputError, match=words):
         frame_renderer(read_scene(mi.load_dict(scene)), find_method(str(tmp_path / "fog.glsl")))
+
+
+def test_a_phase_function_without_a_text_is_refused_and_not_black(tmp_path, monkeypatch):
+    monkeypatch.setattr(ShaderHost, "__init__", None)
+    (tmp_path / "fog.glsl").write_text(_BLACK)
+    scene = read_scene(mi.load_dict(tiny_scene(**_EMPTY)))
+    hazy = replace(scene, medium=replace(scene.medium, phase=named_phase("hazy")))
+    with pytest.raises(InputError, match=r"the phase function is 'hazy': fog\.glsl renders"):
+        frame_renderer(hazy, find_method(str(tmp_path / "fog.glsl")))
+
+
+def test_extinction_that_falls_to_0_from_frame_to_frame_is_refused(drawn, tmp_path):
+    drawn(_BLACK)
+    scene = read_scene(mi.load_dict(tiny_scene(**_EMPTY)))
+    renderer = frame_renderer(scene, find_method(str(tmp_path / "fog.glsl")))
+    clear = replace(scene, medium=thicker_medium(scene.medium, 0.0))
+    with pytest.raises(InputError, match="nothing is extinguished in a channel"):
+        render_frame(replace(renderer, scene=clear))
 
 
 def test_a_frame_that_takes_too_long_ends_with_its_process(drawn, monkeypatch):

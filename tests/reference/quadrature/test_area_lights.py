@@ -367,3 +367,29 @@ def test_emission_is_seen_through_fog_and_not_from_behind(variant):
     assert image.emitted[4, 4] == pytest.approx(np.array([3, 2, 1]) * np.exp(-0.21 * 2), rel=1e-6)
     assert (image.emitted[0, 0] == 0).all()
     assert quadrature_image(behind, plan=fixed(2)).emitted.max() == 0
+
+
+@pytest.mark.parametrize(("lifted", "stays"), [(0.0, False), (-0.1, False), (0.1, True)])
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+def test_a_plate_in_or_behind_the_plane_of_a_light_casts_no_shadow(variant, kind, lifted, stays):
+    """Rounding would say by chance that one in the plane is before the light."""
+    place = mi.ScalarTransform4f().translate([0.3, 0.4, 2.9]).rotate([0.8, 0.6, 0.0], 163)
+    plate = {"type": kind, "to_world": place.translate([0, 0, lifted]), "bsdf": GREY}
+    reference = read_reference(lit_scene(lamp=flat(bsdf=NULL), plate=plate))
+    assert bool(before_light(reference, reference.area[0])[1].count) == stays
+
+
+@pytest.mark.parametrize("bsdf", [NULL, None], ids=["null", "black"])
+def test_a_plate_hides_a_lamp_right_behind_it(variant, bsdf):
+    """A millimetre before a lamp 20 m away; a plate in the plane of the lamp touches it."""
+    light = lamp(to_world=turned((0.0, 0.0, 20.0), 180, (2.0, 2.0, 1.0)), bsdf=bsdf)
+
+    def seen(place):
+        plate = {"type": "rectangle", "to_world": turned((0, 0, place), 180, (3, 3, 1))}
+        scene = lit_scene(size=(1, 1), lamp=light, plate=plate | {"bsdf": GREY})
+        return quadrature_image(read_reference(scene), plan=fixed(2)).emitted.max()
+
+    assert seen(19.999) == 0
+    assert seen(20.001) > 0
+    if bsdf is NULL:  # else either of two opaque shapes in one plane may be met
+        assert seen(20.0) > 0

@@ -14,6 +14,7 @@ from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.area_light import triangle_normals
 from airlight.reference.scene.camera import film_positions, pixel_centres
 from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.convex_bounds import Sphere, read_bounds
 from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from airlight.reference.scene.shapes import read_shapes
@@ -127,6 +128,15 @@ def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scal
         mi.Ray3f(mi.Point3f(start), mi.Vector3f(-direction)), coherent=False
     )
     assert np.array(hit.t) == pytest.approx(7 - shapes.radius.item(), rel=1e-5)
+
+
+def test_a_sphere_of_fog_has_the_radius_of_its_surface(variant):
+    """Scales that differ by rounding: Mitsuba takes the first."""
+    to_world = mi.ScalarTransform4f().scale([2.0, 2.000015, 2.000015])
+    shape = mi.load_dict({"type": "sphere", "to_world": to_world})
+    bounds = read_bounds(shape)
+    assert isinstance(bounds, Sphere)
+    assert bounds.radius == pytest.approx(2.0, rel=1e-7)
 
 
 def test_shapes_are_sorted_and_others_refused_by_name(variant):

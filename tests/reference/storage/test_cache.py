@@ -35,6 +35,17 @@ from airlight.reference.storage.files import (
 pytestmark = pytest.mark.usefixtures("own_cache")
 
 
+def test_a_user_without_a_home_is_told_to_name_a_folder(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", homeless)
+    for name in ("AIRLIGHT_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(InputError, match="expected AIRLIGHT_CACHE_DIR to name a folder"):
+        cache_folder()
+
+
 @pytest.mark.claim("files-whole-or-not-at-all")
 @pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
 def test_an_exception_leaves_the_old_file_and_nothing_else(tmp_path, kind):

@@ -79,6 +79,21 @@ def test_data_that_a_users_file_names_count_with_it(folder):
     assert digests[0] == digests[1] != digests[2]
 
 
+@pytest.mark.parametrize("words", ["'tables/a.csv'", "'tables', 'a.csv'"])
+def test_data_in_a_folder_that_a_users_file_names_count_with_it(folder, words):
+    """Rows stood as they were when a table in a folder of the user's had changed."""
+    (folder / "mine.py").write_text(
+        f"from pathlib import Path\nTABLE = Path(__file__).parent.joinpath({words})\n"
+        f"LONG = '{'long ' * 99}'\n"
+    )
+    (folder / "tables").mkdir()
+    digests = []
+    for name, text in (("a.csv", "1"), ("b.csv", "1"), ("a.csv", "2")):
+        (folder / "tables" / name).write_text(text)
+        digests.append(code_digest([folder / "mine.py"]))
+    assert digests[0] == digests[1] != digests[2]
+
+
 def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path_factory):
     other = tmp_path_factory.mktemp("other")
     for path in folder.rglob("*.py"):

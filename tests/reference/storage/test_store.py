@@ -232,7 +232,7 @@ def every_inputs(tmp_path) -> list[Inputs]:
         ImageInputs(
             REFERENCE, "hall a", (32, 24), "mine", tmp_path / "a.exr", (timing, "card"), Model()
         ),
-        StabilityInputs(100, {"mine.py:k": code}),
+        StabilityInputs(100, {"mine.py:k": code}, MACHINE),
         ScalingInputs("map", standard_study("scaling"), MACHINE),
         PaperInputs("maps", "ab", MACHINE),
     ]

@@ -12,7 +12,7 @@ from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shapes import read_shapes
 from airlight.reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
-from airlight.reference.visibility.distances import exact_distance
+from airlight.reference.visibility.distances import exact_distance, to_plane
 from tests.helpers.scenes import tiny_scene
 
 
@@ -26,6 +26,18 @@ def test_distance_to_a_plane_is_exact(variant):
         (-reference.origin[2] / reference.direction[:, 2])[met], rel=1e-14
     )
     assert np.isinf(distance[~met]).all()
+
+
+def test_a_distance_whose_digits_are_lost_is_found_again():
+    """Right before a large triangle far from the origin single precision has few digits; a line
+    that passes beside the triangle has no better distance.
+    """
+    corner = np.array([[-1.0, -1.0, 0.05], [1.0, -1.0, 0.05], [0.0, 2.0, 0.05]])
+    direction = np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 0.05]])
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    cast = np.array([0.052, 3.0])
+    distance = to_plane(np.stack([corner, corner]), direction, cast)
+    assert distance == pytest.approx([0.05, 3.0], rel=1e-14)
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])

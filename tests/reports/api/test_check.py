@@ -100,11 +100,22 @@ def test_frames_of_a_folder_are_judged(folder, capsys):
     assert run(["check", str(folder), "--only", "intensity"]) == 0
 
 
+def test_the_same_frame_twice_can_be_asked_alone(folder):
+    """Its name was offered in a refusal, and refused."""
+    file = folder / "check.json"
+    twice = {"again": ["base.exr", "base.exr"]}
+    file.write_text(json.dumps(json.loads(file.read_text()) | twice))
+    (kept,) = airlight.check(folder, only="again").kept
+    assert (kept.name, kept.verdict) == ("again", "holds")
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [
         (("--only", "unitz"), "only: got 'unitz'"),
         (("--only", "pan"), "none of the relations that are asked for"),
+        (("--only", "again"), "again is none of the relations that are asked for"),
+        (("--only", "intensity,pan"), "pan is none of the relations that are asked for"),
         (("--margin", "2"), "margin: got 2"),
         (("--set", "kernel=exact", "--precision", "double"), "leave out kernel, precision"),
         (("--set", "steps=8"), "leave out steps"),

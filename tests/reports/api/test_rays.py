@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import airlight
+from tests.helpers.height_fog import SUN
+from tests.helpers.scenes import scene_xml
 
 SIZE = (17, 12)
 
@@ -28,6 +30,18 @@ def test_camera_rays_are_those_of_mitsuba_and_end_where_the_reference_ends(varia
     depth = airlight.reference(name, size=SIZE).image.depth
     np.testing.assert_array_equal(np.isfinite(found.distance), np.isfinite(depth))
     np.testing.assert_allclose(found.distance, depth, rtol=2e-6)
+
+
+def test_a_sun_that_only_the_model_of_a_scene_lets_through_is_in_no_ray_s_way(variant, tmp_path):
+    """The reference took the scene, and its rays were refused by physics."""
+    (tmp_path / "sun.xml").write_text(scene_xml(SUN, size=SIZE))
+    found = airlight.rays(airlight.load_scene(tmp_path / "sun.xml", model="light-path=off"))
+    (tmp_path / "lamp.xml").write_text(scene_xml(size=SIZE))
+    lamp = airlight.rays(tmp_path / "lamp.xml")
+    np.testing.assert_array_equal(found.direction, lamp.direction)
+    np.testing.assert_array_equal(found.distance, lamp.distance)
+    with pytest.raises(airlight.InputError, match="nothing of it arrives"):
+        airlight.rays(tmp_path / "sun.xml")
 
 
 def test_a_scene_without_a_quadrature_has_no_such_rays(variant):

@@ -71,15 +71,17 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
 )
 def test_a_quadrature_of_an_area_light_says_where_its_standard_errors_come_from(show):
     """Its header has a number of batches, but no samples a pixel and no
-    seeds: it traced nothing.
+    seeds: it traced nothing. Means over pixels need no light sample.
     """
-    image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3))
-    image.attributes["airlight:batches"] = 8
-    shown = show(
-        Reference(scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3)
-    )
-    assert "standard errors from 8 independent sets of light samples" in shown
-    assert "seeds" not in shown
+    for pixel, drawn in (("centre", "light samples"), ("area", "positions in each pixel")):
+        image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3))
+        image.attributes.update({"airlight:batches": 8, "airlight:pixel": pixel})
+        made = Reference(
+            scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3
+        )
+        shown = show(made)
+        assert f"standard errors from 8 independent sets of {drawn}" in shown
+        assert "seeds" not in shown
 
 
 def traced(*, batches=64, reached=None, masked=0, cached=0, damaged=0, errors=None):
@@ -145,6 +147,9 @@ def test_a_reference_by_samples_has_its_standard_errors_and_no_bound():
     assert proven.error is proven.bound
     assert proven.bound.shape == grid.error.shape == (4, 6, 3)
     assert grid.bound is None
+    means = reference(emitted=values, emitted_se=values)
+    assert means.emitted_standard_error.max() == 1e-9
+    assert proven.emitted_standard_error is None
 
 
 def test_an_animation_says_what_a_frame_costs_and_which_files_there_are():

@@ -38,6 +38,10 @@ def test_what_a_report_would_drop_is_refused(tmp_path, line, dropped):
         ("[checks]\nbatches = 64", "checks"),
         ('growth = ["size"]', "growth"),
         ("stability = 100", "stability"),
+        ('times = "stages"', "times = 'stages'"),
+        ('timed_size = "800x600"', "timed_size"),
+        ("seconds = 2", "seconds"),
+        ("slow = 0.04", "slow"),
     ],
 )
 def test_what_a_sweep_would_drop_is_refused(tmp_path, monkeypatch, lines, dropped):

@@ -5,11 +5,14 @@ beyond the noise of a machine.
 
 import copy
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from airlight.reports.commands.main import run
 from airlight.reports.diff import compare
+from airlight.reports.diff.engines import _cell, _layer
 from tests.helpers.reports import agreement, checked, errors, method, report, slow_down
 
 
@@ -68,6 +71,19 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     )
     assert run(["diff", *files(report(), new)]) == 1
     assert "expected a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
+
+
+def test_a_folder_with_a_report_on_engines_too_is_refused_until_one_is_named(files, capsys):
+    """Reports on engines were compared, and those on methods passed over in silence."""
+    new = report()
+    method(new)["error"] = errors(3e-3)
+    old, file = files(report(), new)
+    for folder in (Path(old), Path(file).parent):
+        (folder / "engines.json").write_text("{}")
+    assert run(["diff", old, file]) == 2
+    said = f"{old} has two reports, on methods and on engines; name report.json or engines.json"
+    assert said in capsys.readouterr().err
+    assert run(["diff", str(Path(old) / "report.json"), file]) == 1
 
 
 def test_errors_of_noisy_methods_are_compared_by_their_intervals():
@@ -232,6 +248,55 @@ def test_what_has_other_sizes_is_not_compared_and_said():
         scene["size"] = scene["timed"] = [640, 480]
     with pytest.raises(ValueError, match="no number can be compared"):
         compare_reports(report(), new)
+
+
+def test_a_reference_whose_error_is_not_known_has_not_moved_for_sure():
+    """An unknown error counted as none: any other mean was another reference."""
+    new = report()
+    known = new["scenes"][0]["reference"]
+    known.update(mean=1.001 * known["mean"], relative_error=None)
+    difference = compare_reports(report(), new)
+    assert words(difference) == []
+    said = "fog errors not compared: the reference has another mean, and its error is not known"
+    assert said in words(difference, "note")
+
+
+def test_only_numbers_that_both_reports_have_are_compared():
+    dark = report()
+    for row in dark["scenes"][0]["methods"]:
+        row["error"] = errors(None)  # relative to a black reference
+    fewer, whole = (compare_reports(each, copy.deepcopy(each)) for each in (dark, report()))
+    assert whole.errors_compared - fewer.errors_compared == 4 * 5
+
+
+def test_an_error_of_an_engine_that_was_not_known_is_better_known():
+    known, unknown = (
+        SimpleNamespace(layer="airlight", right=True, blocks={"equation": each, "total": each})
+        for each in (0.1, None)
+    )
+    assert [each[0] for each in _layer(unknown, known)] == ["note", "better"]
+    assert [each[0] for each in _layer(known, unknown)] == ["worse", "worse"]
+    assert [*_layer(unknown, unknown), *_layer(known, known)] == []
+
+
+def test_a_layer_of_an_engine_that_was_not_judged_before_is_named():
+    surface = SimpleNamespace(layer="surface", right=False, blocks={"total": None})
+    old, new = (
+        SimpleNamespace(
+            scene="hall",
+            engine="e",
+            status="judged",
+            title="e",
+            headline="",
+            layers=layers,
+            layer=lambda name, layers=layers: next(iter(layers), None),
+        )
+        for layers in ((), (surface,))
+    )
+    findings, compared = _cell(old, new)
+    assert [each.words for each in findings] == ["hall, e, surface new, not right by its equation"]
+    assert compared == 0
+    assert _cell(new, new) == ([], 0)  # no number of it is known
 
 
 def test_times_that_are_gone_are_said():

@@ -63,9 +63,34 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
     assert found.compared.verdict.kind == "exact"
 
 
-def test_one_frame_has_no_file_of_changes(variant, tmp_path):
-    run("open-fog", *SMALL, "--frames", "1", "-o", str(tmp_path / "fog.exr"))
-    assert [path.name for path in tmp_path.iterdir()] == ["fog-0001.exr"]
+def test_one_frame_has_no_file_of_changes_and_none_of_a_longer_run_stays_beside_it(
+    variant, tmp_path
+):
+    def render(frames):
+        files = ("-o", str(tmp_path / "fog.exr"), "-o", str(tmp_path / "fog.png"))
+        run("open-fog", *SMALL, "--frames", frames, *files)
+        return sorted(path.name for path in tmp_path.iterdir())
+
+    assert len(render("3")) == 3 + 3 + 1
+    assert render("1") == ["fog-0001.exr", "fog-0001.png"]
+    # Files of another program are not ours to remove.
+    others = {"fog-0002.exr": b"v/1", "fog-0002.png": b"PNG", "fog.json": b"{}"}
+    for name, content in others.items():
+        (tmp_path / name).write_bytes(content)
+    assert render("1") == sorted(["fog-0001.exr", "fog-0001.png", *others])
+    assert {name: (tmp_path / name).read_bytes() for name in others} == others
+
+
+def test_the_file_of_changes_has_those_of_the_scene_itself(variant, tmp_path):
+    """Frames of a changed medium were judged by the reference of the medium as it was."""
+    changed = ("--change", "medium.sigma_t=0.3", "--change", "light.intensity=2,3,4")
+    moves = ("--frames", "2", "--animate", "colour")
+    run("open-fog", *SMALL, *changed, *moves, "-o", str(tmp_path / "a.exr"))
+    changes = json.loads((tmp_path / "a.json").read_text())["changes"]
+    assert changes["medium.sigma_t"] == [[0.3], [0.3]]
+    first, second = changes["light.intensity"]
+    assert first == pytest.approx([2, 3, 4], rel=1e-6)
+    assert first != second
 
 
 def test_the_plan_says_what_the_scene_needs_and_renders_nothing(variant, capfd):

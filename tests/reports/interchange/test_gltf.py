@@ -95,6 +95,19 @@ def test_trimesh_reads_it_back(variant, tmp_path):
     np.testing.assert_allclose(back.camera_transform[:3, 3], [0.63, 1.87, 5.31], rtol=1e-6)
 
 
+@pytest.mark.parametrize(("scale", "near"), [(1.0, 1e-3), (1e-4, None)])
+def test_the_near_plane_takes_no_small_scene_away(variant, tmp_path, scale, near):
+    """It was a millimetre, behind which a scene of half a millimetre lay."""
+    place = mi.ScalarTransform4f().look_at([0, -4.1 * scale, 0], [0, 0, 0], [0, 0, 1])
+    sensor = tiny_scene()["sensor"] | {"to_world": place}
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 0.41 * scale}
+    bulb = tiny_scene()["lamp"] | {"position": [0.9 * scale, 0, 0]}
+    write_gltf(tmp_path / "a.glb", loaded(sensor=sensor, ball=ball, lamp=bulb, floor=None))
+    lens = parts(tmp_path / "a.glb")[0]["cameras"][0]["perspective"]
+    assert 0 < lens["znear"] < 1e-2 * scale
+    assert near is None or lens["znear"] == near
+
+
 @pytest.mark.claim("gltf")
 def test_lights_are_those_of_the_scene(variant, tmp_path):
     scene = loaded(spot=spot(cutoff=40.0, beam=25.0), hard=spot())

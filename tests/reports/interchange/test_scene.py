@@ -18,11 +18,13 @@ from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.scene.read import read_reference
 from airlight.reports.commands.main import run
 from airlight.reports.interchange.fog_grid import fog_grid, write_fog_grid
+from airlight.reports.interchange.gltf import _TURNS
 from airlight.reports.interchange.scene import describe_scene, spot_power_angle
+from airlight.reports.interchange.words import description_table
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.scenes.registry import FOG_SCENES
 from tests.helpers.area_lights import lamp
-from tests.helpers.height_fog import LAMP, fog_xml
+from tests.helpers.height_fog import FOG, LAMP, SUN, fog_xml
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
@@ -189,6 +191,15 @@ def test_a_camera_looks_along_minus_z_and_cuts_no_fog_away(variant):
     assert data["clip_start"] < 1e-5
 
 
+@pytest.mark.parametrize("up", ["x", "-x", "y", "-y", "z", "-z"])
+def test_meshes_stand_before_the_camera_whatever_is_up(variant, up):
+    """Camera and lights have the axes of the scene, and so must what Blender imports."""
+    turn = np.array(cycles_properties(properties()[0] | {"up": up})["turn"])
+    place = np.array([0.3, -1.1, 2.7])
+    x, y, z = np.array(_TURNS[up]) @ place
+    assert (turn @ [x, -z, y, 1] == [*place, 1]).all()  # Blender's y is -z of glTF
+
+
 def test_lights_have_watts_whole_angles_and_directions(variant):
     described, cycles = properties(hard=spot())
     lamp, hard = cycles["lights"]
@@ -208,6 +219,13 @@ def test_lights_have_watts_whole_angles_and_directions(variant):
     np.testing.assert_allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-6)
 
 
+def test_a_spot_that_blender_would_widen_is_refused(variant):
+    _, cycles = properties(wide=spot(cutoff=0.6, beam=0.6), narrow=spot(cutoff=0.4, beam=0.4))
+    _, wide, narrow = cycles["lights"]
+    assert math.degrees(wide["data"]["spot_size"]) == pytest.approx(1.2)
+    assert narrow == {"cannot": "Blender's spots are at least a degree wide"}
+
+
 def test_media_have_coefficients_and_the_sign_of_g(variant):
     fog = tiny_scene()["fog"] | {"phase": {"type": "hg", "g": -0.37}}
     described, cycles = properties(fog=fog)
@@ -220,6 +238,16 @@ def test_media_have_coefficients_and_the_sign_of_g(variant):
     three = cycles_properties(describe_scene(load_scene("three-media", (8, 6))))
     assert three["world"] is None
     assert len(three["media"]) == 3
+
+
+def test_the_size_of_a_drawn_light_is_no_number_of_pixels(variant):
+    lights = [{"name": "a", "size": [0.3, 0.2]}, {"name": "b", "size": []}]
+    told = description_table(described() | {"drawn": {"lights": lights}})
+    cells = [tuple(row.values.values()) for row in told.rows]
+    words = {(what, part): value for what, part, value in cells}
+    assert words["drawn", "lights 1"] == "name a; size (0.3, 0.2) m"
+    assert words["", "lights 2"] == "name b; size ()"
+    assert words["", "size"] == "(16, 12) pixels"
 
 
 @pytest.fixture
@@ -261,6 +289,19 @@ def test_mitsuba_reads_the_file(medium, tmp_path):
     np.testing.assert_allclose(found, fog_of(medium).density(z), rtol=5e-4)
 
 
+def test_the_grid_of_fog_far_from_the_origin_is_there(variant, tmp_path):
+    """A grid ends at its box, which was about the origin whatever the scene."""
+    far = FOG.replace('<translate x="-20" y="-20"', '<translate x="90000" y="-70000"')
+    (tmp_path / "fog.xml").write_text(fog_xml(LAMP, fog=far))
+    medium = read_reference(load_scene(str(tmp_path / "fog.xml")).scene).medium
+    text = write_fog_grid(tmp_path / "fog.vol", medium)
+    read = mi.load_string(text.replace("<medium ", '<medium version="3.0.0" ', 1))
+    ray = mi.Ray3f(mi.Point3f(90020, -69980, 99), mi.Vector3f(0, 0, -1))
+    meets, begin, end = (np.array(each).item() for each in read.intersect_aabb(ray))
+    assert meets
+    assert (begin, end) == (pytest.approx(99 - 42.5, rel=1e-6), pytest.approx(99.5, rel=1e-6))
+
+
 def test_a_grid_takes_the_place_of_an_older_file_and_its_path_is_safe_in_xml(medium, tmp_path):
     """Who reads the older file goes on to: nothing is written into it."""
     path, kept = tmp_path / 'fog & "smoke".vol', tmp_path / "kept"
@@ -279,8 +320,23 @@ def test_describe_writes_it(variant, tmp_path):
     assert "gridvolume" in found.grid
     airlight.describe("smoke", output=tmp_path / "smoke.vol")
     assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
+    # The other files, which the scene fits, are not written either.
+    files = [tmp_path / f"open.{ending}" for ending in ("pbrt", "glb", "vol")]
     with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
-        airlight.describe("open-fog", output=tmp_path / "open.vol")
+        airlight.describe("open-fog", output=files)
+    assert not list(tmp_path.glob("open.*"))
+
+
+def test_fog_under_a_sun_that_only_a_model_lets_through_is_written_too(variant, tmp_path):
+    """The description took the model, and the grid was refused by physics."""
+    level = SUN.replace('z="-0.45"', 'z="0"')
+    (tmp_path / "fog.xml").write_text(fog_xml(level))
+    target = tmp_path / "fog.vol"
+    found = airlight.describe(str(tmp_path / "fog.xml"), model="light-path=off", output=target)
+    assert "gridvolume" in found.grid
+    assert target.exists()
+    with pytest.raises(airlight.InputError, match="sun"):
+        airlight.describe(str(tmp_path / "fog.xml"), output=target)
 
 
 #: Units of the numbers that an engine programmer types, by their names: those

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airlight.reports.data.records import Method
-from airlight.reports.page.chart import speed_error_chart
+from airlight.reports.page.chart import scene_chart, speed_error_chart
 from airlight.reports.page.filters import DASH
 from airlight.reports.page.render import SCRIPTS, render_page
 from airlight.reports.plotting.figure import speed_panel
@@ -215,6 +215,17 @@ def test_bars_of_noisy_methods_go_down_to_their_bias():
     speed_panel(panel, "scene", entries, {"0": {}, "1": {}})
     bars = [bar.get_segments() for bar in panel.collections if np.ptp(bar.get_segments()[0][:, 1])]
     np.testing.assert_allclose(np.ravel([bar[0][:, 1] for bar in bars]), [0.05, 0.2])
+
+
+def test_the_point_of_a_noisy_method_says_the_error_at_which_it_stands():
+    """The words under the pointer were of the first run, the point of the mean over the runs."""
+    noise = {"runs": 8, "bias": 0.0, "bias_within": 0.1, "rmse": 0.2, "rmse_within": 0.1}
+    noise |= {"root_bias": None, "most_bias": 0.05}
+    data = report_data()
+    data["scenes"][0]["methods"][0]["noise"] = noise
+    svg = scene_chart(checked(data).scenes, 0)
+    assert "<title>good (k): 3.21 ms, relative RMSE 0.2</title>" in svg
+    assert "<title>flat: 3.21 ms, relative RMSE 0.012</title>" in svg
 
 
 def test_an_error_of_other_light_than_the_airlight_says_so():

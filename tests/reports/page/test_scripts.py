@@ -149,7 +149,7 @@ def test_the_pointer_meets_the_pixel_under_it(viewer):
 def view():
     context = engine(ROOT / "reports/view/page/view.js")
     context.eval("""takeCamera({"camera.origin": [1, -5, 2], "camera.target": [1.2, -4.1, 1.9], "camera.up": [0, 0, 1],
-        "light.position": [1.8, -1, 1.2]}, true)""")
+        "light.position": [1.8, -1, 1.2]})""")
     return context
 
 
@@ -165,6 +165,21 @@ def test_an_error_that_is_not_known_is_not_shown_as_none(view):
 
 def camera(context):
     return [np.array(asked(context, f"camera.{name}")) for name in ("origin", "target")]
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0])
+def test_the_mouse_moves_the_camera_that_was_typed(view, unit):
+    """The old aim stayed, and a camera in a scene of micrometres turned about a place 3 m away."""
+    places = {"camera.origin": [1, -5, 2], "light.position": [1.8, -1, 1.2]}
+    typed = {name: [unit * each for each in place] for name, place in places.items()}
+    x, y, z = typed["camera.origin"]
+    typed |= {"camera.target": [x, y + 1, z], "camera.up": [0, 0, 1]}
+    view.eval(f"takeCamera({json.dumps(typed)})")
+    origin, target = camera(view)
+    np.testing.assert_allclose(origin, unit * np.array([1.0, -5, 2]))
+    np.testing.assert_allclose(target, unit * np.array([1.0, -1, 2]))
+    view.eval("dolly(-1)")
+    np.testing.assert_allclose(camera(view)[0][1], unit * (-1 - 4 * np.exp(-1.0)))
 
 
 @pytest.mark.claim("view-camera")

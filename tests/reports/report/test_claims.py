@@ -122,6 +122,21 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     )
 
 
+def test_the_interval_of_batch_means_counts_where_it_reaches_farther():
+    """Both intervals must lie inside the margin, and only that of pixels was shown."""
+    data = scenes()
+    statistics = data[1]["agreement"]["airlight"]["statistics"]
+    statistics["relative_bias_ci_batches"] = [-0.004, 0.002]
+    said = "fills most of its margin, 80 %, is -0.4..+0.2 %, in hall (airlight, ±0.5 %)."
+    assert said in texts(data)[0]
+    # Out of time, an interval that overlaps the margin decides nothing.
+    outside = out_of_time([0.006, 0.02])
+    for batches, good in ((None, False), ([0.004, 0.022], None)):
+        outside["statistics"]["relative_bias_ci_batches"] = batches
+        only = claims([scene("hall", [], agreement={"airlight": outside})])[0]
+        assert only.good is good
+
+
 def test_what_failed_is_named_with_its_pixels():
     data = scenes()
     data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}

@@ -12,6 +12,8 @@ from airlight.errors import InputError
 from airlight.reports.sweep.claims import claim, correlations, strongest, sure
 from airlight.reports.sweep.faults import checks, faults, reasons
 from airlight.reports.sweep.samples import FILE, Fastest, fastest_within, read_sweep, samples
+from airlight.reports.sweep.summary import summary_of
+from airlight.reports.sweep.tables import errors_table
 from airlight.validation.statistics.samples import binomial_interval
 from tests.helpers.sweeps import row, rows, write_rows
 
@@ -168,6 +170,7 @@ def test_injected_faults_are_found_and_counted(sweep_of):
     several = rows(20)
     several[7] |= {"error.nonfinite": 12}
     several[8] |= {"error.negative": 5}
+    several[6] |= {"surface_error.negative": 3}
     several[13] |= {"stated.outside": 2, "stated.bound": 1e-5}
     several[3] |= {"stated.outside": 0, "stated.bound": 1e-5}
     sweep = sweep_of(several)
@@ -175,6 +178,7 @@ def test_injected_faults_are_found_and_counted(sweep_of):
     assert [(each.check, each.scene, each.pixels, each.of) for each in found] == [
         ("not finite", several[7]["scene"], 12, 19200),
         ("negative", several[8]["scene"], 5, 19200),
+        ("surface negative", several[6]["scene"], 3, 19200),
         ("outside of the bound", several[13]["scene"], 2, 19200),
     ]
     counted = {each.check: each for each in checks(sweep)}
@@ -182,6 +186,56 @@ def test_injected_faults_are_found_and_counted(sweep_of):
     assert counted["outside of the bound"].faulty_scenes == 1
     assert counted["surface not finite"].rows == 0
     assert counted["negative"].rows == sum(each["status"] == "done" for each in several)
+
+
+def test_scenes_that_were_left_out_for_their_time_are_told(sweep_of):
+    """They were in no count: a slow method was within an error wherever it was tried."""
+    why = {"status": "left out", "reason": "a frame would take 20 s, more than 10 s"}
+    sweep = sweep_of([row(relative_rmse=1e-5), row("random:1", **why), row("random:2", **why)])
+    (sample,) = samples(sweep)
+    made = claim(sample, 1e-3)
+    assert (made.tries, made.refused, made.left_out) == (1, 0, 2)
+    assert made.text.endswith("; 2 more left out for their time.")
+    assert [(each.status, each.cells) for each in reasons(sweep)] == [("left out", 2)]
+    (shown,) = errors_table(summary_of(sweep)).rows
+    assert shown.values["left_out"] == 2
+
+
+def test_what_a_paper_has_too_is_no_fault(sweep_of):
+    """A report calls such values published; a sweep called them faults."""
+    several = [
+        row("random:0", method="shadow-planes-2006", negative=5),
+        row("random:0", method="light-volumes", kernel="taylor", nonfinite=2),
+        row("random:0", method="shadow-planes", parameters={"order": "none"}, negative=7),
+        row("random:1", negative=0),
+    ]
+    sweep = sweep_of(several)
+    assert faults(sweep) == []
+    counted = {each.check: each for each in checks(sweep)}
+    found = [counted[name] for name in ("not finite", "negative")]
+    assert [(each.rows, each.faulty_rows, each.published) for each in found] == [
+        (1, 0, 1),
+        (1, 0, 2),
+    ]
+    said = {(each.kind, each.good) for each in summary_of(sweep).headlines}
+    assert {("As published", None), ("Sound", True)} <= said
+
+
+def test_a_scene_is_within_only_as_far_as_the_reference_of_each_medium_tells(sweep_of):
+    """The reference of the medium with the largest error hid another that knew nothing."""
+    for known, counted in ((None, (0, 1)), (8e-4, (1, 0)), (1e-3, (0, 1))):
+        several = [row(relative_rmse=5e-4), row(relative_rmse=1e-4, medium="m")]
+        several[1]["reference.error"] = known
+        made = claim(samples(sweep_of(several))[0], 1e-3)
+        assert (made.within, made.undecided) == counted
+
+
+def test_references_without_an_error_are_counted_beside_the_known_ones(sweep_of):
+    several = [row(), row("random:1", reference_error=None), row("random:2", reference_error=None)]
+    for each, mean in zip(several, (1.0, 1.0, 0.0)):  # a black one has no relative error
+        each["reference.mean"] = mean
+    said = summary_of(sweep_of(several))
+    assert (said.reference_errors, said.reference_unknown) == ((1e-7, 1e-7), 1)
 
 
 def test_parquet_is_read_as_it_was_written(tmp_path):

@@ -115,6 +115,16 @@ def test_all_is_written_from_the_parquet(tmp_path):
     assert [path.name for path in source.iterdir()] == [FILE]
 
 
+def test_a_figure_for_which_the_rows_have_no_data_any_more_is_gone(tmp_path, monkeypatch):
+    monkeypatch.setattr("airlight.reports.sweep.page.drawn_figures", lambda said: iter(()))
+    write_rows(tmp_path / FILE, rows(12))
+    (tmp_path / "figures").mkdir()
+    for name in ("sweep-medians.pdf", "sweep-medians.svg", "mine.pdf"):
+        (tmp_path / "figures" / name).write_bytes(b"older")
+    write_sweep(tmp_path)
+    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["mine.pdf"]
+
+
 def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(
     tmp_path, monkeypatch, capsys
 ):

@@ -207,3 +207,7 @@ def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_fini
     finite = np.isfinite(radiance).all(axis=-1)
     assert np.abs(picture[..., :3].astype(int) - expected)[finite].max() <= 1
     assert (picture[..., 3] == 255).all()
+    # The airlight alone is known there.
+    shown = Pictures().of_frame(mi.UInt32(order), **layers, layer="airlight", factor=1.7)
+    alone = np.frombuffer(shown, np.uint8).reshape(12, 16, 4)[..., :3].astype(int)
+    assert np.abs(alone - tone_mapped(airlight.astype(np.float64), 1.7)).max() <= 1

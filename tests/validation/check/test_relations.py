@@ -226,6 +226,21 @@ def test_a_fault_breaks_the_relations_made_for_it_and_no_other(fault):
     assert {each.verdict for each in found} <= {HOLDS, FAILS}, shown
 
 
+def test_light_that_no_lamp_makes_is_no_fault_of_twice_the_lamps():
+    """All light with a sky failed for right renderers; a lit density is found beside it."""
+    lamp = render("")["airlight"]
+    sky = np.full_like(lamp, 2 * lamp.mean())
+    frames = {"none": {"total": sky}, "base": {"total": lamp + sky}}
+    frames |= {"twice": {"total": 2 * lamp + sky}, "half": {"total": 1.5 * lamp + sky}}
+
+    def verdict(*names):
+        (kept,) = judge([Asked("intensity", names)], frames, rounding=1e-6)
+        return kept.verdict
+
+    assert verdict("base", "twice", "none") == HOLDS
+    assert verdict("base", "half", "none") == verdict("base", "twice") == FAILS
+
+
 def test_each_relation_has_a_fault_of_its_own():
     broken = set().union(*FAULTS.values())
     assert broken == RELATIONS.keys() - {"again"}

@@ -143,14 +143,15 @@ def test_traits_of_a_scene_and_its_image_by_hand():
         )
         plain = {"sigma_t": ((0.3,) * 3,), "albedo": ((0.9,) * 3,), "phase": (0.4,)}
         ones = {name: (1.0,) for name in ("intensity", "airlight", "surface")}
+        looked_at = values[np.isfinite(values).all(axis=1)]
         predictor = SimpleNamespace(
             reference=reference,
             fog=Fog(**(plain | ones | {"moved": ((0.0,) * 3,)} | fog)),
             observation=SimpleNamespace(holds=holds, values=values, equation=model),
             shape=shape,
             unchanged=None,
-            shown=lambda guess: values,
-            predicted=lambda guess: values - 0.1,
+            shown=lambda guess: looked_at,
+            predicted=lambda guess: looked_at - 0.1,
         )
         return {name for name, there in traits(predictor).items() if there}
 
@@ -186,6 +187,8 @@ def test_traits_of_a_scene_and_its_image_by_hand():
     assert found(shape=(4, 4)) == usual - {"oblong"} | {"square"}
     assert found(values=values[:, :1] * np.ones(3)) == usual - {"colours"}
     assert found(values=np.minimum(values, 1.5)) == usual | {"stop"}
+    # No fault of channels or primaries was looked for where one pixel was infinite.
+    assert found(values=np.r_[values, [[np.inf] * 3]]) == usual
     for clamped, name in ((True, "clamped layers"), (False, "rising layers")):
         assert found(height=HeightFog(constant=1.0, clamped=clamped)) == usual - {"even fog"} | {
             "height fog",

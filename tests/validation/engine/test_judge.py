@@ -13,11 +13,13 @@ from airlight.errors import InputError
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.validation.comparison.images import compare_images
+from airlight.validation.engine import judge as judging
 from airlight.validation.engine.error_place import error_place
 from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import EngineImage, measure_image
 from airlight.validation.engine.judge import compare_scene, judge_image, references
 from airlight.validation.engine.observation import expected_layer, judged_layer, observation_of
+from airlight.validation.engine.other_orders import OtherOrders
 from airlight.validation.engine.verdict import Verdict, all_but_few, judge
 from airlight.validation.estimates.quadrature import (
     reference_error,
@@ -120,10 +122,52 @@ def test_a_margin_holds_the_error_of_the_reference_too(scene, expected):
     assert failures(0 * spread, 0.011) == failures(spread, 0.014) == ()
     (reason,) = failures(spread, 0.011)
     assert "is not shown to be within +-0.011: the mean of the reference may be off by" in reason
+    # With standard errors of the image the error of the reference that is no noise counts as well.
+    total = reference_layer(expected, "total")
+    sure = np.full(total.shape, 1e-6 * mean)
+    image = Image({"total": 1.01 * total, "total_se": sure})
+    judged = judged_layer(image, "own.exr", name="total")
+    for error, right in ((0 * total, True), (2e-3 * total, False), (None, False)):
+        own = replace(expected, surface_error=error)
+        compared = judge_image(
+            image, judged, loaded, lambda pixel, own=own: own, pixel="centre", margin=0.0105
+        )
+        assert (compared.comparison.failures == ()) == right
     # Pixels outside of a mask count nowhere.
     outside = np.where(mask[..., None], 0.0, spread)
     assert failures(outside, 0.011) != ()
     assert failures(outside, 0.011, mask) == ()
+
+
+def test_a_masked_image_that_fits_the_centres_needs_no_means_over_areas(scene, expected):
+    """It took the time of means over pixels: what a mask leaves out fitted nothing."""
+    image, mask = expected.airlight.copy(), np.ones((12, 16), dtype=bool)
+    image[:, 8:], mask[:, 8:] = 100.0, False
+    judged = judged_layer(Image({"airlight": image}), "own.exr", name="airlight")
+    compared = judge_image(
+        Image({"airlight": image}),
+        judged,
+        load_scene(scene, (16, 12)),
+        {"centre": expected}.__getitem__,
+        mask=mask,
+    )
+    assert (compared.pixel, compared.verdict.right) == ("centre", True)
+
+
+def test_pixels_outside_of_a_mask_count_nowhere_beside_further_orders(
+    scene, expected, write, tmp_path, monkeypatch
+):
+    """The verdict that names further orders was that of all pixels."""
+    image, mask = 1.4 * expected.airlight, np.ones((12, 16, 3))
+    image[:, 8:] *= 100
+    mask[:, 8:] = 0.0
+    write_exr(tmp_path / "mask.exr", Image({"total": mask}))
+    found = OtherOrders("own", more=0.5, excess=0.4)
+    monkeypatch.setattr(judging, "other_orders", lambda *args: found)
+    file = write(airlight=image)
+    compared = compare_scene(scene, file, pixel="centre", mask=tmp_path / "mask.exr")
+    assert found.words in compared.verdict.reasons
+    assert 0.3 < compared.verdict.block_error < 0.41
 
 
 def test_a_light_that_a_layer_does_not_show_is_no_part_of_how_well_it_is_known(scene, expected):
@@ -360,6 +404,11 @@ def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     )
     assert error_place(expected, expected, lamp) is None
     assert not error_place(expected, 1.1 * expected, lamp).few
+    # Nothing is relative to a black reference: that was said to be 0 %.
+    black = error_place(0 * expected, image - expected, lamp)
+    assert np.isnan(black.relative_rmse_without)
+    assert black.few
+    assert "relative rmse" not in black.words
 
 
 def test_pixels_that_a_file_does_not_hold_are_not_among_the_few_that_are_wrong():
@@ -407,6 +456,10 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     np.testing.assert_allclose([verdict.block_error, verdict.block_noise], 0.04 / 8, rtol=0.05)
     noisy = judge(expected, expected + 4 * (image - expected), find_hints(expected, image), ())
     assert "most of it scatter of single pixels" in noisy.words
+    # Single pixels do not show their own scatter: it was said to be 0 %.
+    small = judge(expected[:12, :16], image[:12, :16], find_hints(expected, expected), ())
+    assert (small.block, np.isnan(small.block_noise)) == (1, True)
+    assert "scatter" not in small.words
     image[40:80, 40:80] *= 0.9
     verdict = judge(expected, image, find_hints(expected, image), ())
     assert "means over 8 x 8 pixels are" in verdict.words

@@ -4,12 +4,14 @@
 from dataclasses import replace
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from airlight.errors import InputError
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.engine import judge
 from airlight.validation.engine.images import EngineImage, captured_model
 from airlight.validation.engine.judge import compare_scene
 from airlight.validation.engine.model_errors import model_errors
@@ -131,6 +133,16 @@ def test_the_margin_of_both_is_against_physics(scene_errors):
         scene_errors(image, PHYSICAL, margin_total=0.1)
 
 
+def test_the_margin_of_both_holds_what_the_physical_reference_may_be_off(scene_errors, monkeypatch):
+    """The error of the reference counted in `--margin` alone."""
+    image = airlight(MODEL)
+    bias = scene_errors(image).model.total.mean
+    monkeypatch.setattr(judge, "off_by", lambda *args, **options: (0.02 * bias, 0.0))
+    assert scene_errors(image, margin_total=bias * 1.03).comparison.failures == ()
+    (words,) = scene_errors(image, margin_total=bias * 1.01).comparison.failures
+    assert "not shown to be (it may be off by" in words
+
+
 def test_a_sun_without_a_physical_reference_has_a_dash(variant, tmp_path, images):
     def layer(model):
         if model == PHYSICAL:
@@ -155,6 +167,38 @@ def test_a_capture_is_judged_by_the_equation_that_it_names(tmp_path):
     for attributes in (named, engine):
         write_exr(tmp_path / "other.exr", Image(layers, attributes=attributes))
         assert captured_model(tmp_path / "other.exr") is None
+
+
+@pytest.mark.parametrize("layers", [("airlight", "surface"), ("surface",), ("airlight",)])
+def test_all_light_is_compared_where_an_image_has_it(variant, tmp_path, layers):
+    """FLIP compared surfaces alone with the airlight and the surfaces."""
+    reference = reference_image(load_scene("sphere-spot", (16, 12)).scene)
+    file = tmp_path / "sphere-spot.engine.exr"
+    shown = {name: getattr(reference, name) for name in layers}
+    write_exr(file, Image(shown, attributes={"airlight:pixel": "centre"}))
+    study = replace(standard_study("quick"), scenes=("sphere-spot",), configurations=(), flip="all")
+    opened = open_scene("sphere-spot", study.of("sphere-spot").at((16, 12)), {})
+    judged = image_row(opened, EngineImage("sphere-spot", "engine", file), None)
+    assert reference.surface.max() > 0
+    assert (judged.whole is not None) == (len(layers) == 2)
+    if judged.whole is not None:
+        np.testing.assert_allclose(judged.whole, judged.light, rtol=1e-5, atol=1e-6)
+
+
+def test_pixels_that_a_file_does_not_hold_are_no_error_of_all_light(variant, tmp_path):
+    """FLIP compared them, as black ones."""
+    reference = reference_image(load_scene("sphere-spot", (16, 12)).scene)
+    total = (reference.airlight + reference.surface).astype(np.float32)[:, :10]
+    window = [np.array(corner, np.int32) for corner in ((0, 0), (9, 11), (0, 0), (15, 11))]
+    header = {"dataWindow": tuple(window[:2]), "displayWindow": tuple(window[2:])}
+    planes = {key: np.ascontiguousarray(total[..., n]) for n, key in enumerate("RGB")}
+    OpenEXR.File(header, planes).write(str(tmp_path / "sphere-spot.engine.exr"))
+    study = replace(standard_study("quick"), scenes=("sphere-spot",), configurations=(), flip="all")
+    opened = open_scene("sphere-spot", study.of("sphere-spot").at((16, 12)), {})
+    shown = EngineImage("sphere-spot", "engine", tmp_path / "sphere-spot.engine.exr")
+    judged = image_row(opened, shown, None)
+    assert judged.row.error.relative_rmse < 1e-4
+    assert judged.whole is None
 
 
 def test_the_row_of_an_image_has_both_errors(variant, tmp_path):

@@ -298,6 +298,7 @@ def test_merged_moments_are_those_of_all_batches():
             "a.exr and b.exr share the seeds 3; compute one of them again with another --seed",
         ),
         ({"seeds": "4-9"}, "b.exr: its header names 6 seeds and 3 batches"),
+        ({"batch_spp": "few"}, "b.exr: its header names few samples a pixel of a batch; expected"),
         (
             {"seeds": ""},
             "b.exr is no Monte Carlo reference of `airlight reference`: it lacks seeds",

@@ -61,3 +61,12 @@ def test_the_interval_holds_the_share_in_95_of_100_runs():
         low, high = left_out(part, whole).interval
         held += low <= 0.2 <= high
     assert abs(held - 3800) < 55
+
+
+def test_the_share_is_unknown_where_no_path_found_light():
+    """It was 0 with an interval without width."""
+    for nothing in (np.zeros(4), np.full(4, np.nan)):
+        found = left_out(nothing, nothing)
+        assert (found.value, found.interval) == (None, (None, None))
+    # Nor is it known to be 0 where no path was scattered twice.
+    assert left_out(np.arange(1.0, 5.0), np.arange(1.0, 5.0)).interval == (None, None)

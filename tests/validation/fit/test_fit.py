@@ -23,6 +23,7 @@ from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
 from airlight.validation.fit.fit import fit_image
 from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
 from airlight.validation.fit.unknowns import Unknown, read_unknowns
+from airlight.validation.fog_model.radiance import scene_fog
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.models import model_of
 from tests.helpers.scenes import scene_xml
@@ -264,6 +265,23 @@ def test_an_end_that_noise_hides_is_found_far_away(times):
     # Noise of 300 values has another size by 12 % at most, and an end is found to 2 % of its errors.
     assert high == pytest.approx(np.log1p(times), abs=0.3)
     assert low < -0.3
+
+
+@pytest.mark.parametrize(
+    ("scene", "name"), [("sphere-spot", "light.x"), ("mist", "z_1"), ("mist", "sigma_1")]
+)
+def test_a_place_is_looked_for_in_lengths_of_the_scene(variant, scene, name):
+    """Least errors, and where an ellipse is right, were in metres, at any size of the scene."""
+    reference = read_reference(load_scene(scene, (8, 6)).scene)
+    (number,) = (each.number for each in read_unknowns([name], reference, {}))
+    (start,) = number.starts
+    moved = number.outward(number.inward(start) + 1e-3)
+    unit = start  # of a logarithm
+    if name == "light.x":
+        unit = np.linalg.norm(reference.lights[0].position - reference.origin)
+    if name == "z_1":
+        unit = scene_fog(reference).height.layers[0].scale_height
+    assert moved - start == pytest.approx(1e-3 * unit, rel=1e-3)
 
 
 @pytest.mark.parametrize("place", ["fog", "medium", "1"])

@@ -15,7 +15,10 @@ from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.columns import plain
 from airlight.validation.motion import judge
 from airlight.validation.motion.judge import compare_frames
+from airlight.validation.motion.measures import Sequence
+from airlight.validation.motion.noise import compare_runs
 from airlight.validation.scenes.loading import load_scene
+from tests.helpers.scenes import scene_xml
 
 SIZE = (32, 24)
 FRAMES = 8
@@ -67,6 +70,12 @@ def test_a_frame_without_a_finite_value_is_named(lights, tmp_path):
     assert found.failures == (
         f"{references[3].size} values are NaN or infinite, in frames 3 (0004.exr)",
     )
+    # Its error against earlier references was 0.
+    light = np.ones((2, 2, 3))
+    images = [1.01 * light] * 3 + [np.nan * light] + [1.01 * light] * 4
+    everywhere = np.ones((2, 2), dtype=bool)
+    still = Sequence(8, images.__getitem__, lambda n: light, lambda n: everywhere)
+    assert judge._shifts(still) == pytest.approx(dict.fromkeys(range(-2, 4), 0.01))
     files = written(
         tmp_path, [np.nan * each for each in references], changes=changes, pixel="centre"
     )
@@ -105,6 +114,25 @@ def test_a_margin_below_the_error_of_the_reference_is_not_kept(lights, tmp_path,
         assert each.verdict.kind == "exact"
     for each, margin in zip(missed, (0.05, 0.001), strict=True):
         assert f"not shown to be within +-{margin}" in each.failures[0]
+
+
+def test_frames_of_a_scene_that_names_its_equation_are_judged_by_it(variant, tmp_path):
+    """Frames were judged by physics without a word, runs by the equation without its name."""
+    named = '<default name="airlight-model" value="light-path=off"/>'
+    scene = tmp_path / "own.xml"
+    scene.write_text(re.sub("(<scene[^>]*>)", rf"\1{named}", scene_xml(), count=1))
+    loaded = load_scene(str(scene), (16, 12))
+    image = reference_image(loaded.scene, model=loaded.model).airlight
+    pattern, about = written(tmp_path, [image, image], pixel="centre", scene="hall")
+    frames = compare_frames(str(scene), pattern, about)
+    assert frames.verdict.kind == "exact"
+    assert "is of the scene hall" in frames.notes[1]
+    random = np.random.default_rng(5)
+    written(tmp_path, [image + 1e-3 * image.mean() * random.normal(size=image.shape) for _ in "ab"])
+    runs = compare_runs(str(scene), pattern, pixel="centre")
+    assert abs(runs.noise.bias.value) < 0.01
+    for found in (frames, runs):
+        assert found.notes[0].startswith("judged by the equation of light-path=off")
 
 
 def test_exposure_is_taken_away(lights, tmp_path):

@@ -5,6 +5,7 @@ import json
 import math
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from airlight.errors import InputError
@@ -181,6 +182,18 @@ def test_an_error_of_the_reference_is_no_bias_of_the_runs(off):
     assert biased.root_bias == pytest.approx(0.02 - off, rel=0.2)
 
 
+@pytest.mark.parametrize(
+    ("off", "words"),
+    [
+        (0.0, "no random numbers: all of its error is bias, +0.1 % in the mean"),
+        (0.002, "no random numbers: no error beyond that of the reference"),
+        (math.inf, "whether there is a bias cannot be told: the error of the reference is unknown"),
+    ],
+)
+def test_an_error_of_the_reference_is_no_bias_of_a_single_run(off, words):
+    assert measure_noise(REFERENCE, [1.001 * REFERENCE], off=(off, off)).verdict == words
+
+
 def test_runs_that_differ_by_less_than_rounding_are_refused():
     """There was a division by their noise, which is zero."""
     for value in (-0.0, 1e-40):
@@ -200,6 +213,28 @@ def test_only_the_sign_for_digits_has_a_meaning_in_names(tmp_path):
     assert [path.name for path in run_paths(tmp_path / "night [v2] #.exr")] == names[:2]
     with pytest.raises(InputError, match="1 files have such a name"):
         run_paths(tmp_path / "night * #.exr")
+
+
+def test_a_part_of_a_frame_is_refused(tmp_path):
+    """The pixels that such a file does not hold were black ones, a bias of all runs and frames."""
+    window = [np.array(corner, np.int32) for corner in ((0, 0), (9, 11), (0, 0), (15, 11))]
+    header = {"dataWindow": tuple(window[:2]), "displayWindow": tuple(window[2:])}
+    for number in range(2):
+        planes = {key: np.ones((12, 10), np.float32) for key in "RGB"}
+        OpenEXR.File(header, planes).write(str(tmp_path / f"{number}.exr"))
+    about = tmp_path / "frames.json"
+    about.write_text(json.dumps({"first": 0, "frames": 2}))
+    for compare, more in ((compare_runs, ()), (compare_frames, (about,))):
+        with pytest.raises(InputError, match=r"0\.exr holds a part of its frame alone"):
+            compare("open-fog", tmp_path / "#.exr", *more)
+
+
+def test_runs_of_two_layers_are_refused(tmp_path):
+    """All light of one file was judged as the airlight of the other."""
+    write_exr(tmp_path / "0.exr", Image({"airlight": np.ones((12, 16, 3))}))
+    write_exr(tmp_path / "1.exr", Image({"total": np.ones((12, 16, 3))}))
+    with pytest.raises(InputError, match="has no layer 'airlight'"):
+        compare_runs("open-fog", tmp_path / "#.exr")
 
 
 def test_a_seed_used_twice_is_noticed(variant, tmp_path):

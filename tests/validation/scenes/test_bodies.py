@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
-from airlight.validation.scenes.bodies import check_bodies
+from airlight.realtime.scene.closed_mesh import Bounds
+from airlight.validation.scenes.bodies import _common_sphere, check_bodies
 from airlight.validation.scenes.meshes import box, icosphere, joined, placed, torus
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, loaded, ring
 
@@ -161,3 +162,24 @@ def test_convex_bounds_overlap_as_soon_as_they_do(pair, gap):
         return
     with pytest.raises(InputError, match=r"shapes '[ab]' and '[ab]' overlap"):
         check_bodies(scene)
+
+
+@pytest.mark.parametrize("unit", [1e-7, 1e-6, 1e4])
+def test_how_far_convex_bodies_overlap_has_no_unit(unit):
+    """A solver with a tolerance of 1e-7 judged every other pair of micrometre bodies wrongly."""
+    random = np.random.default_rng(0)
+
+    def body(normals, centre, unit):
+        offsets = unit * (1 + normals @ centre)
+        return Bounds("body", normals, offsets, np.zeros((0, 3, 3)), unit * centre, 1.7 * unit)
+
+    for _ in range(30):
+        sides = random.standard_normal((2, 12, 3))
+        sides /= np.linalg.norm(sides, axis=2, keepdims=True)
+        faces = [np.concatenate([each, np.eye(3), -np.eye(3)]) for each in sides]
+        middles = np.zeros(3), 1.2 * random.standard_normal(3)
+        common = [
+            _common_sphere(*(body(*each, scale) for each in zip(faces, middles))) / scale
+            for scale in (1.0, unit)
+        ]
+        assert common[1] == pytest.approx(common[0], abs=1e-6)

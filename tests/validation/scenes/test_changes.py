@@ -15,12 +15,14 @@ from airlight.errors import InputError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.scene.read_scene import read_again, read_scene
+from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.read import read_reference
 from airlight.validation.scenes.animation import animate, moved_parts
 from airlight.validation.scenes.changes import change_scene, change_words, changeable, parse_changes
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.registry import SCENES
 from airlight.validation.study.configuration import configuration, prepared
+from tests.helpers.scenes import LAMP, scene_xml
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -145,6 +147,12 @@ def test_a_change_that_cannot_be_is_one_line(change, message):
     assert "\n" not in str(raised.value)
 
 
+def test_changes_to_where_float32_loses_lengths_are_refused_as_in_files():
+    far = {"camera.origin": (1e7, 0.0, 0.0), "camera.target": (1e7, 9.0, 1.0)}
+    with pytest.raises(InputError, match="m from the camera, and coordinates there are up to 1e"):
+        load_scene("colonnade", (16, 12), far | {"light.position": (1e7, 3.0, 0.0)})
+
+
 def test_a_lobe_that_no_medium_has_is_one_line_where_the_medium_is_isotropic_too():
     """It ended in a RuntimeError of Mitsuba, which built the phase function first."""
     with pytest.raises(InputError, match=r"got 1, expected finite numbers from -0\.99 to 0\.99"):
@@ -168,6 +176,50 @@ def test_an_isotropic_medium_gets_a_lobe_for_methods_and_reference(tmp_path, as_
     same = load_scene(name, (16, 12), {"medium.g": (0.0,)}).scene
     assert read_reference(same).medium.phase.name == "isotropic"
     assert changeable(same)["medium.g"].value == (0.0,)
+
+
+@pytest.mark.parametrize(("lobe", "g"), [("isotropic", 0.0), ("hg", 0.3)])
+def test_a_change_of_one_medium_is_of_no_other(tmp_path, lobe, g):
+    """Mitsuba's parser makes one phase function, and one albedo, of all that are equal."""
+    inside = f'<float name="g" value="{g}"/>' if g else ""
+    same = f'<phase type="{lobe}">{inside}</phase><volume type="constvolume" name="albedo">'
+    same += '<rgb name="value" value="0.9, 0.8, 0.7"/></volume>'
+    body = f"""<medium type="homogeneous" id="mist"><float name="sigma_t" value="0.7"/>{same}</medium>
+    <shape type="sphere" id="body"><point name="center" value="1.4, 0.3, 0.7"/><float name="radius" value="0.4"/>
+    <bsdf type="null"/><ref name="interior" id="mist"/><ref name="exterior" id="fog"/></shape>"""
+    path = tmp_path / "fog.xml"
+    path.write_text(scene_xml(LAMP, body, fog='<float name="sigma_t" value="0.31"/>' + same))
+    changes = {"medium.g": (0.6,), "medium.albedo": (0.5,)}
+    reference = read_reference(load_scene(str(path), (16, 12), changes).scene)
+    assert reference.medium.phase.g == pytest.approx(0.6)
+    np.testing.assert_allclose(reference.medium.albedo, 0.5, rtol=1e-6)
+    (mist,) = reference.media
+    assert getattr(mist.phase, "g", 0.0) == pytest.approx(g)
+    np.testing.assert_allclose(mist.albedo, [0.9, 0.8, 0.7], rtol=1e-6)
+
+
+@pytest.mark.parametrize("coefficient", ["albedo", "sigma_t"])
+def test_a_coefficient_on_a_grid_is_refused_with_a_change_too(tmp_path, coefficient):
+    """It ended in a KeyError: Mitsuba calls such a medium homogeneous."""
+    mi.VolumeGrid(np.full((2, 2, 2, 1), 0.3, np.float32)).write(str(tmp_path / "grid.vol"))
+    grid = f'<volume type="gridvolume" name="{coefficient}"><string name="filename" value="grid.vol"/></volume>'
+    other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
+    path = tmp_path / "fog.xml"
+    path.write_text(scene_xml(fog=f'{grid}<float name="{other}" value="0.5"/>'))
+    scene = load_scene(str(path), (16, 12), {"camera.fov": (31.0,)}).scene
+    with pytest.raises(InputError, match=f"its {coefficient} differs from place to place"):
+        read_reference(scene)
+
+
+def test_a_camera_far_from_the_origin_looks_where_it_is_told():
+    """In float32 a target a metre away would turn it by a milliradian."""
+    scene = load_scene("open-fog", (16, 12)).scene
+    origin, direction = (10000.3, -20000.7, 3.1), (0.36, 0.48, 0.8)
+    aim = {"camera.origin": origin, "camera.target": tuple(np.add(origin, direction))}
+    change_scene(scene, aim | {"camera.up": (0.0, 0.0, 1.0)})
+    matrix = camera_matrix(scene.sensors()[0])
+    np.testing.assert_allclose(matrix[:3, 2], direction, atol=1e-6)
+    np.testing.assert_allclose(matrix[:3, 1], [-0.48, -0.64, 0.6], atol=1e-6)
 
 
 def host(array) -> np.ndarray:

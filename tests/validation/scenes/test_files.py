@@ -85,6 +85,20 @@ def test_references_to_the_medium_that_is_there_change_nothing(load):
     np.testing.assert_array_equal(image(said), image(plain))
 
 
+def test_what_is_around_a_box_of_a_centimetre_is_known_from_a_camera_in_it(load):
+    """A ray from a thousand kilometres away passed the box, whose fog then seemed to be around it."""
+    eye = CAMERA.format(INSIDE).replace(
+        'origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6"',
+        'origin="0.002, -0.003, 0.001" target="0.001, 0, 0.001"',
+    )
+    box = shape(
+        "cube", NULL + '<ref name="interior" id="fog"/>', name="box", at=(0, 0, 0), size=0.007
+    )
+    ball = shape("sphere", GREY + OUTSIDE, at=(0.03, 0.04, 0), size=0.003)
+    with pytest.raises(InputError, match="medium 'fog' as exterior, where there is no medium"):
+        load(LAMP, box, ball, camera=eye)
+
+
 def test_a_wall_in_a_box_of_fog_may_name_it(load):
     box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
     ball = shape("sphere", GREY + '<ref name="exterior" id="fog"/>', size=0.3)
@@ -261,6 +275,13 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "medium 'fog' names the material 'skimmilk'; expected its sigma_t .* in numbers": (
         {"media": medium('<string name="material" value="skimmilk"/>')},
     ),
+    "medium 'fog' has a sigma_t of 0 in a channel with sigma_s or sigma_a": (
+        {
+            "media": medium(
+                '<rgb name="sigma_t" value="0.3, 0, 0.3"/><rgb name="sigma_s" value="0.1, 0.1, 0.1"/>'
+            )
+        },
+    ),
     "medium 'fog' has a density.*sigma_t": (
         {"media": medium('<float name="density" value="2"/>')},
     ),
@@ -382,9 +403,9 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
     assert "'projector'" in said["projector"]
 
 
-def room(*, without=""):
+def room(*, without="", mirror="", flip=""):
     """A window of a room of fog and its five walls, which reference the fog too; a
-    lamp and a ball are inside.
+    lamp and a ball are inside. `mirror`, `flip`: of the window.
     """
     turns = {
         "window": '<rotate x="1" angle="90"/><translate y="-1.3"/>',
@@ -397,8 +418,9 @@ def room(*, without=""):
     wall, parts = GREY + OUTSIDE, [LAMP.replace("0.7, 0.3, 1.9", "0.4, 0.3, 0.9")]
     for name, turn in turns.items():
         if name != without:
+            turn = mirror + turn if name == "window" else turn
             place = f'<transform name="to_world"><scale value="1.3"/>{turn}</transform>'
-            sides = NULL + '<ref name="interior" id="fog"/>' if name == "window" else wall
+            sides = flip + NULL + '<ref name="interior" id="fog"/>' if name == "window" else wall
             parts.append(f'<shape type="rectangle" id="{name}">{place}{sides}</shape>')
     return [*parts, shape("sphere", wall, at=(0.1, 0.2, -0.3))]
 
@@ -418,6 +440,26 @@ def test_a_room_of_fog_behind_a_window_is_a_box(load):
     assert expected[0].max() > 0
     # The box reaches 1e-4 of its size beyond the walls.
     np.testing.assert_allclose(image(rooms), expected, rtol=2e-3, atol=1e-3 * expected.max())
+
+
+@pytest.mark.parametrize(
+    ("mirror", "flip", "is_box"),
+    [
+        ('<scale x="-1"/>', "", True),
+        ('<scale z="-1"/>', "", False),
+        ("", '<boolean name="flip_normals" value="true"/>', False),
+        ('<scale z="-1"/>', '<boolean name="flip_normals" value="true"/>', True),
+    ],
+)
+def test_the_room_lies_behind_the_normal_of_its_window(load, mirror, flip, is_box):
+    """Mitsuba moves a normal by the inverse transposed: a mirror of x alone leaves it as it was."""
+    parts = room(mirror=mirror, flip=flip)
+    if is_box:
+        shapes = load(*parts, camera=CAMERA.format("")).shapes()
+        assert next(each for each in shapes if each.id() == "window").is_mesh()
+    else:  # the fog is before the window, where no room is
+        with pytest.raises(InputError, match="'window' bounds a medium and is a rectangle"):
+            load(*parts, camera=CAMERA.format(""))
 
 
 def test_a_window_without_a_whole_room_is_refused(load):

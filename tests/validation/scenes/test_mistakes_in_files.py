@@ -232,6 +232,15 @@ def test_clip_planes_are_noted_where_they_cut_mitsubas_own_image(variant, tmp_pa
         assert bool(clip_notes(load_scene(str(tmp_path / "own.xml")).scene)) == noted
 
 
+def test_a_far_plane_behind_a_grid_cuts_nothing(variant, tmp_path):
+    """A grid ends at its box, and is no fog without end."""
+    mi.VolumeGrid(np.full((2, 2, 2, 1), 0.3, np.float32)).write(str(tmp_path / "smoke.vol"))
+    for plane, noted in (("", False), ('<float name="far_clip" value="0.5"/>', True)):
+        text = smoke("smoke.vol").replace('<float name="fov"', plane + '<float name="fov"')
+        (tmp_path / "own.xml").write_text(text)
+        assert bool(clip_notes(load_scene(str(tmp_path / "own.xml")).scene)) == noted
+
+
 IMAGES = {
     "screen.exr": (b"\x89PNG\r\n\x1a\n", "not an EXR file but PNG; .*save linear radiance as EXR"),
     "sky.hdr": (b"#?RADIANCE\n", "not an EXR file but Radiance HDR; convert it"),

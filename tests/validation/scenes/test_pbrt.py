@@ -7,6 +7,7 @@ import pytest
 
 from airlight.errors import InputError
 from airlight.reference.scene.read import read_reference
+from airlight.reports.interchange.scene import surface
 from airlight.validation.scenes.loading import load_scene, scene_identity
 
 FOG = """MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [0.01 0.02 0.03]
@@ -156,6 +157,22 @@ def test_the_camera_takes_the_medium_of_its_version(read):
     )
     np.testing.assert_allclose(new.medium.sigma_t, [0.105, 0.16, 0.215], rtol=1e-6)
     np.testing.assert_allclose(old.medium.sigma_t, 0.1, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("version", "reflectance"), [(3, 0.2), (4, 0.5)])
+def test_the_end_of_a_transform_ends_what_its_version_says(read, version, reflectance):
+    """pbrt-v4 takes TransformBegin for AttributeBegin, and its end takes the material back."""
+    kind, end = (
+        ('"matte" "rgb Kd"', "WorldEnd") if version == 3 else ('"diffuse" "rgb reflectance"', "")
+    )
+    world = (
+        f"TransformBegin Material {kind} [0.2 0.2 0.2] Translate 3 0 0 TransformEnd\n" + BALL + LAMP
+    )
+    scene = read(pbrt(world, end=end))
+    (ball,) = scene.shapes()
+    assert surface(ball)["reflectance"] == pytest.approx(3 * [reflectance])
+    middle = 0.5 * (np.ravel(ball.bbox().min) + np.ravel(ball.bbox().max))
+    np.testing.assert_allclose(np.abs(middle), [0.9, 0.3, 1.2], atol=1e-6)
 
 
 def test_a_bound_has_its_medium_inside_whichever_way_it_faces(read):

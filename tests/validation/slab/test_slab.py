@@ -7,7 +7,10 @@ import pytest
 
 from airlight.analytic.phase import HgDraine
 from airlight.errors import InputError
-from airlight.validation.slab.light import slab_numbers
+from airlight.reference.monte_carlo.slab_walk.estimates import slab_estimate
+from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
+from airlight.reference.monte_carlo.slab_walk.walk import Slab
+from airlight.validation.slab.light import _estimated, slab_numbers
 from airlight.validation.slab.phases import phase_pair, read_phase_file
 from airlight.validation.slab.request import slab_request
 from tests.helpers.hg_draine import hg_draine_moments
@@ -53,6 +56,21 @@ def test_orders_are_those_of_photons(tau, sun, phase, albedo):
     assert len(z) > 60
     errors = numbers["photons"]["standard_error"]["orders"]
     assert errors[0]["reflectance"] < 0.01 * numbers["orders"][0]["reflectance"]
+
+
+def test_an_order_that_no_photon_reached_has_no_known_error():
+    """200 photons in half a mean free path: none is scattered 40 times."""
+    request = slab_request(0.5, 0.0, orders="1,40", depths=[0.2])
+    slab = Slab(request.tau, request.mu0, request.albedo, HenyeyGreenstein(0.0), request.depths)
+    estimate = slab_estimate(slab, request.ranges, photons=200, workers=1)
+    (few, none), (few_error, no_error) = (
+        _estimated(request, estimate, which)["orders"] for which in (0, 1)
+    )
+    for name in ("reflectance", "transmittance"):
+        assert few[name] > few_error[name] > 0
+        assert none[name] == 0
+        assert np.isnan(no_error[name])
+    assert np.isnan(no_error["fluence"][0]["value"])
 
 
 @pytest.mark.statistical

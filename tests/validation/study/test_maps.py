@@ -50,6 +50,7 @@ from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.registry import Animation
 from airlight.validation.statistics.estimate import Answer
+from airlight.validation.study import variation
 from airlight.validation.study.causes import decompose
 from airlight.validation.study.configuration import (
     Configuration,
@@ -224,6 +225,24 @@ def test_a_sweep_of_more_frames_than_a_turn_goes_round_again(variant):
     )
     assert len(row.measures.rmse_by_frame) == 5
     assert row.measures.relative_rmse.value < 1e-4
+
+
+def test_an_error_of_the_reference_is_no_noise_of_frames(variant, monkeypatch):
+    """An exact method under a sky, whose references have random errors, was said to be noisy."""
+    loaded, exact = load_scene("open-fog", (8, 6)), variation.reference_image
+    random = np.random.default_rng(5)
+
+    def noisy(scene):
+        image = exact(scene)
+        own = np.full(image.airlight.shape, 0.01 * image.airlight.mean())
+        airlight = image.airlight + own * random.normal(size=own.shape)
+        return replace(image, airlight=airlight, airlight_se=own, surface_se=0 * own)
+
+    monkeypatch.setattr(variation, "reference_image", noisy)
+    (row,) = method_motion(
+        loaded.scene, loaded.animation, [configuration("unshadowed")], frames=3, turn=240
+    )
+    assert row.verdict.startswith("exact")
 
 
 def test_what_does_not_move_is_refused(variant):

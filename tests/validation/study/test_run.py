@@ -87,16 +87,22 @@ def test_an_error_of_the_reference_is_no_bias_of_runs_by_pixel():
     own = 2e-3 * random.normal(size=(12, 16, 3))
     runs = [1 + 0.01 * random.normal(size=own.shape) for _ in range(8)]
 
-    def root(runs, error):
+    def found(runs, error):
         of = sampled.Reference(
             1 + own, np.full(own.shape, error), "statistical", None, None, None, Spent()
         )
-        return module._runs_error(of, runs).root_bias
+        return module._runs_error(of, runs)
 
-    assert root(runs, 0.0) == pytest.approx(2e-3, rel=0.3)
-    assert root(runs, 3 * 2e-3) is None
+    exact, known = found(runs, 0.0), found(runs, 3 * 2e-3)
+    assert exact.root_bias == pytest.approx(2e-3, rel=0.3)
+    assert known.root_bias is None
+    # The words on the bias hold for the true image, not for the reference alone.
+    scale = (1 + own).mean()
+    assert known.bias_within - exact.bias_within == pytest.approx(3 * 2e-3 / scale)
+    assert known.most_bias - exact.most_bias == pytest.approx(3 * 2e-3 / scale)
     # A bias beyond that is found all the same.
-    assert root([run + 0.02 for run in runs], 3 * 2e-3) == pytest.approx(0.02, rel=0.1)
+    biased = found([run + 0.02 for run in runs], 3 * 2e-3)
+    assert biased.root_bias == pytest.approx(0.02, rel=0.1)
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -114,6 +120,9 @@ def test_an_error_of_the_reference_is_no_bias_of_a_method(variant, monkeypatch, 
     (found,) = variation.method_noise(scene, [configuration("shadow-planes")], runs=2)
     assert found.noise.relative_rmse == pytest.approx(0.01, rel=0.3)
     assert (found.noise.root_bias is None) == known
+    # The picture shows bias alone: 95 of 100 pixels are within two standard errors.
+    alike = np.mean(found.mean == found.reference)
+    assert alike > 0.9 if known else alike < 0.1
 
 
 @pytest.mark.usefixtures("variant")
@@ -282,6 +291,9 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
         for configuration in left
     )
     assert {configuration.method for configuration in left} == set(FOG_METHODS)
+    # A method that somebody asks for alone was missing without a word.
+    asked = (configuration("ray-march", None, {"shadow": "map"}),)
+    assert configurations_for(scene_with(shadows=False), asked) == asked
 
 
 def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
@@ -394,6 +406,8 @@ def test_a_scene_of_half_has_half_the_width_in_all_its_images_and_more_paths_in_
         (24, 18),
     )
     assert halved.checks.samples == {"single-scatter": 128, "volpath": 64}
+    # Half of one pixel is one: there was an image without pixels.
+    assert replace(study, sizes=((1, 3),)).of("b").sizes == ((1, 1),)
 
 
 def test_images_of_a_study_are_each_scene_size_and_medium_and_the_first_are_timed():

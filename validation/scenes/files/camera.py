@@ -14,6 +14,7 @@ import numpy as np
 
 from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
+from airlight.reference.scene.varying import is_grid
 
 _USUAL_NEAR = 1e-2  # Mitsuba's near plane [m] where the file gives none
 
@@ -40,21 +41,25 @@ def clip_notes(scene: mi.Scene) -> list[str]:
         return []
     sensor = scene.sensors()[0]
     near, far = (float(mi.traverse(sensor)[key]) for key in ("near_clip", "far_clip"))
-    # Depths of all shapes along the camera's axis, by the corners of their box.
-    box, matrix = scene.bbox(), camera_matrix(sensor)
-    corners_of_box = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
-    if not np.all(np.isfinite(corners_of_box)):  # empty, or a place that `check_numbers` refuses
-        corners_of_box = np.empty((0, 3))
-    corners = np.array(np.meshgrid(*corners_of_box.T)).reshape(3, -1).T
-    depth = (corners - matrix[:3, 3]) @ matrix[:3, 2]
-    # Optical depths of a medium around the camera; a box of fog around it ends
-    # within the box of all shapes.
-    medium = sensor.get_medium()
+    # Optical depths of a medium around the camera; a box of fog around it ends within the box of
+    # all shapes, and a density grid at its own.
+    medium, matrix, boxes = sensor.get_medium(), camera_matrix(sensor), [scene.bbox()]
     unbounded = medium is not None and all(
         shape.interior_medium() != medium for shape in scene.shapes()
     )
     before = beyond = ""
     parameters = mi.traverse(medium) if medium is not None else {}
+    if medium is not None and is_grid(medium):
+        parts = mi.traverse(medium).hierarchy
+        boxes.append(next(each for each in parts if each.class_name() == "GridVolume").bbox())
+        unbounded = False
+    # Depths of all shapes and of a grid along the camera's axis, by the corners of their boxes.
+    depth = np.empty(0)
+    for box in boxes:
+        span = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
+        if np.all(np.isfinite(span)):  # else empty, or a place that `check_numbers` refuses
+            corners = np.array(np.meshgrid(*span.T)).reshape(3, -1).T
+            depth = np.append(depth, (corners - matrix[:3, 3]) @ matrix[:3, 2])
     if "sigma_t.value.value" in parameters:
         sigma_t = float(np.min(parameters["sigma_t.value.value"]) * parameters["scale"])
         before, beyond = (

@@ -105,6 +105,26 @@ def grey_densities(state: mi.parser.ParserState) -> None:
             props["has_spectral_extinction"] = False
 
 
+def give_own_parts(state: mi.parser.ParserState) -> None:
+    """Give each medium and light its own phase function, coefficients and spectra: a change of one
+    is then a change of no other.
+
+    Mitsuba's parser makes one node of all that are equal, and one object of a node. A grid, which
+    no change can name, stays shared.
+    """
+    taken = set[int]()
+    for index in (*of_kind(state, "Medium"), *of_kind(state, "Emitter")):
+        for key, at in list(references(properties(state, index))):
+            part = kind(state, at)
+            if part not in ("PhaseFunction", "Volume", "Texture"):
+                continue
+            if at in taken and properties(state, at).plugin_name() != "gridvolume":
+                state.nodes.append(mi.parser.SceneNode(state.nodes[at]))
+                at = len(state.nodes) - 1
+                properties(state, index)[key] = mi.Properties.ResolvedReference(at)
+            taken.add(at)
+
+
 def mirrored_grids(state: mi.parser.ParserState) -> list[str]:
     """Return notes on grids that their to_world mirrors, which are read as Mitsuba reads them."""
     notes = []
@@ -187,6 +207,11 @@ def _extinction(props: mi.Properties) -> tuple[Array, Array]:
         if "sigma_s" in coefficients
         else extinction - coefficients["sigma_a"]
     )
+    if np.any((extinction == 0) & (scattering != 0)):
+        raise InputError(
+            f"medium '{props.id()}' has a sigma_t of 0 in a channel with sigma_s or sigma_a; "
+            "expected sigma_t = sigma_s + sigma_a [1/m]"
+        )
     # The albedo of a channel without extinction has no meaning, and is 0.
     return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
 

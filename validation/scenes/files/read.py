@@ -19,6 +19,7 @@ from airlight.validation.scenes.files.camera import check_camera, clip_notes
 from airlight.validation.scenes.files.grids import give_grids
 from airlight.validation.scenes.files.media import (
     give_extinction,
+    give_own_parts,
     grey_densities,
     mirrored_grids,
     pass_where_no_material,
@@ -162,6 +163,7 @@ def _mend(state: mi.parser.ParserState, path: Path) -> None:
     grey_densities(state)
     pass_where_no_material(state)
     check_colours(state)
+    give_own_parts(state)
     write_out_instances(state)
 
 

@@ -127,10 +127,14 @@ class _Space:
         self._bounds = scene_of(bounds) if bounds else None
         self._around = sensor.get_medium()
         if self._bounds is not None:
-            # The medium outside of all bounds, seen from the camera: a ray from far away towards
-            # the camera meets the bounds from outside, or none.
-            camera = camera_matrix(sensor)[:3, 3]
-            self._around = self._at(camera[None] + np.array([[1e6, 2e6, 3e6]]), camera[None])[0]
+            # The medium outside of all bounds, seen from the camera: a ray from beyond them towards
+            # the camera meets the bounds from outside, or none. It begins twice their distance
+            # away, as float32 rays from farther would pass small ones.
+            camera, box = camera_matrix(sensor)[:3, 3], self._bounds.bbox()
+            ends = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
+            away = float(np.linalg.norm(ends - camera, axis=1).max())
+            start = camera + 2 * away * np.array([0.3, 0.5, 0.8])
+            self._around = self._at(start[None], camera[None])[0]
 
     def _at(self, start: Array, towards: Array) -> list[mi.Medium | None]:
         """Return the media at points, (n, 3) [m]: the medium before the nearest bound on the way

@@ -289,8 +289,11 @@ def rooms_as_boxes(state: mi.parser.ParserState, shapes: Iterable[mi.Shape]) -> 
         ]
         if not _is_null(shape) or len(media) != 1:
             continue
-        # The interior medium of a rectangle lies on the side that its normal points away from.
-        room = _room(_matrix(shape), -1.0 if shape.interior_medium() else 1.0, walls)
+        # The interior medium of a rectangle lies on the side that its normal points away from. A
+        # transform that mirrors, and flip_normals, turn the normal against the product of the sides.
+        matrix = _matrix(shape)
+        facing = np.sign(np.linalg.det(matrix[:3, :3])) * (-1 if shape.has_flipped_normals() else 1)
+        room = _room(matrix, float(-facing if shape.interior_medium() else facing), walls)
         if room is None:
             continue
         box = mi.Properties("cube")
@@ -326,8 +329,8 @@ def _room(window: Array, side: float, walls: list[Array]) -> Array | None:
     """Return the transform from Mitsuba's cube to the room behind a window, (4, 4) [m]; None
     where walls are missing.
 
-    `window`: the transform of its rectangle; `side`: -1 where the room lies on the side that the
-    normal points away from, else 1; `walls`: corners, (4, 3) each [m].
+    `window`: the transform of its rectangle; `side`: 1 where the room lies on the side to which the
+    cross product of the rectangle's sides points, else -1; `walls`: corners, (4, 3) each [m].
     """
     front = _corners(window)
     normal = np.cross(window[:3, 0], window[:3, 1])

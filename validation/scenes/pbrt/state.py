@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The graphics state of pbrt, and the parts of a scene with the state where they stand.
 
-`AttributeBegin` keeps the whole state, `TransformBegin` the transform. `WorldBegin` resets the
-transform and nothing else: media that were set before it stay. pbrt-v4 gives the camera the medium
-outside of the interface at `Camera`, pbrt-v3 that at the end of the world. A file is of pbrt-v3 if
-it has `WorldEnd` or the film `image`, which pbrt-v4 has not.
+`AttributeBegin` keeps the whole state; `TransformBegin` keeps the transform in pbrt-v3, and the
+whole state in pbrt-v4. `WorldBegin` resets the transform and nothing else: media that were set
+before it stay. pbrt-v4 gives the camera the medium outside of the interface at `Camera`, pbrt-v3
+that at the end of the world. A file is of pbrt-v3 if it has `WorldEnd` or the film `image`, which
+pbrt-v4 has not.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ class PbrtScene:
 class _World:
     """The state while the directives of a file go by."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, old: bool) -> None:
+        self.old = old  # whether the file is of pbrt-v3
         self.state = State()
         self.kept = list[tuple[Directive, State]]()  # by AttributeBegin and TransformBegin
         self.systems = dict[str, Array]()
@@ -105,12 +107,12 @@ class _World:
             self._attribute(directive)
 
     def _end(self, directive: Directive) -> None:
-        """Return to the state of the last AttributeBegin or TransformBegin."""
+        """Return to the state of the last AttributeBegin or TransformBegin (see the module)."""
         begin = directive.name.replace("End", "Begin")
         if not self.kept or self.kept[-1][0].name != begin:
             raise directive.error(f"there is no {begin} that it ends; remove it, or add one")
         kept = self.kept.pop()[1]
-        whole = directive.name == "AttributeEnd"
+        whole = directive.name == "AttributeEnd" or not self.old
         self.state = kept if whole else replace(self.state, ctm=kept.ctm)
 
     def _option(self, directive: Directive) -> None:
@@ -165,8 +167,12 @@ def read_parts(source: Iterable[Directive], name: str) -> PbrtScene:
 
     Raises InputError, by file and line, for what is not read, and for blocks that have no end.
     """
-    world = _World()
-    for directive in source:
+    lines = list(source)
+    old = any(
+        each.name == "WorldEnd" or (each.name == "Film" and each.type == "image") for each in lines
+    )
+    world = _World(old=old)
+    for directive in lines:
         world.run(directive)
     if world.kept:
         raise world.kept[-1][0].error("has no end; add one")
@@ -174,7 +180,6 @@ def read_parts(source: Iterable[Directive], name: str) -> PbrtScene:
         missing = "Camera" if world.begun else "WorldBegin"
         raise InputError(f"scene {name}: the file has no {missing}; expected a whole scene of pbrt")
     camera, film = world.single["Camera"], world.single.get("Film")
-    old = world.ended or (film is not None and film.directive.type == "image")
     # pbrt-v3 makes the camera at the end of the world, with the media that are in force there.
     if old:
         camera = replace(camera, state=replace(camera.state, outside=world.state.outside))

@@ -199,14 +199,16 @@ def visible_triangle(view: View):
 
 
 def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
-    """Refuse bounded media whose Gamma no vertices can have.
+    """Refuse bounded media whose Gamma no vertices can have, and lights without a place: rows of
+    vertices are counted from a light.
 
-    Raises InputError for a medium around them, and for a directional light.
+    Raises InputError for a medium around bounded ones, and for a directional light.
     """
-    if not medium.clear or not all(light.w for light in lights):
+    around = medium.bounded_media and not medium.clear
+    if around or not all(light.w for light in lights):
         raise InputError(
-            "evaluation=vertex: needs bounded media in vacuum, and lights that have a place; use "
-            "evaluation=pixel"
+            "evaluation=vertex: needs lights that have a place, and vacuum around bounded media; "
+            "use evaluation=pixel"
         )
 
 

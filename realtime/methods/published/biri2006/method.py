@@ -28,6 +28,7 @@ from typing import Any
 
 import drjit as dr
 
+from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.methods.published.biri2006.crossings import Buffer, reaches, sum_crossings
 from airlight.realtime.methods.published.biri2006.media import FORMS, constant_rays
@@ -100,6 +101,7 @@ class ShadowPlanes2006(Method):
         "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond "
         "the last Gamma is constant",
         least=2,
+        most=64,  # 1.5^64 = 2e11: beyond it float32 loses the squares of distances
     )
     ambient: float = parameter(
         0.0,
@@ -150,9 +152,15 @@ class ShadowPlanes2006(Method):
         return PaperPreparation(occluders, self.cone, self.order)
 
     def check(self, scene):
-        """Refuse bounded media that vertices cannot have."""
-        if scene.medium.bounded_media and self.evaluation == "vertex":
+        """Refuse media and lights that vertices cannot have, and a pyramid that is not drawn."""
+        if self.evaluation == "vertex":
             check_vertices(scene.medium, scene.lights)
+        spots = any(light.cone is not None for light in scene.lights)
+        if self.cone and spots and not scene.features.shadows:
+            raise InputError(
+                f"cone: got {self.cone}, and no planes are drawn where nothing casts a shadow; use "
+                "cone=0"
+            )
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray between shadow planes, and whether the light
@@ -231,9 +239,10 @@ class ShadowPlanes2006(Method):
         """
         index = planes.index
         rays = ray_planes(index, view.aim, view.distance)
-        # Planes take the place of a cone whose intensity does not fall within it.
-        cone = bool(self.cone and light.cone is not None and not light.varies)
-        airlight = self._lit(view, light.without_cone() if cone else light, kernel)
+        # Planes bound a spot. They take the place of a cone in which the intensity does not fall.
+        cone = bool(self.cone and light.cone is not None)
+        bare = light.without_cone() if cone and not light.varies else light
+        airlight = self._lit(view, bare, kernel)
         # Vertices in bounded media: medium by medium, each with a Gamma that begins where it does.
         if view.medium.bounded_media and self.evaluation == "vertex":
             start = type(view.medium.albedo)(0) if start is None else start

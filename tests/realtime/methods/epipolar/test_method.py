@@ -24,7 +24,7 @@ from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.light_frames import SIZE as FRAME_SIZE
 from tests.helpers.light_frames import camera, coloured_fog, lamp
-from tests.helpers.scenes import spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 SIZE = (40, 30)
 #: Where the light is, seen from a camera at the origin that looks along +y with +z up.
@@ -280,4 +280,27 @@ def test_no_pixel_is_brighter_than_without_shadows(variant):
     # Sums over lit intervals and the whole ray are rounded differently, and in float32
     # by the quadrature's size.
     assert (image <= bare * 1.01 + 1e-4 * bare.mean()).all()
+    assert image.mean() < bare.mean()
+
+
+def test_media_of_pure_colours_have_fractions_channel_by_channel(variant):
+    """A ray that meets the red medium alone has no fraction of green, which its neighbours in the
+    green one must not take for a number: pixels between the two were negative.
+    """
+
+    def fog(centre, radius, albedo):
+        sphere = {"type": "sphere", "center": list(centre), "radius": radius}
+        return bounded_medium(sphere, 0.9, albedo)
+
+    scene = clear_scene(
+        size=(64, 48),
+        red=fog((-0.3, -0.6, 0.6), 0.5, (0.9, 0.0, 0.0)),
+        green=fog((0.1, 0.7, 0.65), 0.6, (0.0, 0.9, 0.0)),
+        ball={"type": "sphere", "center": [0.58, 0.71, 1.4], "radius": 0.12},
+    )
+    image, bare = (np.asarray(render(scene, name)) for name in ("min-max", "unshadowed"))
+    assert (image >= -1e-6 * bare.mean()).all()
+    assert (image <= bare * 1.01 + 1e-4 * bare.mean()).all()
+    # Some rays meet both media.
+    assert ((bare[..., 0] > 0) & (bare[..., 1] > 0)).sum() > 30
     assert image.mean() < bare.mean()

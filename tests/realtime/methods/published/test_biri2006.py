@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import airlight.realtime.methods.published.biri2006.mesh as module
+from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.loading import load_scene
@@ -16,8 +17,9 @@ from airlight.validation.scenes.parts import mitsuba_mesh
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse
+from tests.helpers.height_fog import SUN, fog_xml
 from tests.helpers.occluders import closed_sphere
-from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def frame(parameters):
@@ -145,6 +147,34 @@ def test_without_occluders_in_view_a_medium_is_its_end_less_its_entry(variant):
     pixel = render(scene, kernel="taylor", media="paper").airlight
     vertex = render(scene, kernel="taylor", media="paper", evaluation="vertex").airlight
     assert relative_rmse(vertex, pixel) < 1e-6
+
+
+def test_the_planes_of_a_soft_spot_are_meshed_as_far_as_those_of_a_hard_one(variant):
+    """With rows for occluders alone Gamma stays what it is next to the light, a thousand times too
+    large.
+    """
+    scene = tiny_scene(ball=occluder(), floor=None, lamp=spot(beam=11.0))
+    pixel, vertex = (
+        render(scene, order="exact", cone=32, evaluation=each).airlight
+        for each in ("pixel", "vertex")
+    )
+    assert relative_rmse(vertex, pixel) < 1
+
+
+def test_a_pyramid_is_refused_where_no_planes_are_drawn(variant):
+    """The image would have the cone itself."""
+    with pytest.raises(InputError, match="cone: got 32, and no planes are drawn"):
+        frames.renderer(
+            tiny_scene(ball=None, floor=None, lamp=spot()), "shadow-planes-2006", cone=32
+        )
+
+
+def test_vertices_need_lights_that_have_a_place(variant, tmp_path):
+    """Their rows are counted from the light; height fog has no bounds and lets suns in."""
+    (tmp_path / "fog.xml").write_text(fog_xml(SUN))
+    scene = load_scene(str(tmp_path / "fog.xml")).scene
+    with pytest.raises(InputError, match="evaluation=vertex: needs lights that have a place"):
+        frames.renderer(scene, "shadow-planes-2006", evaluation="vertex")
 
 
 def test_ambient_light_is_added_by_its_formula(variant):

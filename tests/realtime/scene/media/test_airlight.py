@@ -257,6 +257,24 @@ def test_thin_fog_keeps_the_digits_of_an_ambient_field(variant, sigma_t):
             assert found == pytest.approx(-np.expm1(-sigma_t * (distance - begin)), rel=2e-6)
 
 
+def test_steps_in_a_bubble_of_thin_fog_go_on_to_its_end(variant):
+    """They stopped after the 20 optical depths of the fog around it."""
+    types = array_types("single")
+    fog, thin = (
+        Homogeneous((dr.opaque(types.scalar, each),), types.color(1), Isotropic())
+        for each in (2.0, 0.01)
+    )
+    no_planes = np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3))
+    ball = make_bounded_medium(thin, Bounds("ball", *no_planes, np.zeros(3), 30.0), types)
+    medium = BoundedMedia(*vars(fog).values(), bounded_media=(ball,))
+    rays, zero = medium.rays(types.vector(-29, 0, 0), types.vector(1, 0, 0)), types.scalar(0)
+    for depth in (3.0, 20.0):
+        (found,) = medium.optical_depth(rays, zero, medium.length_of(depth))
+        assert float(found[0]) >= depth
+    _, end = medium.part(rays, zero, types.scalar(40.0), uniform=True)
+    assert float(end[0]) == 40.0
+
+
 @pytest.mark.claim("bounded-media-of-methods", tolerance="relative RMSE 1e-5 to 1e-4, by scene")
 @pytest.mark.parametrize(
     ("scene", "bound"),

@@ -11,7 +11,10 @@ from airlight.realtime.frame.image import render_frame
 from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.scene.density import DensityGrid, density_on_device
 from airlight.realtime.scene.media.density_grid import GridMedium
+from airlight.realtime.scene.phase import Isotropic
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
@@ -80,6 +83,30 @@ def test_a_ray_march_goes_to_the_reference(scene, light):
         )
     assert max(errors[::2]) < 5e-3
     assert errors[2] < 0.5 * errors[1]
+
+
+def test_depths_are_exact_in_voxels_of_any_size(variant):
+    """A metre of a ray was a difference of two places in the grid, which rounding took away."""
+    types, random = array_types("single"), np.random.default_rng(3)
+    values = random.random((5, 6, 7), dtype=np.float32)
+    aims = random.uniform(0, 1, (100, 3)) * (7, 6, 5) - (-2.0, 3.1, 2.6)
+    aims = (aims / np.linalg.norm(aims, axis=1)[:, None]).T
+
+    def depths(voxel):
+        sides = voxel * np.array([7.0, 6.0, 5.0])
+        to_grid = np.column_stack([np.diag(1 / sides), np.zeros(3)])
+        density = density_on_device([DensityGrid(values, 1 / voxel, to_grid)], types)
+        ends = types.vector(0, 0, 0), types.vector(*sides.tolist())
+        largest = dr.opaque(types.scalar, 1 / voxel)
+        medium = GridMedium(density, largest, *ends, types.color(1), Isotropic())
+        origin = types.vector(-2 * voxel, 3.1 * voxel, 2.6 * voxel)
+        ways = types.vector(*(aligned_array(types.scalar, column) for column in aims))
+        end = dr.full(types.scalar, np.inf, aims.shape[1])
+        return np.array(medium.optical_depth(medium.rays(origin, ways), 0, end)[0])
+
+    of_centimetres = depths(2.0**-6)
+    assert of_centimetres.min() > 0.05
+    np.testing.assert_allclose(depths(2.0**24), of_centimetres, rtol=1e-5)
 
 
 def test_depths_of_steps_add_up_to_the_depth_from_the_camera(scene, monkeypatch):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.rays import ray_geometry
 from airlight.realtime.scene.closed_mesh import (
     CELLS,
     Bounds,
@@ -22,6 +23,8 @@ from airlight.realtime.scene.closed_mesh import (
     radial_planes,
     read_bounds,
 )
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded import BoundedMedia
 from airlight.realtime.scene.media.light_paths import LightPaths
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import Isotropic
@@ -87,6 +90,34 @@ def sphere_bounds(centre, radius):
     return Bounds(
         "sphere", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius
     )
+
+
+def test_a_body_of_micrometres_has_the_airlight_of_one_of_metres(variant):
+    """Panels were 8 micrometres long at least, and went over facets in a small body."""
+    types, (vertices, faces) = array_types("single"), placed(SOLIDS["gem"], CENTRE, TURN)
+    vertices = vertices.astype(np.float32).astype(np.float64)
+    aim = CENTRE + np.random.default_rng(5).normal(size=(64, 3)) * 0.3 - (3.0, 0.4, 0.5)
+
+    def airlight(length):
+        def vector(columns):
+            return types.vector(*(aligned_array(types.scalar, column) for column in columns))
+
+        def fog(sigma_t):
+            return Homogeneous((dr.opaque(types.scalar, sigma_t),), types.color(1.0), Isotropic())
+
+        bounds = mesh_bounds(closed_mesh("gem", length * vertices, faces))
+        body = make_bounded_medium(fog(2.0 / length), bounds, types)
+        medium = BoundedMedia(*vars(fog(0.0)).values(), bounded_media=(body,), clear=True)
+        light = Light(types.vector(1.7 * length, 0.4 * length, 2.9 * length), types.color(1.0))
+        origin = types.vector(3.0 * length, 0.4 * length, 0.5 * length)
+        rays = medium.rays(origin, vector((aim / np.linalg.norm(aim, axis=1)[:, None]).T))
+        lit = medium.lit(rays, light, ray_geometry(origin, rays.aim, light))
+        ends = (dr.full(types.scalar, end, len(aim)) for end in (0.0, np.inf))
+        return length**2 * np.array(lit.airlight(*ends), dtype=np.float64)
+
+    metres = airlight(1.0)
+    assert np.count_nonzero(metres[0]) > 8
+    np.testing.assert_allclose(airlight(2.0**-16), metres, rtol=1e-5)
 
 
 def test_what_the_half_spaces_hold_is_what_the_box_holds():

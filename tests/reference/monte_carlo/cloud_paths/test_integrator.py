@@ -20,6 +20,8 @@ from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from airlight.reference.monte_carlo.batches import merged
 from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
 from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from airlight.reference.monte_carlo.cloud_paths.phases import Tabulated
+from airlight.reference.monte_carlo.cloud_paths.walk import _counted_fraction
 from airlight.reference.monte_carlo.volpath import volpath_orders_batch
 from airlight.reference.scene.clouds import read_clouds
 from airlight.validation.scenes.loading import load_scene
@@ -262,6 +264,31 @@ def test_layers_add_up_and_seeds_give_the_same_numbers(variant):
     few = paths(clouds, 2, 16, sets=SETS[1:2])
     np.testing.assert_array_equal(few.mean[2], one.mean[3])
     np.testing.assert_allclose(few.mean[0], one.mean[0], rtol=1e-6, atol=1e-12)
+
+
+def test_a_transparent_shape_without_a_medium_takes_no_part(variant):
+    """A ball of nothing around the cloud, between it and the camera, the sun and the sky."""
+    parts = {"cloud": ball((1.1,) * 3, (0.9,) * 3, {"type": "isotropic"}), "sky": sky((0.2,) * 3)}
+    nothing = {"type": "sphere", "radius": 2.0, "bsdf": {"type": "null"}}
+    alone, around = (read_clouds(scene(**parts, **more)) for more in ({}, {"nothing": nothing}))
+    (first, second), found = (
+        [seen_clouds(clouds) for clouds in (alone, around)],
+        [paths(clouds, 2, 16).mean for clouds in (alone, around)],
+    )
+    np.testing.assert_array_equal(first.transmittance, second.transmittance)
+    np.testing.assert_array_equal(first.distance, second.distance)
+    assert found[0][0].any()
+    assert not found[1][1].any()  # nothing is no surface
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+
+
+def test_a_direction_that_both_draw_with_no_density_has_no_light(variant):
+    """At its end a table is 0, and the random number 0 draws this end: 0/0 of the light."""
+    fraction = _counted_fraction(mi.Float([0.0, 2.0, 0.0]), mi.Float([0.0, 1.0, 1.0]), 0.5)
+    np.testing.assert_allclose(np.array(fraction), [0.0, 0.8, 0.0], rtol=1e-6)
+    # No table is negative where rounding has a direction beyond forward.
+    beyond = Tabulated(np.array([1.5, 1.5, 0.0])).value(mi.Float(0.0), mi.Float(1 + 1e-6))
+    assert np.array(beyond).min() == 0
 
 
 # Clouds with densities ----------------------------------------------------------------------------

@@ -56,7 +56,7 @@ def by_walk(scene, paths, seed):
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, paths)
     targets = Targets(mi.UInt32([0, 0]), 1)
-    sums, _ = walk(
+    sums = walk(
         walk_scene(read_clouds(scene), 0),
         targets,
         sampler,

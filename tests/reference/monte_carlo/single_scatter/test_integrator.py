@@ -140,6 +140,13 @@ def test_agrees_with_the_quadrature(variant, name):
     assert np.all(batches.standard_error[1] == 0)
 
 
+def test_a_lamp_may_stand_at_the_origin(variant):
+    reference = read_reference(_load(ball=None, floor=None, lamp=lamp(position=[0.0, 0.0, 0.0])))
+    total = _run(reference, batches=4).mean[0].sum(axis=0)
+    expected = quadrature_image(reference).airlight.sum(axis=(0, 1))
+    assert total == pytest.approx(expected, rel=0.02)
+
+
 @pytest.mark.claim("enclosed-light")
 def test_enclosed_light_gives_exactly_zero(variant):
     closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
