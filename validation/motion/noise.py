@@ -141,8 +141,7 @@ class Noise:
         if self.runs == 1 and is_right:
             return "no random numbers: no error beyond that of the reference"
         if self.runs == 1:
-            middle = 100 * (self.bias.value or 0.0)
-            return f"no random numbers: all of its error is bias, {middle:+.3g} % in the mean"
+            return f"no random numbers: all of its error is bias, {(low + high) / 2:+.3g} % in the mean"
         if self.correlated:
             return (
                 "whether there is a bias cannot be told: runs are not independent, and averages of "
