@@ -200,7 +200,7 @@ def read_level(options: Options) -> Level:
 
     # A render engine is given the scene of a render, any other script that of the viewport.
     # `bpy` has no types.
-    class Reader(bpy.types.RenderEngine):  # type: ignore[misc]
+    class Reader(bpy.types.RenderEngine):  # type: ignore[misc]  # bpy has no types
         bl_idname, bl_label = "AIRLIGHT_TO_MITSUBA", "to_mitsuba"
 
         def render(self, depsgraph: Any) -> None:

@@ -15,8 +15,6 @@ import math
 import os
 import random
 import re
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -28,7 +26,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airlight.errors import InputError
+from airlight.errors import DAMAGED, InputError
 from airlight.reference.storage.files import NO_SPACE, sweep_hidden, write_bytes
 
 Arrays: TypeAlias = dict[str, np.ndarray]  #: arrays of any shape and type, by name
@@ -101,17 +99,7 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> Arrays | None:
         # Opened here, since `np.load` leaves a file that it cannot read open.
         with open(_path(key), "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in (names or stored.files)}
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        AttributeError,
-        TypeError,
-        RuntimeError,  # from an archive that seems encrypted, or compressed in an unknown way
-        zipfile.BadZipFile,
-        zlib.error,
-    ):
+    except DAMAGED:
         return None
     if names:
         return arrays

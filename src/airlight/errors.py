@@ -1,13 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one exception for a user's mistake, the one for what is missing on the machine, and the
-name that a user may have meant.
+"""The one exception for a user's mistake, the one for what is missing on the machine, those of a
+damaged archive, and the name that a user may have meant.
 
 Both sides of a comparison raise them: they compute nothing.
 """
 
 import difflib
 import importlib.util
+import zipfile
+import zlib
 from collections.abc import Iterable
+
+#: what NumPy raises where an archive of arrays is missing, damaged or none
+DAMAGED: tuple[type[Exception], ...] = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    AttributeError,
+    TypeError,  # from a single array, which is no archive
+    RuntimeError,  # from an archive that seems encrypted, or compressed in an unknown way
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 class InputError(ValueError):

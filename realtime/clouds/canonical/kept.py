@@ -15,8 +15,6 @@ an image would depend on earlier ones.
 import os
 import re
 import uuid
-import zipfile
-import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from hashlib import blake2b
@@ -27,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.errors import DAMAGED
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]
@@ -57,17 +56,7 @@ def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        AttributeError,
-        TypeError,  # from a single array, which is no archive
-        RuntimeError,  # from an archive that seems encrypted, or compressed in an unknown way
-        zipfile.BadZipFile,
-        zlib.error,
-    ):
+    except DAMAGED:
         return None
     with suppress(OSError):
         os.utime(path)  # what was used longest ago is dropped first
