@@ -1,10 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes of challenges and their references, each made once for all tests."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from airlight.validation.arrays import Array
+
+
+def make_small(change: Callable[[Any, str, Any], None]) -> None:
+    """Let challenges have three scenes of 32 x 24 pixels, by a function such as `setattr`."""
+    from airlight.reports.challenge import draw, entry, folder, score
+
+    change(draw, "EACH", 1)
+    for module in (draw, entry, folder):
+        change(module, "SIZE", (32, 24))
+    for module in (folder, score):
+        change(module, "draw_scenes", drawn)
 
 
 @cache

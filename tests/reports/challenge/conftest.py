@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airlight.reference.storage.exr import Image, write_exr
-from tests.helpers.challenge import drawn, references
+from tests.helpers.challenge import make_small, references
 
 SEED = "7"
 
@@ -15,13 +15,7 @@ SEED = "7"
 @pytest.fixture
 def small(variant, monkeypatch):
     """Let challenges have three scenes of 32 x 24 pixels."""
-    from airlight.reports.challenge import draw, entry, folder, score
-
-    monkeypatch.setattr(draw, "EACH", 1)
-    for module in (draw, entry, folder):
-        monkeypatch.setattr(module, "SIZE", (32, 24))
-    for module in (folder, score):
-        monkeypatch.setattr(module, "draw_scenes", drawn)
+    make_small(monkeypatch.setattr)
 
 
 @pytest.fixture(scope="session")
