@@ -25,6 +25,8 @@ from typing import Any
 
 from airlight.errors import InputError, nearest
 
+MOST_STEPS = 1 << 24  #: of a ray: float32, in which they are counted, has no odd number above
+
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 

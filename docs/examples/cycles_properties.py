@@ -62,7 +62,6 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
     """
     camera = described["camera"]
     width, height = camera["size"]
-    medium = described["medium"]
     return {
         "scene": _SCENE | {"render.resolution_x": width, "render.resolution_y": height},
         "image_settings": _FILE,
@@ -84,7 +83,7 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
             ),
         },
         "lights": [_light(light) for light in described["lights"]],
-        "world": _world(medium, described.get("sky")),
+        "world": _world(described),
         "media": {bounded["name"]: _volume(bounded) for bounded in described["bounded_media"]},
         "materials": {surface["name"]: _material(surface) for surface in described["surfaces"]},
         "objects": {
@@ -139,10 +138,13 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     return {"type": _KINDS[light["kind"]], "data": data, "matrix_world": matrix}
 
 
-def _world(medium: dict[str, Any] | None, sky: dict[str, Any] | None) -> dict[str, Any] | None:
+def _world(described: dict[str, Any]) -> dict[str, Any] | None:
     """Return the medium of all space, None for a vacuum."""
-    if sky is not None:
+    medium = described["medium"]
+    if described.get("sky") is not None:
         return {"cannot": "the light of a sky was not tried"}
+    if medium is not None and described["bounded_media"] and any(medium["sigma_t"]):
+        return {"cannot": "volumes of Blender add up: the fog around would fill bounded media too"}
     return None if medium is None else _volume(medium)
 
 

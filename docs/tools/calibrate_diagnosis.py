@@ -9,7 +9,7 @@ names and misses for limits of the evidence and of the fraction of the error tha
 leaves. From the scenes of `CALIBRATED` it chooses the limits and writes
 `validation/engine/calibration.json`, which the diagnosis reads; from those of `MEASURED`, other
 scenes and seeds, come the figures that count. Both are in `docs/data/diagnosis-calibration.json`,
-and docs/your-engine.md has its table.
+and docs/diagnosed-engines.md has its table.
 """
 
 import argparse

@@ -4,7 +4,7 @@
 
 `python docs/tools/cycles_round_trips.py --python PYTHON --images FOLDER` describes scenes, lets an
 interpreter with `bpy` render them with faults by `cycles_faults.py`, diagnoses what is in the
-folder and writes the answers into the record, from which docs/your-engine.md is built. Images that
+folder and writes the answers into the record, from which docs/diagnosed-engines.md is built. Images that
 are there are not rendered again.
 """
 

@@ -4,7 +4,7 @@
 `python docs/tools/numpy_faults.py` renders a scene by marching rays, which shares no code with the
 reference or with the hypotheses, once for each fault; adds 1 % of noise; lets the diagnosis say
 what is wrong, without telling it what a pixel is; and writes `docs/data/numpy-faults.json`, from
-which docs/your-engine.md has its table of confusion.
+which docs/diagnosed-engines.md has its table of confusion.
 """
 
 import argparse

@@ -86,6 +86,7 @@ import mitsuba as mi
 
 from airlight.realtime.clouds.canonical.transport_grid import Transport
 from airlight.realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
+from airlight.realtime.numerics.functions import opacity
 
 _LEAST_LENGTH = 1e-4  #: of the horizontal part of a unit vector that has a direction
 
@@ -253,7 +254,7 @@ def collector_light(
             set_number, slab.thickness, slab.depth, slab.mu, slab.cos_phi, slab.sin_phi, slab.mu_l
         )
         # *Way* and *cover*: the light of the depth T behind p, and only where the map has cloud.
-        light *= (1 - dr.exp(-behind)) / (1 - dr.exp(-_way(slab)))
+        light *= opacity(behind) / opacity(_way(slab))
         if search.covered:
             light *= dr.minimum(surface.cover, 1)
         path = dr.rcp(extinction)

@@ -63,7 +63,7 @@ from airlight.realtime.clouds.march import (
     voxel,
 )
 from airlight.realtime.numerics.array_types import PerRay, chosen_value
-from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
+from airlight.realtime.numerics.functions import exp_bounded, opacity
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.bounded import Clouds
 
@@ -72,12 +72,7 @@ def opacity_of(depths: tuple[Any, ...], Color) -> Any:
     """Return 1 - exp(-depth) as a colour, from optical `depths` by channel
     [1]; `Color` is its type.
     """
-    # 1 - exp(-d) = 2 exp(-d/2) sinh(d/2) loses nothing where d is small.
-    fractions = [
-        dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth))
-        for depth in depths
-    ]
-    return Color(*fractions)
+    return Color(*map(opacity, depths))
 
 
 #: Returns the light of a step, of its depth, and of the depths to the eye and of
@@ -308,10 +303,8 @@ def step_integral(depth, eye, segment):
     # other factor, (1 - exp(-|du|))/|du|, is at most 1; it is 1 where u does not change.
     first, second = eye[0] + segment[0], eye[1] + segment[1]
     change = dr.abs(depth + (segment[1] - segment[0]))
-    _, less = exp_expm1_bounded(-change)
-    return (
-        depth * exp_bounded(-dr.minimum(first, second)) * dr.select(change > 0, -less / change, 1)
-    )
+    mean = dr.select(change > 0, opacity(change) / change, 1)
+    return depth * exp_bounded(-dr.minimum(first, second)) * mean
 
 
 def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:

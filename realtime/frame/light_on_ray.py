@@ -12,6 +12,7 @@ As h goes to 0 the exponential under the integral goes to 1 at every angle below
 
 J grows like 1/h, and the pixel of a ray that meets the light is infinite; so is a ray that ends at
 the light, with half of the integral or more. With the light at the camera every pixel is infinite.
+Where nothing is extinguished at the light, nothing is scattered there, and all of it is finite.
 A mean over a pixel is finite, since 1/h is integrable over a plane, but a frame holds the radiance
 of the centres.
 
@@ -40,19 +41,15 @@ def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distanc
     width, 3) [W/(m^2 sr)]; `distance`: to the visible surface, (height, width) [m]. Raises
     InputError with the first pixel that is wrong, and why.
     """
-    # A medium with bounds may end before the light, and a cone look away: there the
-    # number says more than the ray.
-    points = (
-        []
-        if scene.medium.clear
-        else [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]
-    )
+    # A cone may look away: there the number says more than the ray.
+    points = [pair for pair in enumerate(scene.lights, 1) if pair[1].kind == "point"]
     if points:
         camera = read_camera(scene.camera)
         for number, light in points:
-            _check_light(
-                camera, number, np.array(light.position, dtype=np.float64).ravel(), distance
-            )
+            position = np.array(light.position, dtype=np.float64).ravel()
+            fault = _fault(camera, f"light {number}", position, distance)
+            if fault and _extinguishes(scene, position - camera.origin):
+                raise InputError(fault)
     for what, values in (("airlight", airlight), ("surface radiance", surface)):
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
@@ -69,31 +66,46 @@ def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distanc
             )
 
 
-def _check_light(camera: HostCamera, number: int, position: Array, distance: Any) -> None:
+def _fault(camera: HostCamera, name: str, position: Array, distance: Any) -> str:
+    """Return what to tell of a light on the ray of a pixel; empty where it is on none."""
     away = position - camera.origin
     reach = float(np.linalg.norm(away))
     known = _ROUNDING * max(np.abs(position).max(), np.abs(camera.origin).max())
     if not reach > known:
-        raise InputError(
-            f"light {number} is {reach:.3g} m from the camera: the airlight, which grows like "
-            "1/distance, is infinite "
-            "in every pixel; move the light or the camera"
+        return (
+            f"{name} is {reach:.3g} m from the camera: the airlight, which grows like 1/distance, "
+            "is infinite in every pixel; move the light or the camera"
         )
     # In the plane at distance 1 a pixel has the sides `left` and `up`.
     c, a, b = np.linalg.solve(camera.basis, away)
     if c <= 0:
-        return
+        return ""
     column, row = 0.5 * (camera.width - 1) - a / c, 0.5 * (camera.height - 1) - b / c
     nearest = np.clip(np.round([column, row]), 0, [camera.width - 1, camera.height - 1]).astype(int)
     across, upward = 0.5 * (camera.width - 1) - nearest[0], 0.5 * (camera.height - 1) - nearest[1]
     ray = camera.basis @ (1.0, across, upward)
     height = float(np.linalg.norm(np.cross(away, ray)) / np.linalg.norm(ray))
     ends = float(distance[nearest[1], nearest[0]])
-    if height <= max(known, _ROUNDING * reach) and reach <= ends * (1 + 4 * _ROUNDING):
-        raise InputError(
-            f"light {number} is {height:.3g} m from the ray through the centre of the pixel in "
-            f"column {nearest[0]} of "
-            f"row {nearest[1]}: the airlight there, which grows like 1/distance, is infinite; move "
-            "the light or the "
-            "camera, or take another size"
-        )
+    if height > max(known, _ROUNDING * reach) or reach > ends * (1 + 4 * _ROUNDING):
+        return ""
+    return (
+        f"{name} is {height:.3g} m from the ray through the centre of the pixel in column "
+        f"{nearest[0]} of row {nearest[1]}: the airlight there, which grows like 1/distance, is "
+        "infinite; move the light or the camera, or take another size"
+    )
+
+
+def _extinguishes(scene: Scene, away: Array) -> bool:
+    """Return whether something is extinguished at a light, so far from the camera [m]."""
+    Vector = type(scene.camera.origin)
+    reach = float(np.linalg.norm(away))
+    # At the camera itself any direction will do.
+    way = Vector(*map(float, away / reach)) if reach else scene.camera.forward
+    rays = scene.medium.rays(scene.camera.origin, way)
+    # On either side of the light: it may lie in the border of the medium.
+    places = (reach * (1 + side * 4 * _ROUNDING) for side in (-1, 1))
+    return any(
+        float(np.max(sigma_t)) > 0
+        for place in places
+        for sigma_t in scene.medium.extinction(rays, type(way.x)(place))
+    )

@@ -45,7 +45,7 @@ def render_samples(
 
     `renderer`: from `realtime.frame.renderer.frame_renderer`. The method prepares the scene again
     for each ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the
-    fraction done. Returns `Frame`: mean radiances; the distance is that of the first ray.
+    fraction done. Returns `Frame`: means of all layers; the distance is that of the first ray.
     """
     camera, frame = renderer.scene.camera, None
     for number, (right, down) in enumerate(pixel_offsets(samples), 1):
@@ -53,21 +53,22 @@ def render_samples(
         # each sample has its own random numbers
         numbered = replace(renderer, frame=renderer.frame + number - 1)
         last = render_frame(replace(numbered, scene=replace(renderer.scene, camera=beside)))
-        airlight, surface = (
-            np.asarray(layer, dtype=np.float64) / samples for layer in (last.airlight, last.surface)
-        )
         if samples == 1:
             return last
-        frame = (
-            Frame(airlight, surface, last.distance)
-            if frame is None
-            else _sum(frame, airlight, surface)
+        airlight, surface, *extra = (
+            np.asarray(layer, dtype=np.float64) / samples
+            for layer in (last.airlight, last.surface, *last.extra.values())
         )
+        part = Frame(airlight, surface, last.distance, dict(zip(last.extra, extra)))
+        frame = part if frame is None else _sum(frame, part)
         if progress is not None:
             progress(number / samples)
     assert frame is not None
     return frame
 
 
-def _sum(frame: Frame, airlight, surface) -> Frame:
-    return replace(frame, airlight=frame.airlight + airlight, surface=frame.surface + surface)
+def _sum(frame: Frame, part: Frame) -> Frame:
+    extra = {name: layer + part.extra[name] for name, layer in frame.extra.items()}
+    return Frame(
+        frame.airlight + part.airlight, frame.surface + part.surface, frame.distance, extra
+    )

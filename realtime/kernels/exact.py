@@ -388,7 +388,8 @@ def range_of_v(geometry: RayGeometry, x0, x1, sigma_t, scale=1.0, tail=1.0):
     # sinh(v1 - v0) = F1 C0 - F0 C1 = (F1^2 - F0^2)/(F1 C0 + F0 C1), whose one difference, F1 - F0,
     # `path_interval` gives without cancellation.
     f0, f1 = e0 / scale, e1 / scale
-    c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
+    # The square of F1 may overflow: rays straight away from a light that they all but pass.
+    c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.select(f1 > 1e9, f1, dr.sqrt(dr.fma(f1, f1, 1)))
     return h, (f0, c0), dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
 
 

@@ -308,7 +308,7 @@ def _fillings(
     albedos = albedos[:1] if grey else albedos
     fillings, factors = [], np.ones_like(albedos)
     # Each pair of a phase function and an albedo in any channel of any cloud is one medium of
-    # slabs, and one table of transport. A cloud that scatters nothing, and has the albedo 0, needs none.
+    # slabs, and one table of transport. A cloud of the albedo 0 scatters nothing, and needs none.
     for phase, albedo in sorted(
         {(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}
     ):

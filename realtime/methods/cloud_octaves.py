@@ -42,7 +42,7 @@ from airlight.realtime.clouds.single_scattering import (
 )
 from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from airlight.realtime.methods.interface.method import Layers, Method, View
-from airlight.realtime.parameters import parameter
+from airlight.realtime.parameters import MOST_STEPS, parameter
 from airlight.realtime.scene.media.bounded import Clouds
 from airlight.realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
 from airlight.realtime.scene.read_scene import Scene
@@ -106,7 +106,7 @@ class CloudOctaves(Method):
         check=_check_phase,
         wanted="scene, isotropic, hg:G or hg-draine:DIAMETER",
     )
-    steps: int = parameter(32, "steps of every ray", least=1)
+    steps: int = parameter(32, "steps of every ray", least=1, most=MOST_STEPS)
     stride: float = parameter(
         1.0,
         "longest step through a grid of densities where a ray enters",

@@ -31,7 +31,7 @@ from airlight.realtime.methods.interface.marching import marched_steps
 from airlight.realtime.methods.interface.method import Layers, Method, View, animate
 from airlight.realtime.numerics.functions import summed
 from airlight.realtime.numerics.noise import PATTERNS
-from airlight.realtime.parameters import parameter
+from airlight.realtime.parameters import MOST_STEPS, parameter
 from airlight.realtime.scene.light_table import light_choice
 from airlight.realtime.scene.lights import Light
 
@@ -57,7 +57,7 @@ class EquiAngular(Method):
     by_rays = True
     at_once = True
 
-    samples: int = parameter(1, "samples of every ray", least=1)
+    samples: int = parameter(1, "samples of every ray", least=1, most=MOST_STEPS)
     jitter: str = parameter(
         "white",
         "noise of the samples: white, a mask of blue noise, or interleaved gradient noise",

@@ -38,7 +38,7 @@ from airlight.errors import InputError
 from airlight.realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
 from airlight.realtime.methods.interface.method import Method, animate, jitter, no_state
-from airlight.realtime.parameters import parameter
+from airlight.realtime.parameters import MOST_STEPS, parameter
 from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.shadow_maps.shadow_map import (
     cast_shadow_maps,
@@ -70,7 +70,7 @@ class RayMarch(Method):
     by_rays = True
     by_table = True
 
-    steps: int = parameter(100, "steps of every ray and light", least=1)
+    steps: int = parameter(100, "steps of every ray and light", least=1, most=MOST_STEPS)
     spacing: str = parameter(
         "equiangular",
         "in the angle at the light, or in the distance",

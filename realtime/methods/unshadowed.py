@@ -30,7 +30,7 @@ import drjit as dr
 
 from airlight.errors import InputError
 from airlight.realtime.methods.interface.method import Layers, Method
-from airlight.realtime.numerics.functions import exp_expm1_bounded
+from airlight.realtime.numerics.functions import opacity
 from airlight.realtime.parameters import parameter
 
 _EXPONENTS = {"wenzel": 0, "quilez": 8, "unreal": 4}  # of the cosine about a sun
@@ -42,7 +42,7 @@ class Unshadowed(Method):
 
     Valid for any scene without occluders between a light and a visible part of the medium;
     elsewhere it shows how much light the volumetric shadows take away. Bounded media have their own
-    nodes, except with a polynomial kernel.
+    nodes; lights at places take the kernel `exact` alone there.
 
     References
     ----------
@@ -118,10 +118,7 @@ class Unshadowed(Method):
         # `quilez` has F = min(tau, 1): multiply by min(tau, 1) / (1 - exp(-tau)) in each channel.
         # The limit at tau = 0 is 1.
         depths = medium.optical_depth(view, 0, end)
-        corrections = [
-            dr.select(tau > 0, dr.minimum(tau, 1) / -exp_expm1_bounded(-tau)[1], 1)
-            for tau in depths
-        ]
+        corrections = [dr.select(tau > 0, dr.minimum(tau, 1) / opacity(tau), 1) for tau in depths]
         return radiance * medium.colour(corrections)
 
     def airlight(self, view, light, state, kernel):

@@ -122,6 +122,11 @@ def exp_expm1_bounded(x):
     return dr.fma(scale, rest, scale), dr.fma(scale, rest, scale - 1)
 
 
+def opacity(depth):
+    """Return 1 - exp(-depth) without the cancellation beside 0; valid as `exp_expm1_bounded`."""
+    return -exp_expm1_bounded(-depth)[1]
+
+
 def exp2_bounded(x):
     """Return 2^x for float32 lanes on a processor, `drjit.exp2` elsewhere.
 

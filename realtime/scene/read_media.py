@@ -350,12 +350,15 @@ def _filling(medium, grid: DensityGrid | None, types: ArrayTypes) -> Homogeneous
     return Homogeneous((largest,), _constant_albedo(medium, types), phase)
 
 
-def _constant_albedo(medium, types: ArrayTypes):
-    """Return the albedo of a medium, a colour that is the same everywhere."""
+def _constant_albedo(medium, types: ArrayTypes, extinguishes: Any = True):
+    """Return the albedo of a medium, a colour that is the same everywhere; 0 where nothing
+    `extinguishes`: such a channel needs no transport.
+    """
     _require_constant(medium, "albedo")
     albedo = np.broadcast_to(
         np.array(mi.traverse(medium)["albedo.value.value"], dtype=np.float64).reshape(-1), 3
     )
+    albedo = np.where(extinguishes, albedo, 0)
     _check_albedo(albedo)
     color = types.color(*(float(value) for value in albedo))
     dr.make_opaque(color)
@@ -441,24 +444,17 @@ def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     if not medium.is_homogeneous():
         raise InputError("the medium is heterogeneous; expected a medium of type 'homogeneous'")
-    _require_constant(medium, "sigma_t", "albedo")
-    sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
-    dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it
-    # The albedo is the quotient of both coefficients, 0 where nothing is extinguished.
-    scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
+    _require_constant(medium, "sigma_t")
+    _, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
     _check_coefficient("sigma_t", extinction)
-    _check_coefficient("sigma_s = albedo sigma_t", scattering)
-    albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
-    _check_albedo(albedo)
     # Grey media compute with one extinction instead of three.
     grey = extinction[0] == extinction[1] == extinction[2]
     sigma = tuple(
         dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction)
     )
-    color = types.color(*(float(value) for value in albedo))
-    dr.make_opaque(color)
-    return Homogeneous(sigma, color, _read_phase(medium.phase_function(), types))
+    phase = _read_phase(medium.phase_function(), types)
+    return Homogeneous(sigma, _constant_albedo(medium, types, extinction > 0), phase)
 
 
 def _read_phase(phase, types: ArrayTypes) -> Phase:

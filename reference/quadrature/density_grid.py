@@ -210,9 +210,10 @@ class GridField:
         ray, low, high = stretches
         inside = ray, np.maximum(low, near[ray]), np.minimum(high, far[ray])
 
-        def source(lit: Stretches) -> "_Integrand":
+        def source(lit: Stretches) -> "_Integrand | None":
             pieces = cut(whole(lit), self._faces(rays, lit[0], near, far))
-            return self._integrand(rays, pieces, terms)
+            pieces = pieces[self._filled(rays, pieces)]
+            return self._integrand(rays, pieces, terms) if len(pieces.ray) else None
 
         return sum_stretches(rays, inside, source, terms, rtol=1e-6, step=2048)
 
@@ -238,6 +239,27 @@ class GridField:
             crossings.append((ray[owner], (plane - origin[owner, axis]) / rate[owner]))
         rays_of, places = (np.concatenate(column) for column in zip(*crossings, strict=True))
         return rays_of, places
+
+    @cached_property
+    def _cells(self) -> NDArray[np.bool_]:
+        """Whether a voxel at a corner of a cell has extinction, by cell (z, y, x); the cells before
+        the first centres and behind the last ones, too.
+        """
+        filled = np.pad(self.medium.values > 0, 1, mode="edge")
+        for axis in range(3):
+            ends = np.moveaxis(filled, axis, 0)
+            filled = np.moveaxis(ends[1:] | ends[:-1], 0, axis)
+        return filled
+
+    def _filled(self, rays: Rays, pieces: Pieces) -> NDArray[np.bool_]:
+        """Return which pieces lie in cells that are not empty; a lamp in an empty one may lie on a
+        ray.
+        """
+        origin = np.broadcast_to(rays.origin, rays.direction.shape)[pieces.ray]
+        middle = (0.5 * (pieces.x0 + pieces.x1))[:, None] * rays.direction[pieces.ray]
+        cell = np.floor(self.medium.voxels(origin + middle)).astype(np.int64) + 1
+        x, y, z = np.clip(cell, 0, self.medium.values.shape[::-1]).T
+        return self._cells[z, y, x]
 
     def _integrand(self, rays: Rays, pieces: Pieces, terms: Terms) -> "_Integrand":
         count = len(pieces.ray)

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import mitsuba as mi
 import numpy as np
@@ -38,6 +39,7 @@ from numpy.typing import NDArray
 from airlight.analytic.clock import stopwatch
 from airlight.analytic.geometry import foot_and_height
 from airlight.errors import InputError
+from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.quadrature.image import Progress, ReferenceImage, quadrature_image
 from airlight.reference.quadrature.replicates import Keep, PointPlan
 from airlight.reference.quadrature.replicates import Kept as Part
@@ -46,6 +48,7 @@ from airlight.reference.scene.convex_bounds import holds
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.point_light import ReferenceLight
 from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.scene.varying import GridMedium, HeightMedium
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
 
@@ -281,7 +284,18 @@ def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
     # A light within a bounded medium is in that medium, else in the one around all.
     inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else reference.medium
-    return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
+    largest = medium.largest
+    # A light above the cap of height fog, or in an empty part of a grid, is in none. Its place is
+    # known to the rounding of coordinates.
+    if isinstance(medium, HeightMedium | GridMedium):
+        corners = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+        places = light.position + _uncertainty(reference, light) * corners
+        largest = (
+            medium.extinction(places)
+            if isinstance(medium, GridMedium)
+            else fog_of(medium).density(places @ medium.up)
+        ).max()
+    return bool(np.any(largest * medium.albedo * light.intensity > 0))
 
 
 def _looks_along(light: ReferenceLight, direction: Array) -> NDArray[np.bool_]:

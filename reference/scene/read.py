@@ -42,7 +42,7 @@ from airlight.reference.scene.homogeneous_medium import (
 from airlight.reference.scene.medium_around import grid_in_a_shape, read_ambient
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.point_light import ReferenceLight, read_point_light
-from airlight.reference.scene.shape_roles import scene_of, sorted_shapes
+from airlight.reference.scene.shape_roles import scene_from, scene_of, sorted_shapes
 from airlight.reference.scene.varying import NO_EXTINCTION, HeightMedium, VaryingMedium
 
 Array = NDArray[np.float64]
@@ -225,16 +225,9 @@ def whole_scene(reference: ReferenceScene) -> "mi.Scene":
 
 
 def _rebuilt(scene: "mi.Scene", emitters: "list[mi.Emitter]") -> "mi.Scene":
-    """Return a scene with other emitters; all parts keep their names."""
-    parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
-    names = [part.id() for part in parts]
-    # Mitsuba names the parts of a dictionary by their keys: the old names are given back.
-    built = mi.load_dict(
-        {"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)}
-    )
-    for part, name in zip(parts, names, strict=True):
-        part.set_id(name)
-    return built
+    """Return a scene with other emitters."""
+    others = (each for each in emitters if not is_area(each))
+    return scene_from([*scene.sensors(), *others, *scene.shapes()])
 
 
 def has_mirrors(reference: ReferenceScene) -> bool:

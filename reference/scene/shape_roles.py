@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shapes of a scene: opaque ones, boundaries of media, and scenes of some of them."""
 
+from collections.abc import Sequence
+
 import mitsuba as mi
 import numpy as np
 
@@ -52,17 +54,13 @@ def scene_of(shapes: "list[mi.Shape]", whole: "mi.Scene") -> "mi.Scene":
     return whole if len(shapes) == len(whole.shapes()) else scene_from(shapes)
 
 
-def scene_from(shapes: "list[mi.Shape]") -> "mi.Scene":
-    """Return a scene of some shapes, which keep their names if these can be keys of a dictionary of
-    Mitsuba.
-    """
-    # The key of a shape becomes its name, in the whole scene too.
-    names = {shape.id() for shape in shapes}
-    are_keys = len(names) == len(shapes) and not any("." in name or not name for name in names)
-    return mi.load_dict(
-        {"type": "scene"}
-        | {
-            shape.id() if are_keys else f"shape{number}": shape
-            for number, shape in enumerate(shapes)
-        }
+def scene_from(parts: "Sequence[mi.Object]") -> "mi.Scene":
+    """Return a scene of parts of another one, such as shapes, which keep their names."""
+    names = [part.id() for part in parts]
+    # Mitsuba names the parts of a dictionary by their keys: the old names are given back.
+    scene = mi.load_dict(
+        {"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)}
     )
+    for part, name in zip(parts, names, strict=True):
+        part.set_id(name)
+    return scene

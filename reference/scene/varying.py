@@ -129,8 +129,9 @@ class GridMedium(VaryingMedium):
         return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
 
     def extinction(self, point: Array) -> Array:
-        """Return the extinction at places in the box, (n,) [1/m]."""
-        return _trilinear(self.values, self.voxels(point))
+        """Return the extinction at places, (n, 3) [m], 0 out of the box, (n,) [1/m]."""
+        inside = np.all((point >= self.low) & (point <= self.high), axis=-1)
+        return np.where(inside, _trilinear(self.values, self.voxels(point)), 0.0)
 
     def voxels(self, point: Array) -> Array:
         """Return places in voxels from the centre of the first, (n, 3)."""

@@ -161,6 +161,7 @@ def capture(
     from airlight.reference.storage.exr import Image, write_exr
     from airlight.reference.storage.files import temporary_folder
     from airlight.reports.api.explore import Description, describe
+    from airlight.reports.engines.record import UNKNOWN
     from airlight.validation.scenes.models import model_of, model_words
 
     with telling(progress, f"{scene} in {engine}") as tell, temporary_folder() as folder:
@@ -182,6 +183,7 @@ def capture(
     made |= {"pixel": told.pixel or ""}
     made |= {"settings": json.dumps(told.settings), "edits": json.dumps(edits) if edits else ""}
     made |= {"model": model_words(model) if model and not model.is_physical else ""}
+    made |= {"equation": "" if model else UNKNOWN}
     attributes = {f"airlight:{name}": words for name, words in made.items() if words}
     write_exr(file, stamped(Image(image.layers, attributes=attributes)))
     return Capture(

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from airlight.validation.check.check_file import Asked
     from airlight.validation.check.judge import Kept
 
+_SIZE = (64, 48)  #: of frames that are rendered here [pixels]
 # Relative rounding of a value by the precision of a method: places of 32 m are known to 2e-6 m in
 # float32, and the airlight of a ray that passes a light closely follows them.
 _ROUNDING = {"single": 2e-4, "double": 1e-6}
@@ -108,7 +109,7 @@ def check(
     engine: str | None = None,
     adapters: File | None = None,
     only: Words = (),
-    size: Size = "64x48",
+    size: Size = _SIZE,
     precision: Literal["single", "double"] | None = None,
     margin: float | None = None,
     progress: Progress = None,
@@ -195,7 +196,7 @@ def check(
         with telling(progress, f"{what}: {equation.title}") as tell:
             return _model(str(what), equation, chosen, pixels, margin, tell)
     if method is None:
-        others = {"kernel": kernel, "precision": precision, **parameters}
+        others = {"kernel": kernel, "precision": precision, "size": pixels != _SIZE, **parameters}
         exclude("check", "without a method the frames are there already", others)
         return _files(Path(what), chosen, margin)
     asked = configuration_of(method, kernel, parameters)
@@ -336,7 +337,7 @@ def _engine(
         capture_of = partial(capture, engine, output=file, adapters=adapters)
         # The scene as it is says which edge the spots of the engine have, and whether it has noise.
         first = capture_of(scene, size=size, settings=dict(settings))
-        edge = "linear" if first.model is None else _edge(model_of(first.model))
+        edge = None if first.model is None else _edge(model_of(first.model))
         seed = first.settings.get("seed")
 
         def frame(changed: Any, number: int) -> "dict[str, Array]":
@@ -360,19 +361,24 @@ def _rendered(
     margin: float | None,
     tell: Any,
     *,
-    falloff: str = "linear",
+    falloff: str | None = "linear",
 ) -> RelationsKept:
     """Judge the frames of changed scenes; `frame` returns the layers of one, by its number, and
-    `falloff` is that of spots to the edge of their cones.
+    `falloff` is that of spots to the edge of their cones, None where it is not known.
     """
     from airlight.validation.check.judge import judge, signature
     from airlight.validation.check.variants import variants
 
-    made = variants(scene, size, falloff)
+    made = variants(scene, size, falloff or "linear")
     asked = _chosen(made.asked, only, made.again)
     names = dict.fromkeys((*made.again, *(name for each in asked for name in each.frames)))
     frames, refused = {}, dict[str, str]()
+    if falloff is None:  # the camera in the place of a spot has its edge
+        why = "the engine does not say which equation it solves, nor which edge its spots have"
+        refused |= {"seen": why, "swapped": why}
     for number, name in enumerate(names):
+        if name in refused:
+            continue
         tell(number / len(names), name)
         try:
             frames[name] = _layers(frame(made.scenes[name](), number))

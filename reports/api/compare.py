@@ -99,7 +99,7 @@ def compare(
         values, (height, width).
     margin
         Largest relative bias that counts as agreement, such as 0.005; two images need standard
-        errors for it, or the bound that a reference states.
+        errors for it, or an error that a file states.
     margin_total
         With a model: the same against the physical equation.
     model

@@ -134,7 +134,8 @@ def report_on_engines(
         for one in value
         for word in ("--set", f"{name}.{one}")
     ]
-    for name, value in {"images": images, "size": size, "adapters": adapters}.items():
+    asked_size = None if size is None else f"{pixels[0]}x{pixels[1]}"
+    for name, value in {"images": images, "size": asked_size, "adapters": adapters}.items():
         words += [f"--{name}", str(value)] if value is not None else []
     wanted = Wanted(
         engines=tuple(chosen),

@@ -177,7 +177,7 @@ class Description(Result):
             cut = ", ".join(self.gltf["tessellated"])
             more = f"; cut into triangles: {cut}" if cut else ""
             lines.append(f"{self.gltf['path']}: {self.gltf['triangles']} triangles{more}")
-        lines += [f"{self.pbrt[0]}: the scene for pbrt-v4"] if self.pbrt else []
+        lines += [f"{path}: the scene for pbrt-v4" for path in self.pbrt]
         return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
 
     def to_dict(self) -> dict[str, Any]:

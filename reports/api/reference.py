@@ -69,8 +69,8 @@ def reference(
         A built-in scene, random:SEED or a Mitsuba XML or pbrt file; from Python also what
         `load_scene` takes or returns.
     estimator
-        quadrature has an error in every pixel, proven or estimated. single-scatter and volpath use random samples
-        and have standard errors. cloud-paths is for clouds, in which light scatters many times.
+        quadrature has an error in every pixel: proven, estimated or statistical. single-scatter and volpath use
+        random samples and have standard errors. cloud-paths is for clouds, in which light scatters many times.
     change
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size

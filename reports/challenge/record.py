@@ -20,6 +20,7 @@ from airlight.reports.challenge.number import (
     rounded,
     rounded_out,
 )
+from airlight.reports.challenge.seed import check_seed
 from airlight.reports.data.records import read_versioned
 from airlight.validation.columns import plain
 
@@ -142,6 +143,7 @@ def read_score(file: Path) -> Score:
     score = read_versioned(file, Score, SCHEMA, wanted, "score again")
     if not (score.scenes and _DIGEST.fullmatch(score.digests.scenes)):
         raise InputError(f"{file} has no scenes, or no digest of them; score again")
+    check_seed(score.entry.seed, score.entry.entry, str(file))
     black = (BLACK.error, BLACK.low, BLACK.high)
     for scene in score.scenes:
         if scene.cannot and (scene.error, *scene.interval) != black:

@@ -19,8 +19,8 @@ def list(
     """List the built-in scenes, methods, kernels, models, studies and papers.
 
     The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
-    The list of models has the equations of engines for `--model`: their parameters, their terms, what
-    was read, no engine being run, and what was not checked.
+    The list of models has the equations of engines for `--model`: their parameters, their terms, the
+    version that was read, and what was not checked.
 
     Parameters
     ----------

@@ -195,9 +195,9 @@ def _command(
         )
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
     # Commands whose result is a file have -o added here; others declare `output` themselves. A
-    # study writes its data by -o and has no --json; neither have three commands.
+    # study writes its data by -o and has no --json; nor have commands without a result.
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
-    if function not in (view, run_tests, export, completion) and ".json" not in endings:
+    if function not in (view, run_tests, completion) and ".json" not in endings:
         extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False

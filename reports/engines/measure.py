@@ -23,6 +23,7 @@ from airlight.reports.engines.record import (
     MISSING,
     PAGE,
     SCHEMA,
+    UNKNOWN,
     Captured,
     Cell,
     Engines,
@@ -40,6 +41,7 @@ from airlight.validation.columns import record_of
 from airlight.validation.engine.diagnose import diagnose_file
 from airlight.validation.engine.images import captured_model
 from airlight.validation.engine.judge import errors_of, judge_image, references
+from airlight.validation.engine.model_errors import PartError
 from airlight.validation.engine.observation import AIRLIGHT, SURFACE, judged_layer
 from airlight.validation.estimates.quadrature import reference_layer
 from airlight.validation.scenes.loading import LoadedScene, load_scene
@@ -175,6 +177,7 @@ def _judged(
 ) -> Cell:
     """Return a cell with the errors of its image, and its pictures."""
     image, model = read_exr(file), captured_model(file) or PHYSICAL
+    captured = captured_of(image)
     solving = replace(loaded, model=model)
     reference_of = references(solving)
     layers = []
@@ -185,23 +188,26 @@ def _judged(
         if dark and not reference_of("centre").surface.any():
             continue
         compared = judge_image(image, judged, solving, reference_of, path=file)
-        verdict = compared.verdict
+        verdict, errors = compared.verdict, errors_of(compared, judged, solving)
+        # Nobody knows what is of an equation that was not told, and what of its algorithm.
+        if not captured.told:
+            none = PartError(None, None, None)
+            errors = replace(errors, image=none, against_physics=None, correlation=None)
         layers.append(
             LayerErrors(
                 layer=name,
-                errors=errors_of(compared, judged, solving),
+                errors=errors,
                 noise=verdict.block_noise if np.isfinite(verdict.block_noise) else None,
                 right=verdict.right,
                 verdict=verdict.words,
-                place=compared.place.words if compared.place else "",
+                place=compared.place.words if compared.place and captured.told else "",
             )
         )
-    captured = captured_of(image)
     # Pictures of all light: the image, and its errors against physics and against its equation.
     shown = image.layers[AIRLIGHT].astype(np.float64) + image.layers[SURFACE]
     pictures = {"picture": tone_mapped(shown, exposure)}
-    own = _total(reference_of(captured.pixel))
-    pictures["algorithm"] = error_map(own, shown)
+    if captured.told:
+        pictures["algorithm"] = error_map(_total(reference_of(captured.pixel)), shown)
     with suppress(InputError):  # a sun in fog without bounds has no physical image
         pictures["error"] = error_map(_total(physical_of(captured.pixel)), shown)
     files = {"image": file.name}
@@ -235,6 +241,7 @@ def captured_of(image: Image) -> Captured:
         pixel=said("pixel", "centre"),
         settings=settings,
         edits=tuple(edits),
+        told=bool(said("engine")) and said("equation") != UNKNOWN,
     )
 
 

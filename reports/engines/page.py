@@ -99,7 +99,12 @@ def strip_bytes(data: Engines, folder: Path) -> bytes:
     upper = [(f"the reference\n{name}", _read(folder, scene.files["picture"]))]
     upper += [(title, _read(folder, cell.files["picture"])) for title, cell in zip(titles, cells)]
     lower = [("against its\nown equation:", _blank(upper[0][1]))]
-    lower += [(_words(cell, "algorithm"), _read(folder, cell.files["algorithm"])) for cell in cells]
+    lower += [
+        (_words(cell, "algorithm"), _read(folder, cell.files["algorithm"]))
+        if cell.told
+        else ("not known", lower[0][1])
+        for cell in cells
+    ]
     figure = picture_grid([*upper, *lower], "double", across=len(upper))
     return file_bytes(figure, ".png", dpi=200)
 

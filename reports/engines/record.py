@@ -18,6 +18,7 @@ CANNOT: Final = "cannot"  #: the engine refuses the scene
 MISSING: Final = "missing"  #: a program is not on the machine, or an image not in the folder
 FAILED: Final = "failed"
 Status = Literal["judged", "cannot", "missing", "failed"]
+UNKNOWN: Final = "unknown"  #: of the equation in the header of a capture
 #: Words before the reason of a cell without an image.
 STATUS_WORDS = {CANNOT: "cannot have it", MISSING: "not run", FAILED: "failed"}
 
@@ -32,6 +33,7 @@ class Captured:
     pixel: str  #: of what the values are: 'centre' or 'area'
     settings: Mapping[str, Any]  #: by the engine's names
     edits: tuple[str, ...]  #: changes of its shaders
+    told: bool = True  #: whether it says which equation its settings mean; else physics judges it
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,11 @@ class Cell:
     def title(self) -> str:
         """The engine with its version."""
         return f"{self.captured.engine} {self.captured.version}" if self.captured else self.engine
+
+    @property
+    def told(self) -> bool:
+        """Whether the engine says which equation it solves."""
+        return self.captured is not None and self.captured.told
 
     def layer(self, name: str) -> LayerErrors | None:
         """Return the errors of a layer; None where it was not judged."""

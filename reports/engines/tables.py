@@ -3,7 +3,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from airlight.reports.engines.record import JUDGED, STATUS_WORDS, Cell, Engines, LayerErrors
+from airlight.reports.engines.record import CANNOT, JUDGED, STATUS_WORDS, Cell, Engines, LayerErrors
 from airlight.reports.tables.table import Column, Row, Table, Value, Verdict, number, numbers, words
 from airlight.reports.tables.table import table as table_of_rows
 
@@ -29,7 +29,8 @@ def engines_table(data: Engines) -> Table:
         values: dict[str, Value] = {"scene": cell.scene, "engine": data.title_of(cell.engine)}
         if layer is None:
             return Row(values, reason=f"{STATUS_WORDS[cell.status]}: {cell.reason}")
-        judged: dict[str, Value] = {"layer": layer.layer, "right": Verdict(layer.right)}
+        right = Verdict(layer.right) if cell.told else None
+        judged: dict[str, Value] = {"layer": layer.layer, "right": right}
         return Row(values | judged | layer.blocks)
 
     rows = [row(cell, layer) for cell in data.cells for layer in cell.layers or (None,)]
@@ -74,6 +75,7 @@ def _sentence(data: Engines, engine: str) -> Iterator[str]:
     layers = [layer for cell in judged if (layer := cell.layer("airlight"))]
     if not layers:
         return
+    scenes = f"{len(layers)} scene{'' if len(layers) == 1 else 's'}"
     # Two ranges and two counts.
     found = [layer.blocks["equation"] for layer in layers]
     known = {error for error in found if error is not None}
@@ -83,13 +85,16 @@ def _sentence(data: Engines, engine: str) -> Iterator[str]:
     elif any(known):
         equation = f"its equation is {_range(found)} off physics"
     algorithm = _range([layer.blocks["algorithm"] for layer in layers])
-    scenes = f"{len(layers)} scene{'' if len(layers) == 1 else 's'}"
     right = sum(layer.right for layer in layers)
     words = (
         f"{judged[0].title} in {scenes}: {equation}, its images are {algorithm} off its equation"
     )
     words += f", and {right} of {len(layers)} right by it"
-    others = len(cells) - len(judged)
+    if not any(cell.told for cell in judged):
+        total = _range([layer.blocks["total"] for layer in layers])
+        words = f"{judged[0].title} in {scenes}: its equation is not known, and its images are "
+        words += f"{total} off physics"
+    others = sum(cell.status == CANNOT for cell in cells)
     yield f"{words}; {others} more it does not have." if others else f"{words}."
 
 

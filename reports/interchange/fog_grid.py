@@ -3,8 +3,8 @@
 
 A grid is linear between the middles of its voxels, and constant beyond the outermost. Linear
 interpolation of an exponential is too dense by (u/2)/tanh(u/2), u = dz/H, in every cell alike:
-nodes times tanh(u/2)/(u/2) have the optical depth of the layer between any two of them. With dz =
-H/20 densities differ by 2e-4 at the nodes.
+nodes times tanh(u/2)/(u/2) have the optical depth of the layer between any two of them, but for
+the cell in which a clamped layer begins. With dz = H/20 densities differ by 2e-4 at the nodes.
 """
 
 from html import escape

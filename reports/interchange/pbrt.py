@@ -14,7 +14,6 @@ height; its grids are not written.
 """
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,6 @@ from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.transforms import matrix_of
 from airlight.reference.scene.varying import VaryingMedium
 from airlight.reference.storage.build import build
-from airlight.reference.storage.files import write_text
 from airlight.reports.interchange.cut import cut_by
 from airlight.reports.interchange.meshes import ShapeMesh, shape_mesh
 from airlight.reports.interchange.scene import describe_scene, scene_as_it_is, surface
@@ -41,32 +39,11 @@ from airlight.validation.scenes.pbrt.sides import backs_are_lit, is_closed
 Array = NDArray[np.float64]
 
 
-def write_pbrt(path: Path, loaded: LoadedScene) -> tuple[Path, ...]:
-    """Write a scene as a file of pbrt-v4, whole or not at all; its meshes stand in it.
-
-    Parameters
-    ----------
-    path
-        The file to write, which ends in .pbrt.
-    loaded
-        The scene.
-
-    Returns
-    -------
-    tuple
-        The files that were written: this one alone.
-
-    Raises
-    ------
-    InputError
-        For a scene that pbrt cannot render as it is, with the name of what is in the way.
-    """
-    write_text(path, pbrt_scene(loaded))
-    return (path,)
-
-
 def pbrt_scene(loaded: LoadedScene) -> str:
-    """Return the text of a scene for pbrt-v4; raises InputError where pbrt cannot render it."""
+    """Return the text of a scene for pbrt-v4; its meshes stand in it.
+
+    Raises InputError where pbrt cannot render it as it is, with the name of what is in the way.
+    """
     if not loaded.model.is_physical:
         raise InputError(
             f"pbrt: the scene names the equation of {loaded.model.title}, and pbrt solves that of "

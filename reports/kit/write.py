@@ -10,7 +10,7 @@ from airlight.errors import InputError
 from airlight.reference.storage.build import build
 from airlight.reference.storage.files import ensure_folder, write_text
 from airlight.reports.interchange.gltf import write_gltf
-from airlight.reports.interchange.pbrt import write_pbrt
+from airlight.reports.interchange.pbrt import pbrt_scene
 from airlight.reports.kit.godot import PROJECT, godot_cannot, godot_scene
 from airlight.reports.kit.languages import DOUBLE_REASON, TEMPLATES, language_files, templates
 from airlight.reports.kit.mitsuba import mitsuba_xml
@@ -97,11 +97,11 @@ def _write_scene(folder: Path, scene: KitScene) -> WrittenScene:
     write_gltf(place / "scene.glb", loaded)
     written = [*files, "scene.glb"]
     try:
-        paths = write_pbrt(place / "scene.pbrt", loaded)
+        write_text(place / "scene.pbrt", pbrt_scene(loaded))
     except InputError as error:
         gaps.insert(0, f"no scene.pbrt: {error}")
     else:
-        written += [path.name for path in paths]
+        written.append("scene.pbrt")
     names = tuple(f"scenes/{scene.name}/{name}" for name in written)
     return WrittenScene(scene.name, scene.words, names, tuple(gaps))
 

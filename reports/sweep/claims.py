@@ -70,8 +70,7 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     # only at one.
     measured = sample.measured
     finite = measured & (sample.nonfinite == 0)
-    surely = finite & (sample.errors + sample.reference_errors <= target)
-    possibly = finite & (sample.errors <= target + sample.reference_errors)
+    surely, possibly = finite & (sample.most <= target), finite & (sample.least <= target)
     # Faults are tries that missed; refusals and scenes without a reference are none.
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())

@@ -222,9 +222,9 @@ class Sample:
     #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN
     #: where nothing was measured.
     errors: Numbers = field(repr=False)
-    #: The reference's own, over its mean [1]: infinite where it is not known, 0 where it is black;
-    #: more where that of another medium lets a smaller error reach farther.
-    reference_errors: Numbers = field(repr=False)
+    #: The same at least and at most, as far as the references of all cells of a scene tell.
+    least: Numbers = field(repr=False)
+    most: Numbers = field(repr=False)
     nonfinite: Numbers = field(repr=False)  #: pixels with NaN or infinity, in all cells of a scene
     times: Numbers = field(repr=False)  #: of a frame [ms], see `comparable_times`; NaN elsewhere
 
@@ -248,11 +248,13 @@ def samples(sweep: Sweep) -> list[Sample]:
     # Columns as arrays, one entry a row.
     labels, scenes, statuses = sweep["label"], sweep["scene"], _statuses(sweep)
     methods, errors = sweep["method"], errors_of(sweep)
-    # An error that is not known may be anything. A black reference has no relative error: what is
-    # compared with it is black or not.
-    black = sweep["reference.mean"] == 0
+    # An error of a reference that is not known may be anything. A black reference has no relative
+    # error: what is compared with it is black or not. What is infinite is so for any reference.
+    decided = (sweep["reference.mean"] == 0) | np.isinf(errors)
     reference_errors = np.nan_to_num(sweep["reference.error"], nan=np.inf)
-    reference_errors = np.where(black, 0.0, reference_errors)
+    reference_errors = np.where(decided, 0.0, reference_errors)
+    # A scene is within an error only where each of its cells is: the largest ends count.
+    ends = errors - reference_errors, errors + reference_errors
     nonfinite = np.nan_to_num(sweep["error.nonfinite"], nan=0.0)
     times = np.where(comparable_times(sweep), sweep[FRAME_MS], np.nan)
     # Random scenes are a sample; chosen ones count only where there are no others (see the module).
@@ -283,6 +285,9 @@ def samples(sweep: Sweep) -> list[Sample]:
         worst = tuple(max(rows, key=badness.__getitem__) for rows in group.values())
         places = list(worst)
         known = times[places][np.isfinite(times[places])]
+        least, most = (
+            np.array([np.fmax.reduce(end[rows]) for rows in group.values()]) for end in ends
+        )
         made.append(
             Sample(
                 label=whole,
@@ -295,28 +300,13 @@ def samples(sweep: Sweep) -> list[Sample]:
                 rows=worst,
                 statuses=tuple(statuses[places]),
                 errors=errors[places],
-                reference_errors=np.array(
-                    [
-                        _reach(errors[rows], reference_errors[rows], float(errors[place]))
-                        for rows, place in zip(group.values(), worst)
-                    ]
-                ),
+                least=least,
+                most=most,
                 nonfinite=np.array([nonfinite[rows].sum() for rows in group.values()]),
                 times=times[places],
             )
         )
     return made
-
-
-def _reach(errors: Numbers, reference_errors: Numbers, worst: float) -> float:
-    """Return by how much the largest error of a scene's cells may exceed the worst that was
-    measured, as far as their references tell.
-    """
-    if not np.isfinite(worst):
-        return 0.0
-    # A scene is within an error only where each of its cells is.
-    tried = ~np.isnan(errors)
-    return float(np.max(reference_errors[tried] - (worst - errors[tried])))
 
 
 def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:

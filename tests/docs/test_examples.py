@@ -273,6 +273,7 @@ def test_scripts_of_engines_refuse_what_they_leave_out(monkeypatch):
     )
     luxcore, cycles = map(importlib.import_module, ("render_luxcore", "cycles_properties"))
     fog = {"sigma_s": [0.1] * 3, "sigma_a": [0.0] * 3, "phase": {"name": "isotropic"}}
+    fog |= {"sigma_t": [0.1] * 3}
     floor = {"name": "floor", "reflectance": [0.5] * 3, "two_sided": True, "diffuse": True}
     plain = {"sky": None, "medium": fog, "surfaces": [floor | {"textured": False}]}
     luxcore.check(plain)
@@ -288,6 +289,14 @@ def test_scripts_of_engines_refuse_what_they_leave_out(monkeypatch):
     scene |= {"camera": axes | {"size": [4, 3], "fov_horizontal": 50.0}}
     assert "phase" in cycles.cycles_properties(scene)["world"]
     assert "sky" in cycles.cycles_properties(scene | {"sky": {}})["world"]["cannot"]
+    # Volumes of Blender add up: the image would have the fog around inside of bounded media too.
+    scene |= {"bounded_media": [fog | {"name": "body"}]}
+    assert "add up" in cycles.cycles_properties(scene)["world"]["cannot"]
+    clear = fog | {"sigma_t": [0.0] * 3, "sigma_s": [0.0] * 3}
+    for around in (None, clear):
+        made = cycles.cycles_properties(scene | {"medium": around})
+        assert "cannot" not in (made["world"] or {})
+        assert made["media"]["body"]["inputs"]["Scatter Coefficients"] == [0.1] * 3
 
 
 @pytest.mark.slow

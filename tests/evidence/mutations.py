@@ -310,8 +310,8 @@ def _segment(change: Callable[..., Any]) -> Wrap:
     """Change the attenuation between light and point: change(media)."""
     return Wrap(
         f"{_TRACED}.boundary_walk:transmittance",
-        lambda function, *arguments, media, active: function(
-            *arguments, media=change(media), active=active
+        lambda function, *arguments, media, **named: function(
+            *arguments, media=change(media), **named
         ),
     )
 

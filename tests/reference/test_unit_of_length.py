@@ -79,6 +79,7 @@ def test_scenes_of_micrometres_are_those_of_decimetres(variant, light):
     assert (small.transitions, small.disagreements) == (usual.transitions, usual.disagreements)
 
 
-def test_the_estimator_walks_through_boundaries_of_micrometres(variant):
-    usual, small = (single_scatter_batch(scene("point", s), 1, 4) for s in (2.0**-4, 2.0**-20))
+@pytest.mark.parametrize("light", ["point", "sun"])
+def test_the_estimator_walks_through_boundaries_of_micrometres(variant, light):
+    usual, small = (single_scatter_batch(scene(light, s), 1, 4) for s in (2.0**-4, 2.0**-20))
     assert np.max(np.abs(small.mean - usual.mean)) < 1e-5 * np.max(usual.mean)

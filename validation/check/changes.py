@@ -154,8 +154,8 @@ def _moved_mesh(mesh: Any, matrix: Array, scale: float) -> Any:
 
 
 def _moved_grid(medium: Any, matrix: Array, scale: float) -> Description:
-    """Return a medium of a density grid, moved: the place of a grid is no
-    parameter, and it is made again.
+    """Return a medium of a density grid, moved: the place of a grid is no parameter, and it is made
+    again. Those of built-in scenes lie along the axes, and belong to one shape.
     """
     inside = mi.traverse(medium)
     box = next(part for part in inside.hierarchy if part.class_name() == "GridVolume").bbox()

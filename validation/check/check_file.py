@@ -131,9 +131,10 @@ class Camera:
                 f"cameras: got a cone of {self.cone} and the falloff {self.falloff!r}; expected "
                 f"degrees, and one of {', '.join(FALLOFFS)}, {_RIM}POWER"
             )
-        # A cone that the frame cuts off has no whole sum.
+        # A cone that the frame cuts off has no whole sum; one that touches its edge is whole, but
+        # for the rounding of a tangent and its inverse.
         shown = math.degrees(math.atan(self._half() * min(1.0, height / width)))
-        if not 0 < self.cone <= shown:
+        if not 0 < self.cone <= shown * (1 + 1e-9):
             raise InputError(
                 f"cameras: got a cone of {self.cone:g} degrees in a frame that shows {shown:.4g} to "
                 "its nearest edge; expected a frame that holds all of the cone"

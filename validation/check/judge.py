@@ -238,7 +238,7 @@ def block_errors(sides: Sides) -> BlockErrors:
         float(np.median(spread[known] / brightness[known])),
         float(np.sqrt(np.mean(scattered**2))),
         float(got[known].sum()) / total if total else math.inf,
-        (int(column_) * size + size // 2, int(row) * size + size // 2),
+        (int((column_ + 0.5) * size * sides.side), int((row + 0.5) * size * sides.side)),
     )
 
 

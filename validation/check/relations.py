@@ -55,6 +55,7 @@ class Sides:
     wanted: Array
     #: by how much sampling alone parts them, pixel by pixel, in their unit
     sampling: Array | float = 0.0
+    side: int = 1  #: of their pixels, in those of the frames
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def _thinned(frames: Sequence[Array], asked: Asked) -> Sides:
     lit = thin > 0.05 * thin.mean()
     # The difference of both is the term that was taken out; less is left.
     one, left = np.where(lit, 1.0, np.nan), np.where(lit, np.abs(second - first), np.nan)
-    return Sides(np.where(lit, ratio, np.nan), one, left)
+    return Sides(np.where(lit, ratio, np.nan), one, left, side=2)
 
 
 def block_means(values: Array, size: int) -> Array:

@@ -65,13 +65,14 @@ from airlight.validation.estimates.quadrature import (
     off_by,
     reference_error,
     reference_layer,
+    shared_part,
     stated_error,
 )
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.statistics.comparison import check_margin
-from airlight.validation.statistics.estimate import Estimate
+from airlight.validation.statistics.estimate import INTERVAL, Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 
@@ -361,12 +362,16 @@ def judge_image(
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
     made: dict[str, Attribute] = {BATCHES: REPLICATES}
     if with_errors and margin is not None:
-        # A margin holds the error of the reference that is no noise, too; NaN where nobody knows it.
+        # A margin holds the error of the reference that is no noise, too, and what its pixels share
+        # of that which is; NaN where nobody knows it.
         stated = stated_error(fitting, judged.holds)
+        shared = INTERVAL * shared_part(fitting, judged.holds)
         expected[f"{name}_bound"] = (
-            np.full(correct.shape, math.nan) if stated is None else stated[0]
+            np.full(correct.shape, math.nan)
+            if stated is None
+            else stated[0] + (0.0 if own_error is None else shared * own_error)
         )
-        made[BOUND] = "estimated" if stated is None else stated[1]
+        made[BOUND] = "estimated" if stated is None or own_error is not None else stated[1]
     comparison = compare_images(
         Image(expected, attributes=made),
         Image(layers, attributes=image.attributes),

@@ -141,8 +141,9 @@ def block_errors(reference: Array, image: Array, side: int) -> tuple[float, floa
     scale = np.maximum(light, floor * count)[lit]
     error = np.abs(offset[lit]) / scale
     # Noise that is independent from pixel to pixel gives the sum of a block the variance
-    # sum(d^2) - sum(d)^2/n.
-    scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)[lit]
+    # (sum(d^2) - sum(d)^2/n) n/(n - 1).
+    scatter = np.maximum(square - offset**2 / np.maximum(count, 1), 0.0)
+    scatter = (scatter * count / np.maximum(count - 1, 1))[lit]
     # Without the worst hundredth of the blocks; of less than a hundred, none may be wrong.
     best = np.argsort(error)[: len(error) - int(OUTLIERS * len(error))]
     noise = math.nan if side == 1 else math.sqrt(float(np.mean((scatter / scale**2)[best])))

@@ -5,10 +5,13 @@ import math
 
 import numpy as np
 
+from airlight.reference.monte_carlo.batches import LAYERS
 from airlight.reference.quadrature.image import ReferenceImage
+from airlight.reference.quadrature.replicates import standard_error
 from airlight.reference.storage.exr import TOTAL
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.statistics.estimate import INTERVAL, UNKNOWN, Estimate, Kind
+from airlight.validation.statistics.samples import widened
 
 
 def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
@@ -87,9 +90,10 @@ def off_by(
     """Return by how much the mean of a layer may be off, and the root mean square of that of its
     values, both over the mean [1]; infinite where it is not known.
 
-    Standard errors count twice, as in intervals of 95 %. They are independent from pixel to pixel,
-    and dependent in the channels of one. `emitted`: see `reference_layer`; `mask`: which pixels
-    count, (height, width), all by default.
+    Standard errors count twice, as in intervals of 95 %. Those of the channels of a pixel are
+    dependent, and those of two pixels as far as the replicates of the image say: rays have samples
+    of their own on area lights, and all the same ones of a sky. `emitted`: see `reference_layer`;
+    `mask`: which pixels count, (height, width), all by default.
     """
     values = reference_layer(reference, layer, emitted=emitted)
     stated = stated_error(reference, layer)
@@ -102,9 +106,23 @@ def off_by(
     light = float(values[finite].sum())
     if not light > 0:
         return math.inf, math.inf
-    pooled = float(np.linalg.norm(np.where(finite, drawn, 0.0).sum(axis=2)))
+    apart = float(np.linalg.norm(np.where(finite, drawn, 0.0).sum(axis=2)))
+    pooled = max(apart, shared_part(reference, layer) * float(drawn[finite].sum()))
     root = float(np.sqrt(((stated[0] + drawn)[finite] ** 2).mean()))
     return (float(stated[0][finite].sum()) + pooled) / light, root * int(finite.sum()) / light
+
+
+def shared_part(reference: ReferenceImage, layer: str) -> float:
+    """Return the standard error of the mean of a layer by its replicates, widened by Student's law,
+    over the mean of those of its values [1]: 0 without any, about 1 where all have one error.
+    """
+    values, parts = reference_error(reference, layer, emitted=False), reference.replicate_means
+    if values is None or parts is None or not np.any(values):
+        return 0.0
+    means = parts.sum(axis=0) if layer == TOTAL else parts[LAYERS.index(layer)]
+    freedom = len(means) - 1.0
+    error = widened(float(standard_error(means.mean(axis=1))), freedom)
+    return error / float(np.mean(values))
 
 
 def known_words(estimate: Estimate) -> str:

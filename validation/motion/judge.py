@@ -42,7 +42,7 @@ from airlight.validation.engine.observation import (
     scene_of_size,
     whole_layer,
 )
-from airlight.validation.estimates.quadrature import known_to, known_words, relative_error
+from airlight.validation.estimates.quadrature import known_to, known_words, off_by, relative_error
 from airlight.validation.motion.blocks import BLOCK
 from airlight.validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from airlight.validation.motion.lag import SURE, Lag
@@ -214,8 +214,7 @@ def compare_frames(
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
     measures = masks["all"]
     lag = measures.lag.lag.value
-    own_error = relative_error(frames.known)
-    verdict = motion_verdict(measures, own_error)
+    verdict = motion_verdict(measures, relative_error(frames.known))
     # Two things fail a comparison: values that are not finite, which no measure counts, and a
     # bias that is not shown to keep the margin. A bias whose error is unknown shows nothing.
     failures = []
@@ -228,7 +227,7 @@ def compare_frames(
     # needs no error of its own, since their RMSE is never smaller.
     rmse = measures.relative_rmse.value
     if margin is not None:
-        left = margin - (math.inf if own_error is None else own_error)
+        left = margin - frames.off
         exact = verdict.kind == "exact" and rmse is not None and rmse <= left
         if not exact and measures.bias.within(left) is not Answer.YES:
             why = "" if measures.bias.error is not None else f": {UNTOLD_SERIES}"
@@ -274,6 +273,7 @@ class _Frames:
         )
         self._changes = changes  # of all frames; those of a frame go before
         self.known = fact(0.0)  # of the frame that is known worst
+        self.off = 0.0  # by how much the mean of a frame's reference may be off, over that mean
         self.nonfinite: list[int] = []  # values of each frame that are NaN or infinite
         shape = (record.frames, *judged.values.shape[:2])
         self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
@@ -326,6 +326,9 @@ class _Frames:
             # One error stands for the references of all frames: the largest relative one.
             known = known_to(image, self._judged.holds, emitted=self._judged.emitted)
             self.known = max(self.known, known, key=doubt)
+            if known.value:
+                off, _ = off_by(image, self._judged.holds, emitted=self._judged.emitted)
+                self.off = max(self.off, off)
             np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
             self._beside[n] = lamp_distance(loaded, image) <= 1.0  # [pixels]
             self._uncover(image.distance, read_reference(loaded.scene))

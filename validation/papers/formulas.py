@@ -99,7 +99,7 @@ def _over_angle(foot: float, height: float, length: float, sigma: float) -> floa
 
 
 def _annex() -> dict[str, float]:
-    """Return each printed coefficient over the derived one, and the means of the
+    """Return how each printed coefficient compares with the derived one, and the means of the
     lobes that the annex expands.
     """
     a = np.linspace(0.13, 2.97, 30)  # sigma_t h

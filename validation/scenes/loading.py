@@ -62,14 +62,17 @@ def load_scene(
 
     `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a
     scene file of Mitsuba, or of pbrt, which ends in .pbrt; `size`: width and height of the image
-    [pixels], by default the size that the scene has; another one keeps the horizontal angle of
-    view; `changes`: values by name that replace those of the scene, see `validation.scenes.changes`.
+    [pixels], by default the size that the scene has; another one keeps the angle of view along the
+    axis that a file of Mitsuba says, else the horizontal one; `changes`: values by name that
+    replace those of the scene, see `validation.scenes.changes`.
 
     Raises InputError for an unknown name, a missing or malformed file, a size that no image can
     have, and a change that the scene cannot have. Whether methods and reference support the scene
     is checked when they read it.
     """
     register_height_fog()
+    if size is not None:
+        _check_size(size)
     record = find_record(name_or_path)
     path = Path()
     if record is not None:
@@ -86,7 +89,7 @@ def load_scene(
         )
     else:
         path = scene_file(name_or_path)
-        scene, named = _read(path), named_in(path, DEFAULT)
+        scene, named = _read(path, size), named_in(path, DEFAULT)
         loaded = LoadedScene(
             path.stem,
             scene,
@@ -109,7 +112,9 @@ def load_scene(
     }
     if lobes:
         scene = (
-            scene_with_lobes(record.build(), lobes) if record is not None else _read(path, lobes)
+            scene_with_lobes(record.build(), lobes)
+            if record is not None
+            else _read(path, size, lobes)
         )
         name_shapes(scene)
         loaded = replace(loaded, scene=scene)
@@ -203,10 +208,14 @@ def _check_films(loaded: LoadedScene) -> None:
             )
 
 
-def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> mi.Scene:
+def _read(
+    path: Path,
+    size: tuple[int, int] | None,
+    lobes: Mapping[str, float] = MappingProxyType({}),
+) -> mi.Scene:
     from airlight.validation.scenes.files.read import read_file
 
-    scene = read_file(path, lobes)
+    scene = read_file(path, lobes, size)
     if not isinstance(scene, mi.Scene):
         raise InputError(
             f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole "
@@ -236,13 +245,19 @@ def name_shapes(scene: mi.Scene) -> None:
             taken.add(shape.id())
 
 
-def resize(scene: mi.Scene, size: tuple[int, int]) -> None:
-    """Set the image size of all cameras of a scene in place, width and height [pixels]."""
+def _check_size(size: tuple[int, int]) -> None:
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(
             f"size: got {size[0]}x{size[1]}, expected at least 1x1 and at most {_LARGEST} pixels "
             "on a side"
         )
+
+
+def resize(scene: mi.Scene, size: tuple[int, int]) -> None:
+    """Set the image size of all cameras of a scene in place, width and height [pixels]; horizontal
+    angles of view stay.
+    """
+    _check_size(size)
     for sensor in scene.sensors():
         parameters = mi.traverse(sensor)
         parameters["film.size"] = list(size)

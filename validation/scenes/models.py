@@ -71,7 +71,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Preset:
-    """The equation of an engine, as it was read in its source; the engine was not run."""
+    """The equation of an engine, as it was read in its source."""
 
     key: str  #: what a user types
     title: str

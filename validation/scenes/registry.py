@@ -4,7 +4,8 @@ builds Mitsuba's dictionary.
 
 Their numbers are arbitrary, never round, so that no constant of the code can hide behind a constant
 of a scene. Those of `FOG_SCENES` scatter light once in homogeneous fog: the standard report and the
-tests of all methods study these. Baselines have all scenes but clouds.
+tests of all methods study these. Baselines have all scenes but clouds and many
+lights.
 
 Each scene is a table with these keys; lengths are in metres, angles in degrees, colours RGB:
 

@@ -22,6 +22,7 @@ from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.storage.scene_digest import scene_content
 from airlight.reference.storage.store import Content, Inputs, stored
 from airlight.validation.arrays import Array, Bools
+from airlight.validation.estimates.quadrature import off_by
 from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import parse_changes
 from airlight.validation.scenes.loading import LoadedScene, load_scene
@@ -48,6 +49,7 @@ class Reference:
     mask: Bools | None  #: pixels that have a reference, (height, width); None for all
     crossings: int | None  #: of all camera rays with edges between light and shadow
     spent: Spent  #: what it took when it was computed
+    off: tuple[float, float]  #: by how much its mean and its values may be off, see `off_by` [1]
 
     @property
     def light(self) -> Array:
@@ -65,7 +67,7 @@ class Reference:
         return ReferenceError(
             "quadrature",
             mean,
-            float(error.mean()) / mean if bright else None,
+            float(np.sqrt(np.mean(error**2))) / mean if bright else None,
             float((error / np.maximum(airlight, FLOOR * mean)).max()) if bright else None,
             self.spent.seconds,
             self.spent.processor,
@@ -78,9 +80,11 @@ def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
     # The light samples of area lights add three standard errors.
     by_chance = 0.0 if image.airlight_se is None else 3.0 * image.airlight_se
-    error = image.airlight_error + by_chance
+    error, off = image.airlight_error + by_chance, off_by(image, "airlight")
     kind: Kind = image.airlight_kind if image.airlight_se is None else "statistical"
-    return Reference(image.airlight, error, kind, image.surface, None, image.transitions, spent)
+    return Reference(
+        image.airlight, error, kind, image.surface, None, image.transitions, spent, off
+    )
 
 
 def load_cell(cell: Cell) -> LoadedScene:
@@ -97,7 +101,14 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     result = stored(inputs, lambda: sampled_reference(loaded.scene), SampledPixels)
     sampled = result.value
     return Reference(
-        sampled.airlight, sampled.error, "statistical", None, sampled.mask, None, result.spent
+        sampled.airlight,
+        sampled.error,
+        "statistical",
+        None,
+        sampled.mask,
+        None,
+        result.spent,
+        sampled.off,
     )
 
 
@@ -116,6 +127,7 @@ class SampledPixels:
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     error: Array  #: its error, (height, width, 3) [W/(m^2 sr)]
     mask: Bools  #: pixels that have a reference, (height, width)
+    off: tuple[float, float]  #: as of `Reference`
 
 
 def sampled_reference(scene: mi.Scene) -> SampledPixels:
@@ -129,4 +141,5 @@ def sampled_reference(scene: mi.Scene) -> SampledPixels:
     airlight, error, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
     airlight[pixels], error[pixels], mask[pixels] = computed.airlight[0], computed.error[0], True
     shape = int(height), int(width)
-    return SampledPixels(airlight.reshape(*shape, 3), error.reshape(*shape, 3), mask.reshape(shape))
+    images = airlight.reshape(*shape, 3), error.reshape(*shape, 3)
+    return SampledPixels(*images, mask.reshape(shape), computed.off)

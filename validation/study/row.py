@@ -48,7 +48,7 @@ class ReferenceError:
     error: float | None = column(
         "own error",
         "1",
-        "its mean error over its mean, three standard errors of area lights added",
+        "RMS of its error over its mean, three standard errors of area lights added",
     )
     worst: float | None = column(
         "own error, worst", "1", "that of the worst pixel, relative to it as in `error.max`"

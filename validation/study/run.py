@@ -229,19 +229,18 @@ def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
     squared, _ = parts_of_error(products)
     bias, within = student(errors.mean(axis=1))
     ends = squared.ends()
-    # The reference may be off by what it states. Its mean is off by the mean of that at most, and a
-    # root mean square by that of it (Minkowski's inequality).
-    own = reference.error[counts] / mean
-    square = float(np.mean(own**2))
+    # A root mean square is off by that of the errors of the reference at most (Minkowski's
+    # inequality).
+    off, root = reference.off
     return RunsError(
         len(errors),
         bias,
-        within + float(own.mean()),
+        within + off,
         *student(np.sqrt(np.diag(products))),
         math.sqrt(squared.value)
-        if squared.value and squared.exceeds(square) is Answer.YES
+        if squared.value and squared.exceeds(root**2) is Answer.YES
         else None,
-        None if ends is None else math.sqrt(max(ends[1], 0.0)) + math.sqrt(square),
+        None if ends is None else math.sqrt(max(ends[1], 0.0)) + root,
     )
 
 

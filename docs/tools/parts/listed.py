@@ -11,9 +11,6 @@ from airlight.reports.data.records import meanings, record_types
 from airlight.reports.tables.drawing import markdown
 from airlight.reports.tables.table import Name, Row, Table
 
-#: Words in the help of parameters, and the pages that they link to.
-LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
-
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
     """Return a Markdown table whose first columns, of words, stand to the left and the
@@ -90,11 +87,7 @@ def _parameter(item: Any) -> tuple[str, str]:
         )
     else:
         values = f"{item.default}; {wanted_values(item)}"
-    what = _cell(limits.help)
-    # Words in the help may have a section of the documentation.
-    for words, link in LINKS.items():
-        what = what.replace(words, f"[{words}]({link})")
-    return _cell(values), what
+    return _cell(values), _cell(limits.help)
 
 
 def kernels() -> str:

@@ -258,8 +258,8 @@ class _Run:
         beam order - 1 times before.
         """
         slab = self.slab
-        # This much of the beam's light counts as none: a sharp phase function keeps half of it in the
-        # peak, and thirty scatterings in the peak are then possible.
+        # This much of the beam's light counts as none: a sharp phase function keeps half of it in
+        # the peak, and thirty scatterings in the peak are then possible.
         times, no_light = order - 1, 1e-9
         if abs(slab._peak) ** times < no_light:
             return np.zeros(1, slab._type)

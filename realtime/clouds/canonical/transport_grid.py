@@ -56,7 +56,7 @@ from airlight.realtime.clouds.canonical.directional_moments import DirectionalMo
 from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 from airlight.realtime.numerics.array_types import ArrayTypes, four_numbers
-from airlight.realtime.numerics.functions import between_entries
+from airlight.realtime.numerics.functions import between_entries, opacity
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]
@@ -373,8 +373,4 @@ def _between(
 def _passed(t: Any, d: Any, mu: Any) -> Any:
     """Return 1 - exp(-L), without cancellation where the way L behind the point is short."""
     # Level lines of sight never leave the slab: their cosine counts as a small one.
-    behind = dr.select(mu < 0, d, t - d) / dr.maximum(dr.abs(mu), 1e-6)
-    # 1 - exp(-L) = L (1 - L/2 + L^2/6) below 0.02, where the next term is 3e-7 of it.
-    return dr.select(
-        behind < 0.02, behind * (1 - behind * (0.5 - behind * (1 / 6))), 1 - dr.exp(-behind)
-    )
+    return opacity(dr.select(mu < 0, d, t - d) / dr.maximum(dr.abs(mu), 1e-6))

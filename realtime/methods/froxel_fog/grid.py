@@ -28,8 +28,7 @@ which goes to S exp(-tau_k) D with sigma. Front to back, with T_k = exp(-tau_k):
 
 The slices of a constant medium in constant light therefore add up to S (1 - exp(-sigma x)) / sigma
 for any number and depths of slices. Multiplying S D by T_k instead is too bright by a factor of 1 +
-z/2, and by T_{k+1} too dark by as much (Hillaire 2015). Where z is small, 1 - exp(-z) cancels, and
-its series takes over.
+z/2, and by T_{k+1} too dark by as much (Hillaire 2015).
 
 Between the ends of slices, and between columns, a pixel interpolates linearly in (u, v, s).
 
@@ -48,7 +47,7 @@ import mitsuba as mi
 
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import Metres, PerRay, four_numbers
-from airlight.realtime.numerics.functions import between_entries
+from airlight.realtime.numerics.functions import between_entries, exp_expm1_bounded
 from airlight.realtime.scene.camera import Camera, row_and_column
 from airlight.realtime.scene.media.medium import Medium, Rays
 
@@ -168,13 +167,13 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
         # the slice.
         depths = medium.optical_depth(rays, x, end)
         source = dr.gather(Color, scattered, number * grid.columns + column)
-        passed = [dr.exp(-depth) for depth in depths]
+        passed = [exp_expm1_bounded(-depth) for depth in depths]
         weights = [
-            before * thickness * _mean_transmittance(depth, through)
-            for before, depth, through in zip(transmittance, depths, passed)
+            before * thickness * dr.select(depth > 0, -less / depth, 1)
+            for before, depth, (_, less) in zip(transmittance, depths, passed)
         ]
         total = total + source * (weights[0] if len(weights) == 1 else Color(*weights))
-        transmittance = [before * through for before, through in zip(transmittance, passed)]
+        transmittance = [before * through for before, (through, _) in zip(transmittance, passed)]
         value = four_numbers(Float)(total.x, total.y, total.z, 0)
         dr.scatter(volume, value, (number + 1) * grid.columns + column)
         return number + 1, end, transmittance, total
@@ -191,17 +190,6 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
         labels=("number", "x", "transmittance", "total"),
     )
     return volume
-
-
-def _mean_transmittance(depth: Any, passed: Any) -> Any:
-    """Return (1 - exp(-z))/z, the mean of exp(-t) for t from 0 to z; `passed` is exp(-z)."""
-    # Up to z = 0.1 the series sum_k (-z)^k / (k + 1)! serves, as 1 - exp(-z) cancels there. Eight
-    # terms leave out 0.1^8/9! = 3e-14. Horner's scheme begins at the last term.
-    thin, terms = 0.1, 8
-    series = type(depth)(1 / math.factorial(terms))
-    for order in range(terms - 1, 0, -1):
-        series = dr.fma(-depth, series, 1 / math.factorial(order))
-    return dr.select(depth > thin, (1 - passed) / depth, series)
 
 
 def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:

@@ -38,6 +38,7 @@ from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import PerRay
 from airlight.realtime.rays import profile
 from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.integrate import half_angles
 from airlight.realtime.scene.media.medium import Rays
 
 #: (point, number of a table) -> function (light, its number in the table) ->
@@ -146,17 +147,17 @@ def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
     square = dr.squared_norm(toward)
     r = dr.sqrt(square) if light.w else Float(1)
     # At the light itself there is no direction: any will do.
-    cosine = dr.dot(toward, points.unit) * dr.rcp(dr.maximum(r, 1e-15))
+    unit = toward * dr.rsqrt(dr.maximum(square, 1e-30))
     strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * profile(
-        light, points.point, -toward * dr.rsqrt(dr.maximum(square, 1e-30))
+        light, points.point, -unit
     )
-    # c albedo sigma_t p of all media in parts of `unit`, one value for each froxel.
-    value = strength * medium.mean_source(points.rays, *points.ends, _at(cosine))
+    # c albedo sigma_t p of all media in parts of `unit`, one value for each froxel. Narrow lobes
+    # need both halves of the angle: a cosine has lost them.
+    down, up = half_angles(unit, points.unit)
+    value = strength * medium.mean_source(
+        points.rays, *points.ends, lambda phase: phase.evaluate_half(down, up)
+    )
     # The depth to the light is walked only where some light arrives and is scattered.
     some = lit & (sum(value) > 0 if dr.depth_v(value) > 1 else value > 0)
     depths = medium.depth_to_light(light, points.point, r, active=some)
     return dr.select(some, value * medium.transmittance(depths), 0)
-
-
-def _at(cosine: Any) -> Any:
-    return lambda phase: phase.evaluate(cosine)

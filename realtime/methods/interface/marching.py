@@ -137,7 +137,7 @@ def marched_integral(
             index + 1,
             before,
             depths,
-            total + dr.select(reached, airlight.source(x, camera), 0) * length,
+            total + dr.select(reached, airlight.source(x, camera) * length, 0),
         )
 
     # The depth from the camera to the first step, which a light's cone or the medium may put far

@@ -10,7 +10,7 @@ from typing import Any
 from airlight.errors import InputError
 from airlight.realtime.area_lights.points import LightSamples
 from airlight.realtime.methods.interface.method import Method
-from airlight.realtime.parameters import parameter
+from airlight.realtime.parameters import MOST_STEPS, parameter
 from airlight.realtime.shadow_maps.shadow_map import map_size
 
 AUTO = "auto"
@@ -57,7 +57,7 @@ class SoftShaftsParameters(Method):
     at_once = True
     light_samples = LightSamples(5, "ring")
 
-    steps: int = parameter(32, "steps of every ray and light sample", least=1)
+    steps: int = parameter(32, "steps of every ray and light sample", least=1, most=MOST_STEPS)
     spacing: str = parameter(
         "uniform",
         "of the steps: in the distance, or in the angle at the light sample",

@@ -17,7 +17,7 @@ import drjit as dr
 import numpy as np
 
 from airlight.errors import InputError
-from airlight.realtime.numerics.functions import exp_expm1_bounded
+from airlight.realtime.numerics.functions import opacity
 from airlight.realtime.scene.density import Density
 from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces
 from airlight.realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
@@ -208,8 +208,7 @@ class BoundedMedia(Homogeneous):
             length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
             ends = zip(piece.medium.sigma_t, piece.before)
             channels = [
-                dr.select(length > 0, -dr.exp(-tau) * exp_expm1_bounded(-s * length)[1], 0)
-                for s, tau in ends
+                dr.select(length > 0, dr.exp(-tau) * opacity(s * length), 0) for s, tau in ends
             ]
             total += piece.medium.albedo * type(total)(*channels)
         return total

@@ -101,19 +101,22 @@ class BoundedRays(LitRays):
         """Return how fast the depth of both paths grows along the ray, bounded media on
         the light's left out [1/m].
         """
-        # A channel of which nothing is left on the way to the camera does not count: the panels of
-        # the others may be a thousand times as long.
-        around = self.medium.sigma_t
-        left = [
-            dr.fma(sigma_t, x - piece.begin, before) < optical_reach(type(x))
-            for sigma_t, before in zip(piece.medium.sigma_t, piece.before, strict=True)
-        ]
+        around, left = self.medium.sigma_t, self.left(piece, x)
         rate = reduce(dr.maximum, map(dr.select, left, piece.medium.sigma_t, repeat(type(x)(0))))
         # The distance to a light at a place grows by 1 m a metre at most, in the medium around. A
         # sun shines through vacuum between the bounded media.
         if self.light.w and not self.medium.clear:
             rate = rate + reduce(dr.maximum, map(dr.select, left, around, repeat(type(x)(0))))
         return rate
+
+    def left(self, piece: Piece, x) -> list[Any]:
+        """Return by channel whether something is left on the way to the camera. Others do not
+        count: the panels of those that do may be a thousand times as long.
+        """
+        return [
+            dr.fma(sigma_t, x - piece.begin, before) < optical_reach(type(x))
+            for sigma_t, before in zip(piece.medium.sigma_t, piece.before, strict=True)
+        ]
 
     def depths(self, piece: Piece, x, r, lengths) -> list[Any]:
         """Return the optical depth of both paths at x, by channel; `lengths` of
@@ -221,10 +224,11 @@ class PieceRays(LitRays):
     def _rate(self, start: Start, envelopes):
         """Return the reciprocal of the longest panels [1/m]."""
         rate, bending = self.whole.growth(self.piece, start.x, start.r), type(start.s)(0)
+        left, around = self.whole.left(self.piece, start.x), self.medium.sigma_t
         # The rate of the depths is at most the sum of all their rates; the length of a path in a
         # medium rises steeply where the path grazes a facet, and there the panel is short.
         for path, lines in zip(self.paths, envelopes):
-            growth, smooth = path.growth(lines, start.x, start.r)
+            growth, smooth = path.growth(lines, start.x, start.r, around, left)
             rate = rate + growth
             bending = dr.maximum(bending, 1 / smooth)
         # Paths along a facet change without limit where they pass its edge: a panel shorter than a

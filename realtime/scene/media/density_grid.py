@@ -58,7 +58,7 @@ class GridMedium(VaryingMedium):
     def extinction(self, rays, x):
         """Return the extinction [1/m]."""
         enter, leave = rays.crossed
-        inside = (x >= enter) & (x <= leave)
+        inside = (x >= enter) & (x < leave)
         return (
             dr.select(inside, self.largest * self.density.at(rays.at(x), mi.UInt32(0), inside), 0),
         )

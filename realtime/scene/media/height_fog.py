@@ -38,7 +38,7 @@ import numpy as np
 
 from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
+from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded, opacity
 from airlight.realtime.scene.media.integrate import Node, Start
 from airlight.realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from airlight.realtime.scene.phase import Phase
@@ -102,7 +102,7 @@ class HeightFog(VaryingMedium):
     def extinction(self, rays, x):
         """Return the extinction [1/m]."""
         (enter, leave), (start, rise) = rays.crossed
-        return (dr.select((x >= enter) & (x <= leave), self.density(dr.fma(rise, x, start)), 0),)
+        return (dr.select((x >= enter) & (x < leave), self.density(dr.fma(rise, x, start)), 0),)
 
     def optical_depth(self, rays, x0, x1):
         """Return the optical depth of segments [m], in closed form [1]."""
@@ -443,4 +443,4 @@ def _root(fraction):
 
 def phi(u):
     """Return (1 - e^-u)/u, 1 at u = 0, for u >= 0 (see the module)."""
-    return dr.select(u > 0, -exp_expm1_bounded(-u)[1] / u, 1)
+    return dr.select(u > 0, opacity(u) / u, 1)

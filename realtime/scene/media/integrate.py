@@ -111,7 +111,7 @@ def integral(lit: Any, x0, x1) -> list[Any]:
     kinks = geometry.smooth_subsegments(light, x0, x1)[:-1]
     bends = [x - foot for x in (*lit.bends(), *(end for _, end in kinks))]
     width = _panel_width(lit, Float) if light.w else None
-    half_angles = (None, None) if light.w else _half_angles(lit)
+    angles = (None, None) if light.w else half_angles(-light.axis, lit.rays.direction)
 
     def panel(turn, s, state, totals):
         # The light's limits to a panel first, then the medium's.
@@ -119,9 +119,7 @@ def integral(lit: Any, x0, x1) -> list[Any]:
         end, values, state = lit.panel(start, state)
         # In the light of a place the weights hold dx/r^2, at infinity dx.
         nodes = (
-            _at_place(lit, start, end, height)
-            if light.w
-            else _at_infinity(lit, start, end, half_angles)
+            _at_place(lit, start, end, height) if light.w else _at_infinity(lit, start, end, angles)
         )
         for node in nodes:
             weight = node.weight
@@ -216,9 +214,9 @@ def _at_place(lit: Any, start: Start, end, height) -> Iterator[Node]:
         yield Node(start.x + far, far, rest, s, r, down, up, weight * fraction * inverse)
 
 
-def _at_infinity(lit: Any, start: Start, end, half_angles: tuple[Any, Any]) -> Iterator[Node]:
+def _at_infinity(lit: Any, start: Start, end, angles: tuple[Any, Any]) -> Iterator[Node]:
     """Return the nodes of panels in the light of a direction: x is linear in t."""
-    length, (down, up) = end - start.s, half_angles
+    length, (down, up) = end - start.s, angles
     for t, weight in unit_nodes(lit.nodes(type(length))):
         far = t * length
         yield Node(
@@ -226,14 +224,12 @@ def _at_infinity(lit: Any, start: Start, end, half_angles: tuple[Any, Any]) -> I
         )
 
 
-def _half_angles(lit: Any) -> tuple[Any, Any]:
-    """Return sin^2 and cos^2 of half the angle between rays and a light at
-    infinity, both with all digits.
+def half_angles(toward, direction) -> tuple[Any, Any]:
+    """Return sin^2 and cos^2 of half the angle by which light is scattered into rays, both with
+    all digits; `toward` are unit vectors to the light.
     """
-    # The cosine of the scattering angle is -axis . direction: |sum|^2 is 4 sin^2 and |difference|^2
-    # is 4 cos^2 of half of this angle.
-    axis, direction = lit.light.axis, lit.rays.direction
-    return 0.25 * dr.squared_norm(axis + direction), 0.25 * dr.squared_norm(axis - direction)
+    # The cosine of the scattering angle is toward . direction.
+    return 0.25 * dr.squared_norm(toward - direction), 0.25 * dr.squared_norm(toward + direction)
 
 
 def _roots(s, h):

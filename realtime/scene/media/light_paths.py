@@ -304,20 +304,32 @@ class LightPaths:
             until_low, until_high, after = self._over_planes(state, step, self.active)
         return (until_low, until_high), after
 
-    def growth(self, envelopes: Envelopes | None, x, r):
+    def growth(self, envelopes: Envelopes | None, x, r, around, left):
         """Return how fast the depths of paths in this medium change along the ray at most [1/m],
         and the longest panel from x on, as far as this medium says [m].
+
+        `around`: the extinctions of the medium around it [1/m]: a length l adds (sigma_k - sigma_0)
+        l to a depth, which falls as fast in a bubble of thin fog. `left`: the channels that count,
+        of which something is left on the way to the camera.
         """
-        Float, sigma_t = type(x), self.bounded.medium.sigma_t
-        densest, sparsest = reduce(dr.maximum, sigma_t), reduce(dr.minimum, sigma_t)
+        Float, nothing = type(x), type(x)(0)
+        # By channel the length of which nothing is left, the change by a metre of it, `left`.
+        channels = [
+            (optical_reach(Float) / own, dr.abs(own - other), counts)
+            for own, other, counts in zip(self.bounded.medium.sigma_t, around, left, strict=True)
+        ]
         if envelopes is None:
             # The chord of a sphere changes like a root: `_smooth_chord` limits the panel, and
             # `_turning` stands for the rate. Paths that miss the sphere have no chord until they
             # graze it, where panels end; and of paths through most of a dense one nothing is left.
             turning = self._turning(r)
             longest = self._smooth_chord(x, turning)
-            counts = self.active & ~self._misses(x) & ~self._dark(x, r, longest)
-            rate = dr.select(counts, turning * densest, 0)
+            between = self._between(x, r, longest)
+            rates = [
+                dr.select(counts & (between <= reach), turning * change, nothing)
+                for reach, change, counts in channels
+            ]
+            rate = dr.select(self.active & ~self._misses(x), reduce(dr.maximum, rates), 0)
             return rate, dr.select(self.active, longest, dr.inf)
         first, last = envelopes.ends(x)
         meets = self.active & (last > first)
@@ -329,13 +341,14 @@ class LightPaths:
         rising += dr.select(first > 0, dr.abs(envelopes.largest[1]) / (1 + w * first), 0)
         rising = dr.select(meets, rising, 0)
         steepness = dr.select(meets, w + r * rising, 0)
-        # While the length is beyond that of which nothing is left in any channel, a panel may take
+        # While the length is beyond that of which nothing is left in a channel, a panel may take
         # half of what is beyond.
         length = r * ((last - first) / (1 + w * last)) / (1 + w * first)
-        beyond_all = length - optical_reach(Float) / sparsest
-        dark = steepness * (2 * CHANGE / beyond_all)
-        rate = steepness * densest
-        rate = dr.select(beyond_all > 0, dr.minimum(rate, dark), rate)
+        rate = nothing
+        for reach, change, counts in channels:
+            beyond_it = length - reach
+            change = dr.select(beyond_it > 0, dr.minimum(change, 2 * CHANGE / beyond_it), change)
+            rate = dr.maximum(rate, dr.select(counts, steepness * change, nothing))
         return rate, (0.5 / rising if w else Float(dr.inf))
 
     def _turning(self, r):
@@ -358,11 +371,10 @@ class LightPaths:
         cross = dr.squared_norm(dr.cross(place, self.toward))
         return cross > reach * dr.squared_norm(self.away(x))
 
-    def _dark(self, x, r, longest):
-        """Return whether the sphere lies between points and the light, and lets nothing through in
-        any channel: nor does it up to `longest`, in which q^2 falls by a fifth at most.
+    def _between(self, x, r, longest):
+        """Return the length in the sphere of paths to points behind it, as the light sees them, and
+        to those up to `longest`, in which q^2 falls by a fifth at most [m]; 0 for other paths.
         """
-        sparsest = reduce(dr.minimum, self.bounded.medium.sigma_t)
         nearest, half = self._chord(x, r)
         between = nearest > half
         if self.w:
@@ -370,7 +382,7 @@ class LightPaths:
         # The least panel of `_smooth_chord` may be longer than the chord keeps its length.
         kept = longest > 0.0021 * self.bounded.radius / self._turning(r)
         left = 2 * 0.89  # of half the chord: sqrt(0.8) = 0.894
-        return between & kept & (left * half * sparsest > optical_reach(type(x)))
+        return dr.select(between & kept, left * half, 0)
 
     def _smooth_chord(self, x, turning):
         """Return the length in which q^2 changes by a fraction of it: q is a root of it [m].

@@ -18,9 +18,15 @@ import drjit as dr
 
 from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
+from airlight.realtime.numerics.functions import exp_bounded, opacity
 from airlight.realtime.scene.lights import Light
-from airlight.realtime.scene.media.integrate import Node, Start, integral, panel_nodes
+from airlight.realtime.scene.media.integrate import (
+    Node,
+    Start,
+    half_angles,
+    integral,
+    panel_nodes,
+)
 from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.rule_reach import CHANGE
 
@@ -178,7 +184,7 @@ class Medium(ABC):
         [m], RGB: 1 - exp(-tau).
         """
         depths = self.optical_depth(rays, 0, distance)
-        return self.albedo * self.colour([-exp_expm1_bounded(-depth)[1] for depth in depths])
+        return self.albedo * self.colour([opacity(depth) for depth in depths])
 
     def check_beam(self, axis, name: str) -> None:
         """Refuse a light at infinity along a unit vector, on the host, that
@@ -418,8 +424,7 @@ class LitRays:
             down, up = half_angle(s, r, dr.rcp(r), dr.square(self.geometry.height))
         else:
             # The angle between ray and light is one for a ray.
-            axis, direction = self.light.axis, self.rays.direction
-            down, up = (0.25 * dr.squared_norm(v) for v in (axis + direction, axis - direction))
+            down, up = half_angles(-self.light.axis, self.rays.direction)
         return lambda phase: phase.evaluate_half(down, up)
 
     def radiance(self, integral):

@@ -7,10 +7,10 @@ neither reflects nor refracts. A ray is followed from one such boundary to the n
 `ray_intersect`, and the media are the scene's own pointers. A boundary that rounding makes a ray
 meet twice names the same medium both times. A segment may miss a boundary close to its end, where
 the point lies in the boundary or just beneath it: the stretch in the wrong medium is then as short
-as that distance. The walk follows the medium from the light on and never asks in which medium the
-point lies.
+as that distance. The walk follows the medium from the light on, or to a light infinitely far away
+takes the one before each boundary, and never asks in which medium the point lies.
 
-Stretches are measured along the one straight ray, from the light to the point. A continued ray
+Stretches are measured along the one straight ray between the light and the point. A continued ray
 starts a little beyond a boundary, so that it does not meet the boundary again; the optical depth
 counts that little way too. Visibility rays stop a relative 1e-5 before the point, since a point on
 a surface must not be hidden by that surface; the attenuation counts the whole distance (volpath's
@@ -42,6 +42,37 @@ class Surroundings:
         return Surroundings(
             scene, bool(scene.shapes()), bounded, dr.opaque(mi.Float, metre_of(scene))
         )
+
+
+@dataclass(frozen=True)
+class Path:
+    """Straight ways of shadow rays: from a light to points of camera rays or surfaces, or from
+    these to a light infinitely far away.
+
+    Rays from afar would lose digits: a ball of 1 m, met from 200 m away, would shadow a third of
+    itself. Those to a light infinitely far away have no end: a density grid may reach beyond all
+    shapes, and Mitsuba does not know the box of rectangles alone.
+    """
+
+    begin: "mi.Point3f"  #: [m]
+    away: "mi.Vector3f"  #: unit vectors from there
+    length: "mi.Float"  #: [m]
+    medium: "mi.MediumPtr | None" = None  #: where the ways begin; None: not known
+    far: bool = False  #: whether they lead to a light infinitely far away
+    clear: "mi.Float | float" = 0.0  #: how far off a surface, at which they begin, rays start [m]
+
+    @staticmethod
+    def to_afar(
+        begin: "mi.Point3f", towards: "mi.Vector3f", clear: "mi.Float | float" = 0.0
+    ) -> "Path":
+        """Return the ways from points to a light infinitely far away, in unit directions."""
+        length = dr.full(mi.Float, dr.largest(mi.Float), dr.width(begin))
+        return Path(begin, towards, length, far=True, clear=clear)
+
+    @property
+    def ray(self) -> "tuple[mi.Point3f, mi.Vector3f, mi.Float]":
+        """Origins [m], unit directions and lengths [m] of shadow rays."""
+        return self.begin + self.away * self.clear, self.away, self.length
 
 
 @dataclass(frozen=True)
@@ -127,22 +158,20 @@ def unblocked(
 
 def transmittance(
     around: Surroundings,
-    start: "mi.Point3f",
-    direction: "mi.Vector3f",
-    distance: "mi.Float",
+    path: Path,
     *,
     media: Segment,
     active: "mi.Bool",
     fraction: "mi.Float | float" = 1.0,
 ) -> "mi.Spectrum":
-    """Return the transmittance from a light to points; 0 where a surface is in between.
+    """Return the transmittance along paths; 0 where a surface is in between.
 
-    `around`: the shapes that rays can meet; `start`, `direction`, `distance`: the place of the
-    light, the unit vector from there to the point, and how far the point is [m]; `media`: the media
-    at both ends; `active`: mask; `fraction`: of the optical depth that counts.
+    `around`: the shapes that rays can meet; `media`: the media at both ends; `active`: mask;
+    `fraction`: of the optical depth that counts.
     """
+    start, direction, distance = path.begin, path.away, path.length
     if not around.bounded:
-        lit = unblocked(around, start, direction, distance, active)
+        lit = unblocked(around, *path.ray, active)
         return dr.select(lit, dr.exp(-media.end_sigma_t * distance * fraction), 0)
     reach = distance * (1 - _SHORT_OF_POINT)
 
@@ -159,11 +188,14 @@ def transmittance(
         lit &= ~met | passed | (crossing > reach)
         changes = passed & hit.is_medium_transition()
         # The stretch from the last change of medium to this one. A boundary that rounding doubles
-        # names the same medium again, and adds no error.
-        _, sigma_t = coefficients(medium, changes)
+        # names the same medium again, and adds no error. On the way to a light far away each
+        # boundary names the medium before it, and the last leads into vacuum.
+        before = hit.target_medium(-direction) if path.far else medium
+        _, sigma_t = coefficients(before, changes)
         depth = dr.select(changes, depth + sigma_t * (crossing - boundary), depth)
         boundary = dr.select(changes, crossing, boundary)
-        medium = dr.select(changes, hit.target_medium(direction), medium)
+        if not path.far:
+            medium = dr.select(changes, hit.target_medium(direction), medium)
         done = dr.select(passed, crossing + step_beyond(hit.p, around.metre), done)
         return passed & (done < distance), lit, done, boundary, medium, depth
 
@@ -172,7 +204,7 @@ def transmittance(
     state = (
         mi.Bool(active),
         mi.Bool(active),
-        zero,
+        zero + path.clear,
         mi.Float(zero),
         medium,
         dr.zeros(mi.Spectrum, dr.width(distance)),

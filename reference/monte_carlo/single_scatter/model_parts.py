@@ -13,11 +13,7 @@ from typing import Self
 import drjit as dr
 import mitsuba as mi
 
-from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
-    Segment,
-    transmittance,
-    unblocked,
-)
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import Path, unblocked
 from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     mixture_of,
@@ -28,7 +24,6 @@ from airlight.reference.monte_carlo.single_scatter.model_terms import RayTerms
 from airlight.reference.monte_carlo.single_scatter.stretches import (
     Distances,
     Part,
-    Path,
     Ray,
     Stretch,
     Transmittance,
@@ -110,7 +105,7 @@ class ModelPart(Part):
 
     def seen(self, path: Path, active: "mi.Bool") -> "mi.Bool":
         """Return where no surface stands in a path."""
-        return unblocked(self.terms.opaque, *path.shadow_ray(), active)
+        return unblocked(self.terms.opaque, *path.ray, active)
 
 
 @dataclass(frozen=True)
@@ -165,17 +160,9 @@ class ModelStretch(ModelPart, Stretch):
         """Return the transmittance from the light."""
         if self.terms.light is None:
             return dr.select(self.seen(path, active), mi.Spectrum(1), 0), sampler
-        segment = transmittance(
-            self.around,
-            path.begin,
-            path.away,
-            path.length,
-            media=Segment(self.medium_at_light(path, ray, active), self.sigma_t),
-            active=active,
-            fraction=mi.Float(self.terms.light),
-        )
+        segment = self.on_path(path, ray, active, mi.Float(self.terms.light))
         # A medium without sides is infinitely deep for a light infinitely far away.
-        if path.end is not None and self.terms.arriving is not None:
+        if path.far and self.terms.arriving is not None:
             segment *= self.terms.arriving
         return segment, sampler
 
@@ -260,7 +247,7 @@ class ModelGrid(ModelPart, GridPart):
         passed = mi.Float(1)
         if self.terms.light is not None:
             passed, sampler = self._tracked(
-                path.shadow_ray(), sampler, active, fraction=mi.Float(self.terms.light)
+                path.ray, sampler, active, fraction=mi.Float(self.terms.light)
             )
         return dr.select(self.seen(path, active), mi.Spectrum(passed), 0), sampler
 

@@ -28,7 +28,7 @@ from airlight.reference.monte_carlo.single_scatter.area_sampling import (
     LightSample,
     emitting,
 )
-from airlight.reference.monte_carlo.single_scatter.boundary_walk import step_beyond
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import Path, step_beyond
 from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     Approach,
     Span,
@@ -41,12 +41,12 @@ from airlight.reference.monte_carlo.single_scatter.model_lamps import (
     falloff_of,
     spot_edge,
 )
-from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
+from airlight.reference.monte_carlo.single_scatter.stretches import Part, Ray, point_on
 from airlight.reference.scene.area_light import is_area
 from airlight.reference.scene.directional_light import is_directional
 from airlight.reference.scene.model import Model
 from airlight.reference.scene.read import ReferenceScene, whole_scene
-from airlight.reference.scene.shape_roles import scene_from
+from airlight.reference.scene.shape_roles import metre_of, scene_from
 
 #: points of the unit square
 SquarePoints: TypeAlias = "tuple[mi.Float64, mi.Float64]"
@@ -232,6 +232,7 @@ class AreaSource(_Near):
     shape: Emitting
     radiance: "mi.Color3f"  #: [W/(m^2 sr)]
     alone: "mi.Scene"  #: the shape of the light by itself
+    metre: "mi.Float"  #: 1 m, or the size of a smaller scene [m]
     varies = True
 
     def point(self, numbers: SquarePoints, to: "Ray | mi.Point3d") -> LightSample:
@@ -267,22 +268,20 @@ class AreaSource(_Near):
         """Return the way from where rays off a mirror first meet the light, and its radiance
         there.
         """
-        way = hit.spawn_ray(towards)
-        met = self.alone.ray_intersect(way, active)
+        start = hit.p + towards * _clear(hit, self.metre)
+        met = self.alone.ray_intersect(mi.Ray3f(start, towards), active)
         sends = met.is_valid() & (mi.Frame3f.cos_theta(met.wi) > 0)
-        place = mi.Point3d(dr.select(sends, met.p, way.o + towards))
+        place = mi.Point3d(dr.select(sends, met.p, start + towards))
         point = LightSample(place, mi.Vector3d(met.n), mi.Float64(1))
         return self._path(point, hit.p - mi.Point3f(place)), dr.select(sends, self.radiance, 0)
 
 
 @dataclass(frozen=True)
 class FarSource:
-    """A sun, or a uniform sky; each sample of a sky has its own direction, even over the sphere.
-
-    Its paths begin where the emitter puts its samples: beyond all shapes, in vacuum.
-    """
+    """A sun, or a uniform sky; each sample of a sky has its own direction, even over the sphere."""
 
     emitter: "mi.Emitter"
+    metre: "mi.Float"  #: 1 m, or the size of a smaller scene [m]
     count = 1
     position = None
 
@@ -306,7 +305,7 @@ class FarSource:
         x = part.start + y
         point = point_on(ray, ray.origin + ray.direction * mi.Float(x))
         sample, irradiance = self.emitter.sample_direction(point, mi.Point2f(*numbers), used)
-        path = Path(sample.p, -sample.d, sample.dist, point.p)
+        path = Path.to_afar(point.p, sample.d)
         used &= density > 0
         return Sample(
             x, point, sample.d, path, irradiance * mi.Float(dr.select(used, 1 / density, 0)), used
@@ -317,11 +316,7 @@ class FarSource:
     ) -> SurfaceLight:
         """Return the light that arrives at surfaces."""
         sample, irradiance = self.emitter.sample_direction(hit, mi.Point2f(*numbers), active)
-        return (
-            sample.d,
-            Path(sample.p, -sample.d, sample.dist, hit.spawn_ray(sample.d).o),
-            irradiance,
-        )
+        return sample.d, Path.to_afar(hit.p, sample.d, _clear(hit, self.metre)), irradiance
 
     def in_mirror(
         self, hit: "mi.SurfaceInteraction3f", towards: "mi.Vector3f", active: "mi.Bool"
@@ -329,13 +324,17 @@ class FarSource:
         """Return the way from a sky along rays off a mirror, and its radiance."""
         seen = dr.zeros(mi.SurfaceInteraction3f, dr.width(active))
         seen.wi = -towards
-        # A sample of the emitter is beyond all shapes; so is a point as far away along the ray.
-        far = self.emitter.sample_direction(hit, mi.Point2f(0.5), active)[0].dist
-        way = hit.spawn_ray(towards)
-        return Path(way.o + towards * far, -towards, far, way.o), self.emitter.eval(seen, active)
+        path = Path.to_afar(hit.p, towards, _clear(hit, self.metre))
+        return path, self.emitter.eval(seen, active)
 
 
 Source = PointSource | SpotSource | AreaSource | FarSource
+
+
+def _clear(hit: "mi.SurfaceInteraction3f", metre: "mi.Float") -> "mi.Float":
+    """Return how far off surfaces rays start, so as not to meet them again [m]."""
+    # Mitsuba's own rays leap as far in scenes of metres, along the normal, and over smaller scenes.
+    return mi.math.RayEpsilon * (metre + dr.max(dr.abs(hit.p)))
 
 
 def is_sky(emitter: "mi.Emitter") -> bool:
@@ -349,9 +348,21 @@ def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
     points = [emitter for emitter in emitters if emitter.class_name() == "PointLight"]
     model = reference.model
     falloff = None if model.is_physical else falloff_of(model)
-    others = [_source(emitter, model, falloff) for emitter in emitters if emitter not in points]
+    metre = dr.opaque(mi.Float, metre_of(reference.scene))
+    others = [
+        FarSource(emitter, metre)
+        if is_sky(emitter) or is_directional(emitter)
+        else _spot(emitter, model, falloff)
+        for emitter in emitters
+        if emitter not in points
+    ]
     area = [
-        AreaSource(emitting(light), mi.Color3f(*light.radiance.tolist()), scene_from([light.shape]))
+        AreaSource(
+            emitting(light),
+            mi.Color3f(*light.radiance.tolist()),
+            scene_from([light.shape]),
+            metre,
+        )
         for light in reference.area
     ]
     return (*([_point_lights(points, falloff)] if points else []), *others, *area)
@@ -378,9 +389,7 @@ def _point_lights(emitters: Sequence["mi.Emitter"], falloff: Falloff | None) -> 
     )
 
 
-def _source(emitter: "mi.Emitter", model: Model, falloff: Falloff | None) -> Source:
-    if is_sky(emitter) or is_directional(emitter):
-        return FarSource(emitter)
+def _spot(emitter: "mi.Emitter", model: Model, falloff: Falloff | None) -> SpotSource:
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])

@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
+    Path,
     Segment,
     Surroundings,
     medium_at,
@@ -40,29 +41,6 @@ class Ray:
     direction: "mi.Vector3f"  #: unit
     origin_double: "mi.Point3d"  #: [m]
     direction_double: "mi.Vector3d"  #: unit
-
-
-@dataclass(frozen=True)
-class Path:
-    """Straight ways from a light to points of camera rays or surfaces."""
-
-    begin: "mi.Point3f"  #: on the light, or beyond all shapes for a light infinitely far away [m]
-    away: "mi.Vector3f"  #: unit vectors from there
-    length: "mi.Float"  #: [m]
-    end: "mi.Point3f | None" = None  #: the points [m], for a light infinitely far away
-    medium: "mi.MediumPtr | None" = None  #: where the ways begin; None: not known
-
-    def shadow_ray(self) -> "tuple[mi.Point3f, mi.Vector3f, mi.Float]":
-        """Return the origins [m], unit directions and lengths [m] of shadow rays.
-
-        Those of a light infinitely far away start at the points, since rays from afar lose digits:
-        a ball of 1 m, met from 200 m away, would shadow a third of itself. They have no end: a
-        density grid may reach beyond all shapes, and Mitsuba does not know the box of rectangles
-        alone.
-        """
-        if self.end is None:
-            return self.begin, self.away, self.length
-        return self.end, -self.away, mi.Float(dr.largest(mi.Float))
 
 
 @dataclass(frozen=True)
@@ -152,17 +130,23 @@ class Stretch(Part):
         active: "mi.Bool",
     ) -> Transmittance:
         """Return the transmittance of both ways; see `Part`."""
-        media = Segment(self.medium_at_light(path, ray, active), self.sigma_t)
-        segment = transmittance(
-            self.around, path.begin, path.away, path.length, media=media, active=active
-        )
+        segment = self.on_path(path, ray, active)
         return segment * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
 
-    def medium_at_light(self, path: Path, ray: Ray, active: "mi.Bool") -> "mi.MediumPtr":
-        """Return the media in which paths begin: vacuum beyond all shapes, the one that the path
-        names, or the one that is looked for now.
+    def on_path(
+        self, path: Path, ray: Ray, active: "mi.Bool", fraction: "mi.Float | float" = 1.0
+    ) -> "mi.Spectrum":
+        """Return the transmittance along paths through a fraction of the optical depth; 0 where a
+        surface stands in one.
         """
-        if path.end is not None or not self.around.bounded:
+        media = Segment(self._medium_at_light(path, ray, active), self.sigma_t)
+        return transmittance(self.around, path, media=media, active=active, fraction=fraction)
+
+    def _medium_at_light(self, path: Path, ray: Ray, active: "mi.Bool") -> "mi.MediumPtr":
+        """Return the media at lights: vacuum beyond all shapes, the one that the path names, or the
+        one that is looked for now.
+        """
+        if path.far or not self.around.bounded:
             return dr.zeros(mi.MediumPtr)
         if path.medium is not None:
             return path.medium

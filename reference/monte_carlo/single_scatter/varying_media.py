@@ -28,7 +28,11 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings, unblocked
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
+    Path,
+    Surroundings,
+    unblocked,
+)
 from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     equi_angular,
@@ -37,7 +41,6 @@ from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
 from airlight.reference.monte_carlo.single_scatter.stretches import (
     Distances,
     Part,
-    Path,
     Ray,
     Transmittance,
 )
@@ -130,17 +133,15 @@ class FogPart(Part):
         """Return the transmittance of both ways; see `Part`."""
         depth = self._light_depth(point, path)
         transmittance = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
-        return dr.select(
-            unblocked(self.around, *path.shadow_ray(), active), transmittance, 0
-        ), sampler
+        return dr.select(unblocked(self.around, *path.ray, active), transmittance, 0), sampler
 
     def _light_depth(self, point: "mi.Interaction3f", path: Path) -> "mi.Float64":
         """Return the optical depth from the light along paths to points."""
         z = dr.dot(mi.Vector3d(point.p), self.up)
-        if path.end is None:
-            begin = dr.dot(mi.Vector3d(path.begin), self.up)
-            return self._depth(z, begin, mi.Float64(path.length))
-        return self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
+        if path.far:
+            return self._depth_beyond(z, dr.dot(mi.Vector3d(path.away), self.up))
+        begin = dr.dot(mi.Vector3d(path.begin), self.up)
+        return self._depth(z, begin, mi.Float64(path.length))
 
     def _depth_to(self, x: "mi.Float64") -> "mi.Float64":
         """Return the optical depth from the camera to distances x [m]."""
@@ -227,9 +228,9 @@ class GridPart(Part):
     ) -> Transmittance:
         """Return estimates of the transmittance of both ways; see `Part`."""
         camera, sampler = self._tracked((ray.origin, ray.direction, mi.Float(x)), sampler, active)
-        light, sampler = self._tracked(path.shadow_ray(), sampler, active)
+        light, sampler = self._tracked(path.ray, sampler, active)
         return dr.select(
-            unblocked(self.around, *path.shadow_ray(), active), mi.Spectrum(camera * light), 0
+            unblocked(self.around, *path.ray, active), mi.Spectrum(camera * light), 0
         ), sampler
 
     def _tracked(

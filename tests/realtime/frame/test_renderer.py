@@ -3,6 +3,9 @@
 several rays a pixel converge.
 """
 
+import re
+from dataclasses import dataclass
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -10,7 +13,9 @@ from scipy.integrate import quad
 
 from airlight.errors import InputError
 from airlight.realtime.frame.image import render_frame
+from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.frame.samples import render_samples
+from airlight.realtime.methods.interface.method import Layers, Method
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.reference import reference_image
@@ -18,7 +23,8 @@ from airlight.validation.scenes.loading import load_scene
 from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames
 from tests.helpers.frames import frame, reference_of, relative_rmse
-from tests.helpers.scenes import spot, tiny_scene
+from tests.helpers.height_fog import FOG, fog_xml
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 SCENES = {
     "grey": dict,
@@ -137,6 +143,23 @@ def test_the_mean_converges_to_that_over_the_pixels(variant):
     assert fractions == [number / 16 for number in range(1, 17)]
 
 
+def test_further_layers_are_means_too(variant):
+    @dataclass(frozen=True)
+    class Twice(Method):
+        name = "twice"
+        at_once = True
+        uses_kernel = False
+
+        def render(self, view, state, kernel):
+            shown = view.medium.albedo * view.direction.x
+            return Layers(shown, extra={"twice": 2 * shown})
+
+    made = frame_renderer(frames.read(tiny_scene()), Twice, extra_layers=True)
+    frame = render_samples(made, 4)
+    np.testing.assert_allclose(frame.extra["twice"], 2 * frame.airlight, rtol=1e-6)
+    assert np.ptp(frame.airlight) > 0
+
+
 # Lights on rays, by their distance ----------------------------------------------------------------
 
 
@@ -170,6 +193,36 @@ def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, positio
     frame = render_along("unshadowed", position=position, changes={"wall": wall})
     assert np.isfinite(frame.airlight).all()
     assert frame.airlight[4, 4].min() > 0
+
+
+@pytest.mark.parametrize("method", ["unshadowed", "ray-march"])
+@pytest.mark.parametrize(("lamp", "meets"), [((-12, 3, 8), 0), ((-14, 3, 9), 0), ((0, 3, 2), 1)])
+def test_a_light_on_a_ray_above_height_fog_is_rendered(variant, tmp_path, method, lamp, meets):
+    """Nothing is scattered around it: the integral is finite, also with the camera at the lamp."""
+    fog = fog_xml(
+        f'<emitter type="point"><point name="position" value="{str(lamp)[1:-1]}"/></emitter>',
+        size=(9, 7),
+        fog=FOG.replace('z="43"', 'z="3"'),
+    )
+    down = 'origin="-14, 3, 9" target="-8, 3, 6"'
+    (tmp_path / "fog.xml").write_text(re.sub('origin="-13.*2.9"', down, fog))
+    scene = load_scene(str(tmp_path / "fog.xml")).scene
+    if meets:
+        with pytest.raises(InputError, match=r"light 1 is .* column 4 of row 3"):
+            frames.render(scene, method)
+    else:
+        assert frames.render(scene, method).airlight[3, 4].min() > 0
+
+
+@pytest.mark.parametrize(("lamp", "meets"), [(0.0, True), (-2.0, False), (-5.0, False)])
+def test_a_light_on_a_ray_is_refused_within_a_body_of_fog_alone(variant, lamp, meets):
+    body = bounded_medium({"type": "sphere", "center": [0, 0, 1], "radius": 0.5}, 1.0, (0.9,) * 3)
+    how = {"position": [0.0, lamp, 1.0], "changes": {"fog": None, "ball": body}}
+    if meets:
+        with pytest.raises(InputError, match=r"light 1 is .* column 4 of row 4"):
+            render_along("unshadowed", **how)
+    else:
+        assert render_along("unshadowed", **how).airlight[4, 4].min() > 0
 
 
 @pytest.mark.parametrize(

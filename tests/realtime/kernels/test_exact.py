@@ -326,6 +326,14 @@ def test_exact_in_fog_of_droplets(variant, data_folder, precision, allowed):
     assert integrate_cases(cases, "exact", precision) == pytest.approx(cases.value, rel=allowed)
 
 
+def test_a_ray_straight_away_from_a_light_in_a_sharp_lobe():
+    """The square of F at its end is beyond float32: in thin fog the integral was 0."""
+    g, sigma_t = 1 - 2.0**-10, 2.0**-30
+    # (1 - g)/(1 + g)^2 is the function backwards, and 1/4 the integral of 1/(x + 4)^2.
+    found = kernel_values(exact, (-4.0, 0.0, 0.0, np.inf, sigma_t), "hg", g)
+    assert found == pytest.approx((1 - g) / (1 + g) ** 2 / 4, rel=1e-4)
+
+
 def test_exact_across_the_edge_of_droplets_without_their_peak():
     """The function jumps from 0 to its largest value: panels and short segments end there."""
     rng = np.random.default_rng(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`volpath` refuses bodies of media that Mitsuba's rays leap over, and no others."""
+"""`volpath` refuses bodies of media, and gaps, that Mitsuba's rays leap over, and no others."""
 
 import numpy as np
 import pytest
@@ -59,6 +59,15 @@ def test_overlapping_bounding_boxes_alone_are_no_reason():
     # Two thin boxes across the corners of one square, 3 m apart.
     bodies = [("a", box((2, -9, 0), (3, 9, 1), 0.8)), ("b", box((6, -9, 0), (7, 9, 1), 0.8))]
     check(bodies, refused=False)
+
+
+def test_a_body_that_rays_leap_over_is_refused():
+    """Behind it they would never leave its fog."""
+    thin, thick = (box((0, 0, 0), (width, 10, 1), 0.4) for width in (CLOSE / 2, APART))
+    for body in (thin, Sphere(np.zeros(3), 4e-5)):
+        with pytest.raises(InputError, match=r"'film' is .* thick, and Mitsuba's rays leap"):
+            check_gaps([("film", body)])
+    check_gaps([("film", thick)])
 
 
 def check(bodies, *, refused):

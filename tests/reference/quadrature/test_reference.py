@@ -13,6 +13,7 @@ from airlight.reference.quadrature import reference as module
 from airlight.reference.quadrature.reference import reference_image, reference_of_pixels
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.validation.estimates.monte_carlo import monte_carlo_batches
+from airlight.validation.scenes.height_fog import register_height_fog
 from tests.helpers.area_lights import lamp, lit_scene
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -143,6 +144,40 @@ def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
     for target in ([0, 9, 1], [0.5, -4, 1]):
         with pytest.raises(InputError, match="light 1"):
             reference_image(scene_with(None, lamp=lamp(target)))
+
+
+def fog_before_a_lamp(kind):
+    """Return fog that ends at y = -2 or in a voxel there; the camera is in it and looks out."""
+    place = mi.ScalarTransform4f().translate([-9, -10, -9])
+    if kind == "height fog":
+        place = place.rotate([1, 0, 0], -90).scale([1, 1, 8])
+        density = {"type": "heightfog", "sigma_0": 0.3, "to_world": place}
+    else:
+        # Voxels of 2 m along y; the grid ends at its box, or with empty voxels.
+        values = np.full((2, 8 if kind == "empty voxels" else 4, 2, 1), 0.3, np.float32)
+        values[:, 4:] = 0
+        place = place.scale([18, 2 * values.shape[1], 18])
+        density = {"type": "gridvolume", "grid": mi.VolumeGrid(values), "to_world": place}
+    return {"type": "heterogeneous", "id": "fog", "albedo": 0.8, "sigma_t": density}
+
+
+@pytest.mark.parametrize("kind", ["height fog", "box of a grid", "empty voxels"])
+def test_a_light_behind_the_fog_may_lie_on_a_ray(variant, kind):
+    """Nothing around it scatters: the airlight is that of a ray beside it."""
+    register_height_fog()
+
+    def middle(estimator, x, y):
+        scene = scene_with([x, y, 1.0], size=(3, 3), fog=fog_before_a_lamp(kind))
+        return references(scene)[estimator]().reshape(-1, 3, 3, 3)[0, 1, 1]
+
+    on, beside = middle(0, 0.0, 0.0), middle(0, 1e-3, 0.0)
+    assert on == pytest.approx(beside, rel=1e-5)
+    assert on.min() > 0
+    sampled = middle(1, 0.0, 0.0)  # by two samples
+    assert sampled.min() > 0
+    assert np.isfinite(sampled).all()
+    with pytest.raises(InputError, match=r"light 1 at .* m from the ray"):
+        middle(0, 0.0, -3.0)
 
 
 def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):

@@ -139,6 +139,16 @@ def test_a_sphere_of_fog_has_the_radius_of_its_surface(variant):
     assert bounds.radius == pytest.approx(2.0, rel=1e-7)
 
 
+def test_shapes_keep_their_names(variant):
+    """Names that are no keys of a dictionary became numbers in messages."""
+    nothing = {"type": "sphere", "bsdf": {"type": "null"}}
+    scene = mi.load_dict(tiny_scene(nothing=nothing))
+    for number, shape in enumerate(scene.shapes()):
+        shape.set_id(f"wall.{number}")
+    read_reference(scene)
+    assert [shape.id() for shape in scene.shapes()] == ["wall.0", "wall.1", "wall.2"]
+
+
 def test_shapes_are_sorted_and_others_refused_by_name(variant):
     disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([0, 0, 3])}
     shapes = read_shapes(mi.load_dict(tiny_scene(lid=disk)))

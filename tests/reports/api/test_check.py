@@ -119,6 +119,7 @@ def test_the_same_frame_twice_can_be_asked_alone(folder):
         (("--margin", "2"), "margin: got 2"),
         (("--set", "kernel=exact", "--precision", "double"), "leave out kernel, precision"),
         (("--set", "steps=8"), "leave out steps"),
+        (("--size", "32x24"), "leave out size"),
     ],
 )
 def test_what_a_folder_has_not_is_refused(folder, capsys, words, why):
@@ -208,3 +209,8 @@ def test_an_engine_renders_the_frames(variant, tmp_path):
     }
     assert linear.notes == ("sum is left out: Flat: it takes one lamp",)
     assert airlight.check("open-fog", only="intensity", cap=1.0, **how)["intensity"].fails
+    # An engine that tells no equation may have any edge of spots: no guess is judged.
+    text = (tmp_path / "flat.py").read_text()
+    (tmp_path / "flat.py").write_text(text.replace('"model": "physical", ', ""))
+    (note,) = airlight.check("open-fog", only="intensity,reciprocity", **how).notes
+    assert note.startswith("reciprocity is left out: the engine does not say which equation")

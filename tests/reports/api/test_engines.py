@@ -129,6 +129,7 @@ def test_the_page_and_the_table_have_the_numbers_of_the_data(written):
     # The sentence on the engine is of both scenes.
     assert made.claims[0].startswith("Fake 1.2 in 2 scenes: its equation is ")
     assert "and 2 of 2 right by it; 1 more it does not have." in made.claims[0]
+    assert "--size 48x36" in data["command"]  # that a shell takes
 
 
 @pytest.mark.claim("engines-moved")
@@ -244,6 +245,27 @@ def test_what_has_no_physical_image_is_told_so_and_not_taken_for_physics(variant
     assert "1 of 1 right by it" in said
     (cell,) = made.data.cells
     assert "nothing of it arrives" in cell.headline
+
+
+@pytest.mark.claim("engines-judged")
+def test_an_equation_that_nobody_told_is_not_taken_for_that_of_physics(variant, tmp_path):
+    """An adapter tells none for settings that no term says."""
+    own, out = tmp_path / "adapters", tmp_path / "out"
+    own.mkdir()
+    text = ENGINE.format(python=sys.executable, model="").replace('"model": ""', '"model": None')
+    (own / "mute.py").write_text(text)
+    exact = airlight.reference("open-fog", size=SIZE)
+    layers = {"airlight": 1.03 * exact.airlight, "surface": exact.surface}
+    write_exr(own / "open-fog.exr", Image(layers))
+    made = airlight.report("open-fog", engines="mute", size=SIZE, adapters=own, output=out)
+    (said,), (cell,) = made.claims, made.data.cells
+    assert said.endswith("its equation is not known, and its images are 3 % off physics.")
+    assert cell.layer("airlight").blocks == {
+        "equation": None,
+        "algorithm": None,
+        "total": pytest.approx(0.03, abs=1e-4),
+    }
+    assert "Equation: not known" in (out / "engines.html").read_text(encoding="utf-8")
 
 
 def test_data_of_another_version_are_refused(tmp_path):

@@ -150,3 +150,13 @@ def test_a_score_of_before_is_read_and_a_reason_with_an_error_is_refused(tmp_pat
     file.write_text(json.dumps(data))
     with pytest.raises(InputError, match=r"random-4 has no image and the error .* expected 1"):
         read_score(file)
+
+
+def test_a_score_with_the_words_of_another_entry_is_refused(tmp_path):
+    """The board says that the seed follows from the words."""
+    file = tmp_path / "a.json"
+    data = json.loads(score_text(score("a", 0.1)))
+    data["entry"]["entry"] = "another method, commit abc"
+    file.write_text(json.dumps(data))
+    with pytest.raises(InputError, match="has the seed"):
+        read_score(file)

@@ -22,6 +22,10 @@ def test_the_text_that_is_printed_is_the_file_that_is_written(tmp_path, capsys):
     assert run([*asked, "-o", str(target)]) == 0
     assert capsys.readouterr().out == f"wrote {target}\n"
     assert target.read_text() == printed
+    assert run([*asked, "-o", str(target), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["result"]
+    told = said["language"], said["phase"], said["code"], said["written"]
+    assert told == ("hlsl", "hg", printed, [str(target)])
     assert "airlight export exact --language hlsl --phase hg --test)" in printed
     assert len(re.findall(r"worst = al_worse\(worst, abs\(al_integral", printed)) == 8
     assert run(["export", "exact", "--phase", "hg", "--language", "hlsl"]) == 0

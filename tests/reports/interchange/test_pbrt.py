@@ -11,7 +11,7 @@ import airlight
 from airlight.errors import InputError
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
-from airlight.reports.interchange.pbrt import pbrt_scene, write_pbrt
+from airlight.reports.interchange.pbrt import pbrt_scene
 from airlight.reports.interchange.scene import describe_scene
 from airlight.validation.scenes.loading import LoadedScene, load_scene
 from airlight.validation.scenes.names import scene_names
@@ -33,7 +33,8 @@ QUICK = ("open-fog", "sphere-spot", "windows")
 def references(name, folder):
     """Return the references of a built-in scene and of what is written of it."""
     loaded = load_scene(name, (16, 12))
-    (path,) = write_pbrt(folder / f"{name}.pbrt", loaded)
+    path = folder / f"{name}.pbrt"
+    path.write_text(pbrt_scene(loaded))
     return [
         quadrature_image(read_reference(scene))
         for scene in (loaded.scene, load_scene(str(path), (16, 12)).scene)
@@ -80,7 +81,7 @@ def test_every_scene_keeps_its_reference(variant, tmp_path, name):
 @pytest.mark.parametrize("name", ["two-pens", "mist"])
 def test_what_pbrt_lacks_is_refused_by_name(variant, tmp_path, name):
     with pytest.raises(InputError, match=REFUSED[name]):
-        write_pbrt(tmp_path / "x.pbrt", load_scene(name))
+        airlight.describe(name, output=tmp_path / "x.pbrt")
     assert not list(tmp_path.iterdir())
 
 
@@ -122,7 +123,8 @@ def test_round_shapes_and_area_lights_are_the_same_numbers(variant, tmp_path):
     }
     shapes["bulb"]["emitter"] = emitter
     first = loaded(**shapes)
-    (path,) = write_pbrt(tmp_path / "x.pbrt", first)
+    path = tmp_path / "x.pbrt"
+    path.write_text(pbrt_scene(first))
     second = load_scene(str(path))
     one, other = (
         sorted(

@@ -22,7 +22,7 @@ SCENES = {scene.name: scene for scene in kit_scenes()}
 #: A method of single precision whose shadows are exact in the scene: of spheres by their shadow
 #: volumes, of spots with a soft edge by planes.
 WITH_SPHERES = ("sphere-shadow", "thick-spheres", "three-spheres", "hard-spot", "many-lights")
-#: Scenes that pbrt cannot have; see `write_pbrt`.
+#: Scenes that pbrt cannot have; see `pbrt_scene`.
 NOT_FOR_PBRT = {"light-behind", "camera-in-shadow", "hard-spot", "soft-spot"}
 #: z up of the scene as y up.
 TURN = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])

@@ -228,6 +228,10 @@ def test_a_scene_is_within_only_as_far_as_the_reference_of_each_medium_tells(swe
         several[1]["reference.error"] = known
         made = claim(samples(sweep_of(several))[0], 1e-3)
         assert (made.within, made.undecided) == counted
+        # One medium decides against the scene, whatever the other's reference may hide.
+        several[0]["error.relative_rmse"] = 5e-3
+        made = claim(samples(sweep_of(several))[0], 1e-3)
+        assert (made.within, made.undecided) == (0, 0)
 
 
 def test_references_without_an_error_are_counted_beside_the_known_ones(sweep_of):

@@ -330,6 +330,17 @@ def test_what_holds_for_the_fog_alone_is_not_judged_by_all_light():
     assert {each.verdict for each in found} == {HOLDS}
 
 
+def test_the_worst_place_is_in_pixels_of_the_frames():
+    """`thin` compares means over 2 x 2 pixels, and named a place at half of the way to the fault."""
+    frames = {
+        name: {"total": value * np.ones((48, 64, 3))} for name, value in zip("abc", (4, 2, 1))
+    }
+    frames["b"]["total"][24:32, 40:48] *= 1.2
+    (kept,) = judge([Asked("thin", tuple("abc"))], frames, rounding=1e-6, layer="total")
+    column, row = map(int, kept.worst.split(", "))
+    assert (40 <= column < 48, 24 <= row < 32) == (True, True)
+
+
 def test_a_rim_falls_from_one_on_the_axis_to_nothing_at_the_edge():
     camera = Camera(60.0, cone=25.0)
     weights = {
@@ -338,6 +349,9 @@ def test_a_rim_falls_from_one_on_the_axis_to_nothing_at_the_edge():
     }
     assert weights["rim:1"] == pytest.approx(weights["cosine"])
     assert weights["rim:3"] == pytest.approx(1 - (1 - weights["cosine"]) ** 3)
+    # A cone as wide as the frame is whole: 30 degrees in a frame of 60 were refused.
+    for cone in (15.0, 30.0, 60.0):
+        assert Camera(2 * cone, cone=cone).sensitivity(8, 8).max() > 0
     for words in ("rim:", "rim:0", "rim:nan", "rim:-1", "edge"):
         with pytest.raises(InputError, match="rim:POWER"):
             replace(camera, falloff=words).sensitivity(8, 8)

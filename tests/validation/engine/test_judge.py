@@ -456,6 +456,11 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     np.testing.assert_allclose([verdict.block_error, verdict.block_noise], 0.04 / 8, rtol=0.05)
     noisy = judge(expected, expected + 4 * (image - expected), find_hints(expected, image), ())
     assert "most of it scatter of single pixels" in noisy.words
+    # A block of four pixels shows three quarters of their variance about its mean: 15 % were missing.
+    four = image[:28, :]
+    verdict = judge(expected[:28], four, find_hints(expected[:28], four), ())
+    assert verdict.block == 2
+    assert verdict.block_noise == pytest.approx(0.04 / 2, rel=0.05)
     # Single pixels do not show their own scatter: it was said to be 0 %.
     small = judge(expected[:12, :16], image[:12, :16], find_hints(expected, expected), ())
     assert (small.block, np.isnan(small.block_noise)) == (1, True)

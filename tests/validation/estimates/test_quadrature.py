@@ -133,6 +133,26 @@ def test_a_mean_may_be_off_by_less_than_its_values():
     assert off_by(replace(reference, surface_error=None), "surface") == (np.inf, np.inf)
 
 
+def test_an_error_that_all_pixels_share_stays_in_their_mean():
+    """All rays have the same directions of a sky: its error was divided by the root of the pixels."""
+    layer, random = np.ones((12, 16, 3)), np.random.default_rng(3)
+    for shared in (False, True):
+        size = (8, 1, 1, 1) if shared else (8, *layer.shape[:2], 1)
+        replicates = 1 + 0.02 * random.normal(size=size) * layer
+        spread = replicates.std(axis=0, ddof=1) / np.sqrt(8)
+        means = np.stack([replicates.mean(axis=(1, 2)), np.zeros((8, 3))])
+        image = ReferenceImage(layer, 0 * layer, 0 * layer, layer[..., 0], layer[..., 0], 0, 0.0)
+        seen = {"airlight_se": spread, "surface_se": 0 * layer, "replicate_means": means}
+        sampled = replace(image, surface_error=0 * layer, **seen)
+        for name in ("airlight", "total"):
+            mean, value = off_by(sampled, name)
+            # Half of Student's interval for seven degrees of freedom.
+            if shared:
+                assert mean == pytest.approx(2.3646 * spread.mean(), rel=1e-4)
+            else:
+                assert mean < 3 * value / np.sqrt(12 * 16)
+
+
 def test_variances_of_the_total_add_up():
     layer = np.ones((1, 1, 3))
     none = np.full((1, 1), np.inf)

@@ -105,6 +105,7 @@ def test_a_margin_below_the_error_of_the_reference_is_not_kept(lights, tmp_path,
     """
     changes, references = {"light.position": lights[0]["light.position"][:7]}, lights[1][:7]
     monkeypatch.setattr(judge, "relative_error", lambda known: 0.05)
+    monkeypatch.setattr(judge, "off_by", lambda *reference, emitted: (0.05, 0.05))
     files = written(
         tmp_path, [1.004 * each for each in references], changes=changes, pixel="centre"
     )

@@ -60,10 +60,25 @@ def test_size_that_no_image_has_is_refused(variant, size):
         load_scene("open-fog", size)
 
 
-@pytest.mark.parametrize("size", [(16, 12), (31, 12), (9, 40), (1, 1)])
-def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_file, size):
+FOV = '<float name="fov" value="41.7"/>'
+LENSES = [
+    FOV,
+    *(f'{FOV}<string name="fov_axis" value="{axis}"/>' for axis in ("y", "smaller", "larger")),
+    '<string name="focal_length" value="60mm"/>',  # an angle along the diagonal
+]
+
+
+@pytest.mark.parametrize(
+    ("size", "lens"),
+    [
+        *((size, FOV) for size in ((16, 12), (1, 1))),
+        *((size, lens) for size in ((31, 12), (9, 40)) for lens in LENSES),
+    ],
+)
+def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_file, size, lens):
     """For Mitsuba's own rays and for both readers."""
-    expected = mi.load_string(scene_xml(size=size, fov=41.7))
+    expected = mi.load_string(scene_xml(size=size, fov=41.7).replace(FOV, lens))
+    small_file.write_text(SMALL.replace(FOV, lens))
     resized = load_scene(str(small_file), size).scene
     np.testing.assert_array_equal(
         read_reference(resized).direction, read_reference(expected).direction

@@ -3,6 +3,7 @@
 why; costly work asks first.
 """
 
+import math
 import weakref
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,7 +13,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from airlight.analytic.clock import Spent
 from airlight.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.memory import Memory
@@ -88,21 +88,23 @@ def test_an_error_of_the_reference_is_no_bias_of_runs_by_pixel():
     runs = [1 + 0.01 * random.normal(size=own.shape) for _ in range(8)]
 
     def found(runs, error):
-        of = sampled.Reference(
-            1 + own, np.full(own.shape, error), "statistical", None, None, None, Spent()
-        )
-        return module._runs_error(of, runs)
+        none, spread = np.zeros(own.shape), np.full(own.shape, error)
+        image = ReferenceImage(1 + own, none, none, none[..., 0], none[..., 0], 0, 0.0)
+        image = replace(image, airlight_se=spread, surface_se=none)
+        return module._runs_error(sampled.of_image(image), runs)
 
-    exact, known = found(runs, 0.0), found(runs, 3 * 2e-3)
+    exact, known = found(runs, 0.0), found(runs, 2e-3)
     assert exact.root_bias == pytest.approx(2e-3, rel=0.3)
     assert known.root_bias is None
     # The words on the bias hold for the true image, not for the reference alone.
+    # Its pixels are drawn apart: the mean of 192 has less error than each by the root of that.
     scale = (1 + own).mean()
-    assert known.bias_within - exact.bias_within == pytest.approx(3 * 2e-3 / scale)
-    assert known.most_bias - exact.most_bias == pytest.approx(3 * 2e-3 / scale)
-    # A bias beyond that is found all the same.
-    biased = found([run + 0.02 for run in runs], 3 * 2e-3)
-    assert biased.root_bias == pytest.approx(0.02, rel=0.1)
+    assert known.bias_within - exact.bias_within == pytest.approx(2 * 2e-3 / scale / math.sqrt(192))
+    assert known.most_bias - exact.most_bias == pytest.approx(2 * 2e-3 / scale)
+    # A bias beyond that is found all the same; it had to be beyond three standard errors.
+    for bias in (0.02, 5.5e-3):
+        biased = found([run + bias for run in runs], 2e-3)
+        assert biased.root_bias == pytest.approx(math.hypot(bias, 2e-3), rel=0.2)
 
 
 @pytest.mark.parametrize("known", [False, True])

@@ -52,11 +52,15 @@ _TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "volume")
 _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
-def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> mi.Object:
+def read_file(
+    path: Path,
+    lobes: Mapping[str, float] = MappingProxyType({}),
+    size: tuple[int, int] | None = None,
+) -> mi.Object:
     """Read a scene file: an `mi.Scene`, or another object of Mitsuba where the file has no scene.
 
-    Isotropic media get the mean cosines that `lobes` has for their ids. Features that no
-    command can take are refused.
+    Isotropic media get the mean cosines that `lobes` has for their ids, films the width and height
+    of `size` [pixels] if there is one. Features that no command can take are refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
     # The resolver is global in Mitsuba: files beside this scene must not be found from the next
@@ -66,9 +70,9 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
         mi.set_file_resolver(mi.FileResolver(resolver))
         mi.file_resolver().prepend(str(path.parent))
         if is_pbrt(path):
-            return _translated(config, path, lobes)
+            return _translated(config, path, lobes, size)
         check_text(path)
-        return _built(config, _parsed(config, path), path, lobes)
+        return _built(config, _parsed(config, path), path, lobes, size)
     except (InputError, MissingError):
         raise
     # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
@@ -79,7 +83,10 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
 
 
 def _translated(
-    config: mi.parser.ParserConfig, path: Path, lobes: Mapping[str, float]
+    config: mi.parser.ParserConfig,
+    path: Path,
+    lobes: Mapping[str, float],
+    size: tuple[int, int] | None,
 ) -> mi.Object:
     """Read a file of pbrt: its translation is treated as every other file."""
     # The meshes of the translation are files, which must be there until the scene is built.
@@ -88,7 +95,7 @@ def _translated(
         for note in translation.notes:
             mi.Log(mi.LogLevel.Warn, note)
         state = mi.parser.parse_string(config, translation.xml)
-        return _built(config, _resolved(config, state), path, lobes)
+        return _built(config, _resolved(config, state), path, lobes, size)
 
 
 def _parsed(config: mi.parser.ParserConfig, path: Path) -> mi.parser.ParserState:
@@ -122,6 +129,7 @@ def _built(
     state: mi.parser.ParserState,
     path: Path,
     lobes: Mapping[str, float],
+    size: tuple[int, int] | None,
 ) -> mi.Object:
     if kind(state, 0) != "Scene":
         return mi.parser.instantiate(config, state)
@@ -130,6 +138,8 @@ def _built(
     # The identity of the scene is that of the repaired description, before shapes are rewritten by
     # what Mitsuba builds.
     digest = description_digest(state)
+    if size is not None:
+        _give_size(state, size)
     with temporary_folder() as folder:
         notes = cylinders_as_meshes(state, folder)
         # which takes the nodes apart
@@ -183,6 +193,18 @@ def _leave_out_rendering(state: mi.parser.ParserState) -> None:
                     if name in film:
                         plain_film[name] = film[name]
                 state.nodes[at].props = plain_film
+
+
+def _give_size(state: mi.parser.ParserState, size: tuple[int, int]) -> None:
+    """Give all films another size, whole: Mitsuba takes the angle of view along the axis of the
+    camera's `fov_axis`, which a camera that is built does not tell.
+    """
+    for index in of_kind(state, "Film"):
+        film = properties(state, index)
+        for name in _FILM:
+            if name in film:
+                del film[name]
+        film["width"], film["height"] = size
 
 
 def check_kinds(state: mi.parser.ParserState) -> None:

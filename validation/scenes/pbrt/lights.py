@@ -30,7 +30,7 @@ from airlight.validation.scenes.pbrt.directives import Directive, check_names, c
 from airlight.validation.scenes.pbrt.state import Part
 
 _WHITE = (1.0, 1.0, 1.0)
-_PIECES = 8  # of the edge of a spot: they are within 0.7 % of the intensity
+_PIECES = 8  # of the edge of a spot: they are within 0.9 % of the intensity
 
 
 def words(values: ArrayLike) -> str:

@@ -207,6 +207,21 @@ def test_the_error_falls_with_the_grid_in_order(variant):
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
 
 
+def test_a_sharp_lobe_keeps_its_digits_in_float32(variant):
+    """A cosine has lost the angle: values were wrong by a hundredth."""
+    ball = {"type": "sphere", "center": [0.1, 0.0, 0.6], "radius": 0.5}
+    body = bounded_medium(ball, 0.9, (0.9,) * 3, phase={"type": "hg", "g": 0.996})
+    sun = {"type": "directional", "direction": [0.1, -4.1, 0.7], "irradiance": 3.0}
+    scene = clear_scene(lamp=sun, ball=body)
+    scene["sensor"] = scene["sensor"] | {"fov": 2.0}
+    single, double = (
+        render(scene, "froxel-fog", precision=precision, width=16, height=12).airlight
+        for precision in ("single", "double")
+    )
+    assert double.min() > 0
+    np.testing.assert_allclose(single, double, rtol=3e-4)
+
+
 def test_shadows_of_the_sun_are_there(variant):
     scene = probes.sun()
     exact = reference_of(scene).airlight

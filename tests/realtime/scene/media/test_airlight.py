@@ -15,6 +15,7 @@ from airlight.realtime.frame.image import render_frame
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.closed_mesh import Bounds
 from airlight.realtime.scene.media.bounded import BoundedMedia
+from airlight.realtime.scene.media.light_paths import LightPaths
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import Isotropic
 from airlight.realtime.scene.read_media import make_bounded_medium
@@ -215,6 +216,18 @@ def test_airlight_and_surfaces_are_those_of_the_reference(variant, name):
         assert walked[2, 2] == pytest.approx(reference.airlight[2, 2], rel=1e-5)
 
 
+def test_a_box_that_lets_no_red_through_has_the_colours_of_three_grey_ones(variant):
+    """Panels of red ran out where the other colours alone have light: 4 of 48 pixels."""
+    scene = dense_box(1.0, SMALL)
+    colour = {"type": "rgb", "value": [1.0, 1e-3, 1e-4]}
+    spectral = {"sigma_t": colour, "scale": 1000.0, "has_spectral_extinction": True}
+    scene["ball"] = scene["ball"] | {"interior": scene["ball"]["interior"] | spectral}
+    found = frames.render(scene).airlight
+    for channel, sigma_t in enumerate((1000.0, 1.0, 0.1)):
+        grey = frames.render(dense_box(sigma_t, SMALL)).airlight
+        assert relative_rmse(found[..., channel], grey[..., channel]) < 1e-4
+
+
 def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
     """A sum of some of the panels was a dark pixel in silence."""
     monkeypatch.setattr("airlight.realtime.scene.media.bounded_rays._MOST", 1)
@@ -255,6 +268,28 @@ def test_thin_fog_keeps_the_digits_of_an_ambient_field(variant, sigma_t):
         for distance in (3.25, 6.5):
             found = np.array(medium.ambient(rays, types.scalar(distance)), dtype=np.float64)
             assert found == pytest.approx(-np.expm1(-sigma_t * (distance - begin)), rel=2e-6)
+
+
+def test_depths_in_a_bubble_change_no_faster_than_panels_expect(variant):
+    """Towards the light a path loses fog around the bubble by as much as it gains of thin fog."""
+    types, around = array_types("double"), 2.0
+    thin = Homogeneous((types.scalar(0.01),), types.color(1), Isotropic())
+    no_planes = np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3))
+    bounds = Bounds("ball", *no_planes, np.zeros(3), 1.5)
+    bubble = make_bounded_medium(thin, bounds, types)
+    light = types.vector(2.25, 0.3, 0.2)
+    path = LightPaths(bubble, 1.0, light, types.vector(-1, 0, 0), types.vector(1, 0, 0), own=True)
+
+    def length(x):
+        x = types.scalar(x)
+        return path.length(None, x, dr.norm(path.away(x)))
+
+    x, step = np.linspace(0.1, 1.9, 7), 1e-6
+    change = np.array(length(x + step) - length(x - step)) / (2 * step) * (around - 0.01)
+    r = dr.norm(path.away(types.scalar(x)))
+    rate, _ = path.growth(None, types.scalar(x), r, (types.scalar(around),), [True])
+    assert np.abs(change).min() > 1
+    assert np.all(np.array(rate) >= np.abs(change) * (1 - 1e-6))
 
 
 def test_steps_in_a_bubble_of_thin_fog_go_on_to_its_end(variant):

@@ -147,6 +147,19 @@ def test_a_lamp_may_stand_at_the_origin(variant):
     assert total == pytest.approx(expected, rel=0.02)
 
 
+def test_a_sun_is_looked_for_from_the_points_and_not_from_afar(variant):
+    """In a box of 40 km a walk from beyond all shapes lost the shadows next to a ball of 0.4 m, and
+    2 % of the light of the floor.
+    """
+    box = {"type": "cube", "to_world": mi.ScalarTransform4f().scale([2e4, 2e4, 3.0])}
+    box |= {"bsdf": {"type": "null"}, "interior": {"type": "ref", "id": "fog"}}
+    reference = read_reference(_load(lamp=None, sun=sun(), box=box))
+    surface = _run(reference, samples=1, batches=1).mean[1]
+    expected = quadrature_image(reference).surface.reshape(-1, 3)
+    assert (expected.max(axis=1) > 0).sum() > 20
+    np.testing.assert_allclose(surface, expected, rtol=1e-4, atol=1e-5 * expected.max())
+
+
 @pytest.mark.claim("enclosed-light")
 def test_enclosed_light_gives_exactly_zero(variant):
     closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
