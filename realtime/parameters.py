@@ -25,7 +25,7 @@ from typing import Any
 
 from airlight.errors import InputError, nearest
 
-MOST_STEPS = 1 << 24  #: of a ray: float32, in which they are counted, has no odd number above
+MOST_STEPS = 10**7  #: of a ray: float32, in which they are counted, has no odd number above 2^24
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 

@@ -24,7 +24,7 @@ from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames
 from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.height_fog import FOG, fog_xml
-from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 SCENES = {
     "grey": dict,
@@ -217,12 +217,14 @@ def test_a_light_on_a_ray_above_height_fog_is_rendered(variant, tmp_path, method
 @pytest.mark.parametrize(("lamp", "meets"), [(0.0, True), (-2.0, False), (-5.0, False)])
 def test_a_light_on_a_ray_is_refused_within_a_body_of_fog_alone(variant, lamp, meets):
     body = bounded_medium({"type": "sphere", "center": [0, 0, 1], "radius": 0.5}, 1.0, (0.9,) * 3)
-    how = {"position": [0.0, lamp, 1.0], "changes": {"fog": None, "ball": body}}
+    scene = clear_scene(size=(9, 9), ball=body)
+    scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
+    scene["lamp"]["position"] = [0.0, lamp, 1.0]
     if meets:
         with pytest.raises(InputError, match=r"light 1 is .* column 4 of row 4"):
-            render_along("unshadowed", **how)
+            frames.render(scene, "unshadowed")
     else:
-        assert render_along("unshadowed", **how).airlight[4, 4].min() > 0
+        assert frames.render(scene, "unshadowed").airlight[4, 4].min() > 0
 
 
 @pytest.mark.parametrize(

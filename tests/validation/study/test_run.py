@@ -343,7 +343,7 @@ def test_a_user_is_told_before_a_command_runs_for_minutes(variant, monkeypatch):
     "command",
     [
         ["render", "open-fog", "--size", "16384x16384"],
-        ["render", "open-fog", "--size", "8x6", "--set", "steps=9999999999999"],
+        ["render", "open-fog", "--size", "800x600", "--set", "steps=10000000"],
         ["reference", "open-fog", "--estimator", "volpath", "--samples", "100000000000"],
         ["study", "methods", "open-fog", "--size", "16384x16384"],
     ],
