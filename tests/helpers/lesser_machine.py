@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `airlight challenge` as a processor of 2009 computes it.
+"""The command `airlight challenge` as a processor of 2013 computes it.
 
-`python -m tests.helpers.lesser_machine new 7 -o FOLDER` has kernels of Dr.Jit for x86-64-v2 in
-packets of four, without fused multiplications, and asks for the same of NumPy, OpenBLAS and Embree.
-Challenges are small ones, of three scenes.
+`python -m tests.helpers.lesser_machine new 7 -o FOLDER` has kernels of Dr.Jit for x86-64-v3 in
+packets of four; older ones lack the fused multiplications that its kernels ask for. NumPy, OpenBLAS
+and Embree compute as on a processor of 2009. Challenges are small ones, of three scenes.
 """
 
 import ctypes
@@ -17,7 +17,7 @@ ENVIRONMENT = {
     "AVX2 FMA3",
     "OPENBLAS_CORETYPE": "Nehalem",
 }
-_TARGET, _PACKET = b"x86-64-v2", 4
+_TARGET, _PACKET = b"x86-64-v3", 4
 
 
 def main() -> int:
