@@ -161,7 +161,7 @@ def pair_of(
     frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
     # The batches of light paths give the standard error.
     traced = monte_carlo_reference(
-        loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress
+        loaded, "cloud-paths", budget=Budget(samples=samples), orders=(), progress=progress
     ).image
     method, paths, error = (
         np.array(layer, dtype=np.float64)

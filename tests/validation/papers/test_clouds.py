@@ -120,3 +120,13 @@ def test_a_frame_with_moved_light_makes_its_maps_and_its_light(monkeypatch):
     monkeypatch.setattr(clouds, "first_frame", lambda renderer: None)
     monkeypatch.setattr(clouds, "time_repeated", lambda work, seconds: next(timings))
     assert clouds._light_moved(None) == Timing(13.0, 11.0, 16.0, 5)
+
+
+@pytest.mark.slow  # two transports through clouds
+@pytest.mark.parametrize("name", ["stratocumulus", "ring"])
+def test_pairs_are_of_the_scenes_themselves(variant, name):
+    """The method and light paths through a cloud that is not convex: of the same order."""
+    image, paths, error = clouds.pair_of(clouds.shown(name, (12, 9)), 16)
+    assert image.shape == paths.shape == error.shape == (9, 12, 3)
+    assert 0.5 < image.sum() / paths.sum() < 2
+    assert 0 < error.sum() < paths.sum()
