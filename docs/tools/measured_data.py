@@ -9,6 +9,7 @@ of `airlight study kernels`, or null). `fill_pages.py` then writes the tables of
 
 import argparse
 import json
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,8 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
     return {
         "report": {
             "created": report["created"],
-            "command": report["command"],
+            # The folder of the report is one of the machine that made it.
+            "command": re.sub(r" (-o|--output)[ =]\S+", "", report["command"]),
             "effort": report["settings"]["name"],
             "timed": report["settings"]["measure"]["timed_size"] or report["settings"]["sizes"][0],
             "processor": environment["processor"],

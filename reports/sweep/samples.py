@@ -249,7 +249,7 @@ def samples(sweep: Sweep) -> list[Sample]:
     labels, scenes, statuses = sweep["label"], sweep["scene"], _statuses(sweep)
     methods, errors = sweep["method"], errors_of(sweep)
     # An error of a reference that is not known may be anything. A black reference has no relative
-    # error: what is compared with it is black or not. What is infinite is so for any reference.
+    # error: what is compared with it is black or not. An infinite error stays one for any reference.
     decided = (sweep["reference.mean"] == 0) | np.isinf(errors)
     reference_errors = np.nan_to_num(sweep["reference.error"], nan=np.inf)
     reference_errors = np.where(decided, 0.0, reference_errors)
