@@ -18,9 +18,9 @@ samples are equi-angular (`reference.monte_carlo.single_scatter.distance_samplin
 **Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own
 majorant m (Novak, Selle, Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson
 process of the density m. They use no cell of the grid and no optical depth. Distances are
-equi-angular about lights at places and even under suns and skies, between the ends of the box.
-Integrands are bounded: over the angle at a place sigma_t T_1 T_2 p height, under a sun sigma_t T_1
-T_2 p.
+even under suns and skies, between the ends of the box, and under lights at places a mixture of even
+and equi-angular ones. Integrands are bounded: over the angle at a place by twice sigma_t T_1 T_2 p
+height, under a sun by sigma_t T_1 T_2 p.
 """
 
 from dataclasses import dataclass
@@ -210,14 +210,14 @@ class GridPart(Part):
         length: "mi.Float64",
         span: Span | None,
     ) -> Distances:
-        """Sample distances evenly, for a light at a place one half of them by the angle at the light;
-        see `Part`.
-
-        By the angle alone a ray that meets the light in an empty voxel would see nothing else.
+        """Sample distances evenly, for a light at a place one half of them by the angle at it; see
+        `Part`.
         """
         u = mi.Float64(u)
         if span is None:
             return u * length, 1 / length
+        # A ray may meet the light in an empty voxel: the angle is a step there. Half of the samples
+        # have it; one distribution function of both, as in `sample_distance`, is not inverted there.
         y = dr.select(u < 0.5, equi_angular(2 * u, span), (2 * u - 1) * length)
         return y, 0.5 * (1 / length + equi_angular_pdf(y, span))
 
