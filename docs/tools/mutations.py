@@ -15,6 +15,7 @@ another draw. A line that runs once, when its file is imported, has the tests th
 the file, and a line that no test runs, or only a process of its own, those that run anything of its
 folder. The fastest are run first, and no more of them than take LONGEST. `--again FILES` tries the
 survivors of the record by all tests of these files, such as new ones, and keeps their judgements.
+`--more` adds another draw to the record, which keeps what survived before.
 """
 
 import argparse
@@ -249,7 +250,7 @@ def survey(
             for name in filter(None, tracked.split("\0")):
                 place = Path(folder, str(number), name)
                 place.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(ROOT / name, place)
+                shutil.copy2(ROOT / name, place, follow_symlinks=False)
             copies.put(Path(folder, str(number)))
 
         def tried(mutation: Mutation) -> Outcome:
@@ -278,19 +279,19 @@ def main() -> None:
         metavar="FILE",
         help="test files that the survivors of the record meet",
     )
+    parser.add_argument("--more", action="store_true", help="add the draw to the record")
     asked = parser.parse_args()
+    kept = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
     if asked.again:
-        record = json.loads(RECORD.read_text(encoding="utf-8"))
-        before = [
+        record = kept
+        those = [
             Outcome(**(each | {"mutation": Mutation(**each["mutation"])}))
             for each in record["survivors"]
         ]
         record["survivors"] = []
         for old, each in zip(
-            before,
-            survey(
-                [each.mutation for each in before], lambda _: (asked.again, LONGEST), asked.jobs
-            ),
+            those,
+            survey([each.mutation for each in those], lambda _: (asked.again, LONGEST), asked.jobs),
         ):
             if each.survived:
                 record["survivors"].append(asdict(replace(old, change=each.change)))
@@ -306,16 +307,17 @@ def main() -> None:
         tests = tests_of(mutation, found, took)
         return tests, sum(took.get(test, 0.0) for test in tests)
 
+    before: dict[str, Any] = kept if asked.more else {"sample": 0, "seeds": [], "survivors": []}
     outcomes = []
     for each in survey(chosen, tests_for, asked.jobs):
         outcomes.append(each)
-        survivors = [asdict(each) for each in outcomes if each.survived]
+        survivors = before["survivors"] + [asdict(each) for each in outcomes if each.survived]
         record = {
             "date": time.strftime("%Y-%m-%d"),
             "rooms": list(asked.rooms),
             "of": len(every),
-            "sample": len(outcomes),
-            "seed": asked.seed,
+            "sample": before["sample"] + len(outcomes),
+            "seeds": [*before["seeds"], asked.seed],
             "survived": len(survivors),
             "survivors": survivors,
         }

@@ -372,6 +372,22 @@ def test_numbers_that_take_away_a_little_of_an_unknown_rest_are_not_worth_it():
     assert candidates_of(right, (best, little)).chosen is best
 
 
+def test_a_fault_that_is_nearly_the_image_is_chosen_by_evidence_where_errors_are_noise():
+    """Cycles at 1.05 times the exposure in fog of 0.25/m: without its first 0.2 m the fog makes
+    nearly that image with no number to find, and leaves 3 % more of the noise.
+    """
+    noise = np.random.default_rng(1).normal(0, 0.0075, (1024, 1)).repeat(3, axis=1)
+    nearly = noise + 0.001 * np.linspace(-1, 3, 1024)[:, None]
+    right = replace(explained(0.026), errors=noise + 0.026)
+    factor, plane = (
+        replace(explained(float(np.abs(errors).mean()), numbers, name=name), errors=errors)
+        for errors, numbers, name in ((noise, (1.05,), "factor"), (nearly, (), "near-plane"))
+    )
+    assert candidates_of(right, (plane, factor), noise=True).chosen is factor
+    # Errors that are none hide such a difference: the simpler fault is chosen.
+    assert candidates_of(right, (plane, factor)).chosen is plane
+
+
 def test_a_pair_of_as_few_numbers_needs_no_more_than_evidence():
     """A rest that no fault makes hides how much better two faults are than another one of two
     numbers.

@@ -103,18 +103,25 @@ def test_rays_may_end_before_surfaces(variant):
         np.testing.assert_allclose(found[:, pixel], layers[:, 0], rtol=1e-9)
 
 
-def test_a_channel_is_named_alone_and_three_with_their_factors(variant):
-    airlight = image_of()[0]
-    green = diagnosed(airlight * [1.0, 0.7, 1.0])
-    assert (green.first, green.ranked[0].parameters) == ("colour", pytest.approx((0.7,), rel=1e-3))
-    assert green.ranked[0].words.startswith("green is 0.7 times")
-    tint = diagnosed(airlight * [0.9, 1.0, 1.3])
-    assert (tint.first, tint.ranked[0].parameters) == (
-        "colour",
-        pytest.approx((0.9, 1.0, 1.3), rel=1e-3),
-    )
-    # Three equal factors are one.
-    assert diagnosed(1.2 * airlight).first == "factor"
+def slow(*values):
+    """A diagnosis takes seconds: the fast tests have one of each kind."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(
+    ("tint", "first", "numbers", "words"),
+    [
+        ([1.0, 0.7, 1.0], "colour", (0.7,), "green is 0.7 times"),
+        slow([0.9, 1.0, 1.3], "colour", (0.9, 1.0, 1.3), "red, green and blue are"),
+        slow([1.2, 1.2, 1.2], "factor", (1.2,), "the image is 1.2 times"),
+    ],
+)
+def test_a_channel_is_named_alone_and_three_with_their_factors(
+    variant, tint, first, numbers, words
+):
+    said = diagnosed(image_of()[0] * tint)
+    assert (said.first, said.ranked[0].parameters) == (first, pytest.approx(numbers, rel=1e-3))
+    assert said.ranked[0].words.startswith(words)
 
 
 def test_fog_without_attenuation_that_ends_is_named_with_its_end(variant):
