@@ -46,16 +46,19 @@ def shown(loaded, form, kernel=None):
     "fog-colours", tolerance="1e-4 relative: float32, and the series of the shader is exact here"
 )
 def test_colours_are_what_shaders_print(scene):
-    loaded = scene(SUN, SKY)
+    # The sun stands before the camera, where its lobe is.
+    ahead = SUN.replace('x="0.5" y="0.3" z="-0.45"', 'x="-0.5" y="-0.2" z="-0.3"')
+    loaded = scene(ahead, SKY)
     sensor = loaded.sensors()[0]
     ways = film_directions(sensor, pixel_centres((8, 6)), (8, 6)).reshape(6, 8, 3)
-    towards = -np.array([0.5, 0.3, -0.45]) / np.linalg.norm([0.5, 0.3, -0.45])
+    towards = np.array([0.5, 0.2, 0.3]) / np.linalg.norm([0.5, 0.2, 0.3])
     sky, sun, albedo = (
         np.array([0.2, 0.3, 0.4]),
         np.array([3, 2.6, 2.1]),
         np.array([0.9, 0.85, 0.7]),
     )
     cosine = np.maximum(ways @ towards, 0)[..., None]
+    assert cosine.max() > 0.98 > 0.7 > cosine.min()
     for form, lobe in (("wenzel", 1), ("quilez", 18 * cosine**8), ("unreal", 10 * cosine**4)):
         frame = shown(loaded, form)
         ends = np.where(ways[..., 2] > 0, 2999.5 - 2.3, 2.3 + 0.5) / np.abs(ways[..., 2])
