@@ -23,10 +23,13 @@ the error sqrt(b^2 + V/N).
 
 **Whether the runs are independent.** Runs of one seed are the same, bit by bit: each image counts
 once. Runs that share a part of their random numbers, or of their history, have noise that is
-correlated: of N independent ones the noise n_i has the correlation -1/(N - 1) between two runs, as
-the mean over runs is taken away. A pair that exceeds it by more than a tenth, and that by four
-errors from blocks of pixels, is no pair of independent runs: no bias and no average is reported
-then. Noise that all runs share alike is bias.
+correlated. The mean over runs is taken away, so that independent noise of variances v_i, with sum
+s, leaves S_ii = v_i (1 - 2/N) + s/N^2 and S_ij = s/N^2 - (v_i + v_j)/N: the S_ii tell all v_i, and
+the covariance of two runs is what S_ij has more. Where it is more than a tenth of the noise of
+both, by four errors from blocks of pixels, the pair is no pair of independent runs: no bias and no
+average is reported then. The largest such pair counts as one run for all others, which its share of
+the mean would make alike. Three runs or fewer tell nothing, as their v_i make any S. Noise that all
+runs share alike is bias.
 
 **Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that
 a few runs may have none: their mean is then too dark and their spread too small. For a sum of
@@ -284,31 +287,48 @@ def _with_spread(single: Noise, errors: Array, blurred: Sequence[Array], off: fl
 def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
     """Return the pairs of runs that are not independent, see the module.
 
-    `noise`: deviations from the mean over the runs, (runs, height, width, channels). Two runs say
-    nothing of their independence: the deviations of one are the negatives of the other's.
+    `noise`: deviations from the mean over the runs, (runs, height, width, channels).
     """
-    count = len(noise)
-    if count < 3:
-        return ()
-    # Products of each pair of runs, by group of blocks of pixels.
+    # Products of each pair of runs, by group of blocks of pixels that have noise at all.
     groups = products(noise)
-    total = groups.sum(axis=0)
-    pairs = np.triu_indices(count, 1)
+    groups = groups[np.trace(groups, axis1=1, axis2=2) > 0]
+    named, found = list(range(len(noise))), list[tuple[int, int]]()
+    while len(named) > 3 and len(groups) > 1:
+        # The errors come from leaving out a group. The limit is a correlation of a tenth: ten runs
+        # that share as much are worth five, as 10/(1 + 9/10) is 5.3.
+        total = groups.sum(axis=0)
+        shared = _correlations(total)
+        told = estimates(shared, _correlations(total - groups))
+        sure = [each.exceeds(0.1, SURE) is Answer.YES for each in told]
+        if not any(sure):
+            break
+        largest = int(np.argmax(np.where(sure, shared, -math.inf)))
+        i, j = (int(ends[largest]) for ends in np.triu_indices(len(named), 1))
+        found.append((named[i], named[j]))
+        # The pair is one run from here on, its mean. The mean of fewer runs is taken away.
+        merged = np.eye(len(named))
+        merged[i, [i, j]] = 0.5
+        merged = np.delete(merged, j, axis=0)
+        merged -= merged.mean(axis=0)
+        groups = merged @ groups @ merged.T
+        del named[j]
+    return tuple(sorted(found))
 
-    def excess(sums: Array) -> Array:
-        """Return by how much correlations of pairs exceed those of independent runs."""
-        deviations = np.sqrt(np.diagonal(sums, axis1=-2, axis2=-1))
-        scale = deviations[..., pairs[0]] * deviations[..., pairs[1]]
-        return np.asarray(sums[..., pairs[0], pairs[1]] / scale + 1 / (count - 1))
 
-    # The errors come from leaving out a group that has noise at all. The limit is a correlation of
-    # a tenth: ten runs that share as much are worth five, as 10/(1 + 9/10) is 5.3.
-    lit = groups[np.trace(groups, axis1=1, axis2=2) > 0]
-    excesses = estimates(
-        excess(total), excess(total - lit) if len(lit) > 1 else np.empty((0, len(pairs[0])))
-    )
-    shared = [each.exceeds(0.1, SURE) is Answer.YES for each in excesses]
-    return tuple((int(i), int(j)) for i, j, same in zip(*pairs, shared, strict=True) if same)
+def _correlations(sums: Array) -> Array:
+    """Return the correlation of each pair of runs, (..., pairs), see the module.
+
+    `sums`: of the products of noise without its mean over runs, (..., runs, runs).
+    """
+    count = sums.shape[-1]
+    own = np.diagonal(sums, axis1=-2, axis2=-1)
+    mean = own.sum(axis=-1, keepdims=True) / (count * (count - 1))  # s/N^2
+    variance = (own - mean) / (1 - 2 / count)
+    # Noise that is less than the rounding of the others' has no correlation.
+    variance = np.maximum(variance, 1e-12 * count * mean)
+    i, j = np.triu_indices(count, 1)
+    more = sums[..., i, j] - mean + (variance[..., i] + variance[..., j]) / count
+    return np.asarray(more / np.sqrt(variance[..., i] * variance[..., j]))
 
 
 def _blurred(errors: Array, deviation: float) -> Array:

@@ -26,11 +26,11 @@ from airlight.validation.engine.diagnose import (
     diagnose_file,
     diagnose_image,
 )
-from airlight.validation.engine.fault import Fault
+from airlight.validation.engine.fault import Fault, Number
 from airlight.validation.engine.faults import FAULTS
 from airlight.validation.engine.observation import judged_layer, observation_of
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
-from airlight.validation.engine.search import Explanation, _Search, explain
+from airlight.validation.engine.search import Explanation, _between, _Search, explain
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
 from airlight.validation.fog_model.view import Scenery, scattering_paths, view_of
 from airlight.validation.scenes.loading import load_scene
@@ -402,6 +402,15 @@ def test_a_rest_that_a_comparison_calls_right_is_nothing_to_it(reference, size, 
     rest = _right_rest(predictor, explain(predictor, [factor]))
     said = "nothing to a comparison: means over 2 x 2 pixels are within 0."
     assert rest.startswith(said) if right else not rest
+
+
+def test_a_search_about_a_start_ends_at_the_starts_beside_it():
+    number = Number(0.0, 10.0, (1.0, 2.0, 5.0))
+    assert _between(number, 2.0, 0.0, 10.0) == (1.0, 5.0)
+    assert _between(number, 5.0, 0.0, 10.0) == (2.0, 10.0)
+    # Elsewhere there is 30 % of the value, within the range.
+    assert _between(number, 3.0, 0.0, 10.0) == pytest.approx((2.1, 3.9))
+    assert _between(number, 0.0, 0.0, 10.0) == pytest.approx((0.0, 0.1))
 
 
 @pytest.mark.slow

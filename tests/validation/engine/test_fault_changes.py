@@ -19,6 +19,7 @@ from airlight.validation.engine.fault import Fault, factor_name
 from airlight.validation.engine.faults import FAULTS
 from airlight.validation.engine.prediction import Guess, SceneLight
 from airlight.validation.engine.targets import position_held, scaled
+from airlight.validation.engine.transforms import OPTICS
 from airlight.validation.fog_model.laws import LawFactor, Window
 from airlight.validation.fog_model.radiance import Fog
 
@@ -62,7 +63,8 @@ def test_optics_by_hand(words, values, sigma_t, albedo):
     fog = changed(fault(words), *values).fog
     assert fog.sigma_t[0] == pytest.approx(sigma_t)
     assert fog.albedo[0] == pytest.approx(albedo, abs=1e-5)
-    # nothing stays nothing
+    # Nothing stays nothing, and what does not scatter has no scattering coefficient.
+    assert OPTICS["extinction as scattering"](0.5, 0.0) == (0.5, 0.0)
     assert (fog.sigma_t[1], fog.albedo[1]) == (FOG.sigma_t[1], FOG.albedo[1])
 
 
@@ -460,21 +462,23 @@ def test_a_factor_on_the_fog_or_on_surfaces_begins_where_it_explains_what_is_lef
     assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [(1.0,)]
 
 
+COLOUR = np.array([1.0, 0.5, 0.1])
+
+
 def test_higher_orders_are_the_light_beyond_one_scattering_smoothed(monkeypatch):
     asked = []
 
     def batch(reference, seed, paths, *, max_depth):
         asked.append((seed, max_depth))
-        layers = np.arange(1.0, 1 + len(prediction.LAYERS))[:, None, None] * np.ones(
-            (1, 12 * 16, 3)
-        )
+        numbers = np.arange(1.0, 1 + len(prediction.LAYERS))[:, None, None]
+        layers = numbers * np.ones((1, 12 * 16, 1)) * COLOUR
         return SimpleNamespace(mean=layers * {64: 5.0, 2: 3.0}[max_depth])
 
     monkeypatch.setattr(prediction, "volpath_batch", batch)
     orders = SceneLight(SimpleNamespace(width=16, height=12)).higher_orders
     for number, layer in enumerate(("airlight", "surface")):
         expected = 2.0 * (1 + prediction.LAYERS.index(layer))
-        np.testing.assert_allclose(orders[number], np.full((12 * 16, 3), expected))
+        np.testing.assert_allclose(orders[number], np.full((12 * 16, 3), expected) * COLOUR)
     seeds = {seed for seed, _ in asked}
     assert sorted(asked) == [(seed, depth) for seed in sorted(seeds) for depth in (2, 64)]
     assert len(seeds) > 1

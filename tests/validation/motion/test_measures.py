@@ -294,17 +294,19 @@ def test_intervals_hold_the_reference():
     The interval of the bias is wider, as its frames need not be independent
     (`mean_of_series`): 1.3 times at 40 frames.
     """
-    frames, held = ghosted(0.0, 6), np.zeros(4)
+    frames, held = ghosted(0.0, 6), np.zeros(5)
     scores = []
     for seed in range(100):
         found = measured(averaged(frames, 0.5) + noise(100 + seed, 0.2))
-        apart = [found.lag.gain.value - 1, found.lag.persistence.value - 0.5]
-        errors = [found.lag.gain.error, found.lag.persistence.error]
+        # Half of a new frame: the mean age is a/(1 - a) = 1.
+        lag = found.lag.lag
+        apart = [lag.value - 1, found.lag.gain.value - 1, found.lag.persistence.value - 0.5]
+        errors = [lag.error, found.lag.gain.error, found.lag.persistence.error]
         still = measured(LIGHT + noise(100 + seed, 0.2))
         apart += [still.ghost.value, still.bias.value]
         errors += [still.ghost.error, still.bias.error]
         scores.append(np.array(apart) / errors)
         held += np.abs(scores[-1]) < 1.98
-    assert ((held >= 90) & (held <= (99, 99, 99, 100))).all(), held
-    spread = np.std(scores, axis=0) * (1, 1, 1, 1.3)
+    assert ((held >= 90) & (held <= (99, 99, 99, 99, 100))).all(), held
+    spread = np.std(scores, axis=0) * (1, 1, 1, 1, 1.3)
     assert ((spread > 0.8) & (spread < 1.25)).all(), spread

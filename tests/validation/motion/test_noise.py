@@ -55,6 +55,9 @@ def test_white_noise_has_the_closed_form():
     np.testing.assert_allclose(
         found.blur_gain, 1, atol=0.1
     )  # 768/(4 pi s^2) = 4 independent places of 16 runs, 3 channels
+    # A Gaussian of deviation s averages 4 pi s^2 pixels; at s = 4 the scatter is 5 %.
+    expected = SIGMA / np.sqrt(4 * np.pi * np.square((1.0, 2.0, 4.0)))
+    np.testing.assert_allclose(found.blurred_rmse, expected, rtol=0.2)
     assert found.efficiency == pytest.approx(1 / (found.variance.value * 0.25))
     assert found.seconds_to[0.05] == pytest.approx(found.variance.value * 0.25 / 0.05**2, rel=0.02)
     assert found.largest_fraction < 0.01
@@ -79,6 +82,28 @@ def test_noise_of_another_spectrum_is_told():
     # |1 - exp(-2 pi i f)|^2 is below 0.59 for f < 1/8, and depends on one frequency of two: 0.1 of its mean.
     assert measure_noise(REFERENCE, blue).low_fraction < 0.3
     assert measure_noise(REFERENCE, blotches).low_fraction > 1.5
+
+
+def test_low_frequencies_are_those_of_eight_pixels_and_more():
+    """Waves of 1/24 of the height three times and of the width once have 0.129 cycles a pixel."""
+    random = np.random.default_rng(4)
+    row, column = np.mgrid[:24, :32]
+    phases = 2 * np.pi * (3 * row / 24 + column / 32 + random.random((6, 1, 1)))
+    runs = [REFERENCE + 0.1 * np.cos(phase)[..., None] for phase in phases]
+    assert measure_noise(REFERENCE, runs).low_fraction < 1e-6
+
+
+def test_runs_that_share_little_noise_are_named():
+    random = np.random.default_rng(6)
+    noise = 1e-3 * random.normal(size=(4, *REFERENCE.shape))
+    runs = [REFERENCE + each for each in (noise[0], noise[0] + noise[1], noise[2], noise[3])]
+    assert measure_noise(REFERENCE, runs).correlated == ((0, 1),)
+
+
+def test_a_run_of_less_noise_depends_on_no_other():
+    """Four times the samples: the mean over runs had made it alike to the others."""
+    runs = [*renders(7, 3), *renders(8, 1, sigma=0.5 * SIGMA), *renders(9, 1, sigma=3 * SIGMA)]
+    assert measure_noise(REFERENCE, runs).correlated == ()
 
 
 @pytest.mark.claim("noise-bias")
@@ -194,6 +219,11 @@ def test_an_error_of_the_reference_is_no_bias_of_a_single_run(off, words):
     assert measure_noise(REFERENCE, [1.001 * REFERENCE], off=(off, off)).verdict == words
 
 
+def test_an_interval_of_a_single_run_has_the_error_of_the_mean_on_both_sides():
+    found = measure_noise(REFERENCE, [1.001 * REFERENCE], off=(0.002, 0.003))
+    assert found.bias_ci == pytest.approx((-0.001, 0.003))
+
+
 def test_runs_that_differ_by_less_than_rounding_are_refused():
     """There was a division by their noise, which is zero."""
     for value in (-0.0, 1e-40):
@@ -291,7 +321,7 @@ def test_runs_that_depend_on_one_another_have_no_average(made):
     assert bool(found.correlated) == dependent == math.isnan(found.after(64))
     assert ("runs are not independent" in found.verdict) == dependent
     if dependent:
-        assert (0, 1) in found.correlated
+        assert any(j == i + 1 for i, j in found.correlated)
 
 
 def test_renders_of_a_scene_from_files(variant, tmp_path):

@@ -76,6 +76,13 @@ def test_each_step_has_more_work_than_the_one_before():
     assert growth("size", "frame", works, works).exponent == pytest.approx(1)
 
 
+def test_meshes_grow_until_memory_would_end(monkeypatch):
+    monkeypatch.setattr("airlight.validation.study.growth.triangles_of", lambda scene: 300_000)
+    assert [step.work for step in ladder("triangles", "sphere-spot", (4, 3))] == [
+        300_000 * 4**level for level in range(3)
+    ]
+
+
 def test_a_shader_is_refused_before_anything_is_timed():
     """It has no time of a frame after the light moved: the study ended with a KeyError."""
     study = Study(scenes=("open-fog",), configurations=(Configuration("fog.glsl"),))

@@ -125,6 +125,11 @@ def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
 def test_ends_have_their_worth_in_media_that_vary(name):
     """A pixel beyond the bound had its method refused there, with words on extinction."""
     scene = load_scene(name, (8, 6)).scene
+    reference = read_reference(scene)
+    distance = np.full(48, 5.0)
+    places = bounds._equal_steps(reference, distance)
+    assert ((places >= 0) & (places <= distance)).all()
+    assert (np.diff(places, axis=0) >= 0).all()
     worth = bounds.worth_of_ends(scene, np.arange(48))
     assert worth.shape == (48, 3)
     assert np.isfinite(worth).all()

@@ -3,12 +3,14 @@
 reference and light volumes.
 """
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from airlight.realtime.frame.image import render_frame
 from airlight.realtime.methods.epipolar.min_max_tree import slice_heights
+from airlight.realtime.methods.epipolar.samples import between_samples, mark_samples
 from airlight.realtime.methods.epipolar.slices import (
     image_slices,
     neighbour,
@@ -95,6 +97,18 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
     assert offset.max() < 1.02 * half_step
     inside = np.sum(vectors(direction) * across, axis=1) > -1e-6
     assert np.mean(inside) > 0.99
+
+
+def test_a_pixel_whose_depth_no_sample_has_is_not_interpolated(variant):
+    """A leaf before the ground, between the samples: it would have no airlight at all."""
+    slices = slices_of(read(PLACES["in view"]))
+    ground = mi.Float(5.0) + dr.zeros(mi.Float, SIZE[0] * SIZE[1])
+    samples = mark_samples(slices, ground, count=32, step=4)
+    values = dr.full(mi.Float, 0.25, slices.count * samples.count)
+    point = mi.Float(7.5, 7.5), mi.Float(-4.5, -4.5)
+    fraction, fits = between_samples(samples, values, point, mi.Float(5.0, 2.0))
+    assert np.array(fits).tolist() == [True, False]
+    assert float(fraction[0]) == pytest.approx(0.25)
 
 
 def height_maps(scene, size=32, count=24):
