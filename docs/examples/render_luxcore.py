@@ -164,23 +164,30 @@ def shapes(scene: pyluxcore.Scene, described: dict, path: str) -> None:
     length = struct.unpack_from("<I", data, 12)[0]
     document, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
     turn = np.array(document["scenes"][0]["extras"]["scene_to_gltf"])
-    colours = {surface["name"]: surface["reflectance"] for surface in described["surfaces"]}
+    surfaces = {surface["name"]: surface for surface in described["surfaces"]}
     for mesh in document["meshes"]:
         primitive, name = mesh["primitives"][0], mesh["name"]
         points = accessor(document, binary, primitive["attributes"]["POSITION"], "<f4") @ turn
         triangles = accessor(document, binary, primitive["indices"], "<u4").reshape(-1, 3)
         corners, faces = [tuple(p) for p in points.tolist()], [tuple(t) for t in triangles.tolist()]
         scene.DefineMesh(name, corners, faces, None, None, None, None)
-        scene.Parse(
-            properties(
-                {
-                    f"scene.materials.{name}.type": "matte",
-                    f"scene.materials.{name}.kd": colours[name],
-                    f"scene.objects.{name}.shape": name,
-                    f"scene.objects.{name}.material": name,
-                }
-            )
-        )
+        place = {f"scene.objects.{name}.shape": name, f"scene.objects.{name}.material": name}
+        scene.Parse(properties(material(name, surfaces[name]) | place))
+
+
+def material(name: str, surface: dict) -> dict:
+    """Return a diffuse material, black from behind if the surface is so; its sides come first."""
+    prefix, front = f"scene.materials.{name}", surface["reflectance"]
+    back = front if surface["two_sided"] else [0.0, 0.0, 0.0]
+    return {
+        f"{prefix}-front.type": "matte",
+        f"{prefix}-front.kd": front,
+        f"{prefix}-back.type": "matte",
+        f"{prefix}-back.kd": back,
+        f"{prefix}.type": "twosided",
+        f"{prefix}.frontmaterial": f"{name}-front",
+        f"{prefix}.backmaterial": f"{name}-back",
+    }
 
 
 def accessor(document: dict, binary: bytes, number: int, kind: str) -> np.ndarray:

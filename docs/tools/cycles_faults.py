@@ -112,18 +112,16 @@ def volumes(change: Callable[[dict[str, Any]], Any]) -> Callable[[Properties], A
     """Change the inputs of all media."""
 
     def changed(properties: Properties) -> Any:
-        media = [
-            medium
-            for medium in (properties["world"], *properties["media"].values())
-            if medium is not None
-        ]
-        return (
-            NOT_HERE
-            if [change(medium["inputs"]) for medium in media].count(NOT_HERE) == len(media)
-            else None
-        )
+        after = [change(inputs) for inputs in media_inputs(properties)]
+        return NOT_HERE if after.count(NOT_HERE) == len(after) else None
 
     return changed
+
+
+def media_inputs(properties: Properties) -> list[dict[str, Any]]:
+    """Return the inputs of all media; a scene may have none around its bodies."""
+    media = (properties["world"], *properties["media"].values())
+    return [medium["inputs"] for medium in media if medium is not None]
 
 
 def coefficients(
@@ -237,9 +235,9 @@ def other_channels(properties: Properties) -> None:
         light["data"]["color"] = light["data"]["color"][::-1]
     for material in properties["materials"].values():
         material["inputs"]["Color"] = [*material["inputs"]["Color"][2::-1], 1.0]
-    for medium in (properties["world"], *properties["media"].values()):
+    for inputs in media_inputs(properties):
         for name in ("Scatter Coefficients", "Absorption Coefficients"):
-            medium["inputs"][name] = medium["inputs"][name][::-1]
+            inputs[name] = inputs[name][::-1]
 
 
 def shadowless(properties: Properties) -> Any:

@@ -37,8 +37,8 @@ from airlight.realtime.scene.density import (
 )
 from airlight.realtime.scene.media.bounded import BoundedMedia, Clouds
 from airlight.realtime.scene.media.density_grid import GridMedium
+from airlight.realtime.scene.media.facet_paths import BoundedMedium
 from airlight.realtime.scene.media.height_fog import HeightFog, Layer
-from airlight.realtime.scene.media.light_paths import BoundedMedium
 from airlight.realtime.scene.media.medium import Homogeneous, Medium
 from airlight.realtime.scene.mesh_adjacency import scene_of
 from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated

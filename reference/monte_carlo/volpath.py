@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
-from airlight.reference.monte_carlo.volpath_gaps import check_gaps
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace, check_gaps
 from airlight.reference.scene.clouds import Cloud, CloudScene
 from airlight.reference.scene.convex_bounds import Bounds, read_bounds
 from airlight.reference.scene.homogeneous_medium import VACUUM, ReferenceMedium
@@ -103,7 +103,9 @@ def volpath_batch(
     )
     if reference.directional or reference.sky is not None:
         _check_far(reference)
-    check_gaps([(medium.name, medium.bounds) for medium in reference.media])
+    check_gaps(
+        [(medium.name, medium.bounds, float(medium.largest.max())) for medium in reference.media]
+    )
     # Light seen directly belongs to neither layer.
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
     traced = _Traced(
@@ -127,10 +129,13 @@ def volpath_batch(
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
-def _convex(cloud: Cloud) -> Iterator[tuple[str, Bounds]]:
-    """Yield the bounds of a cloud where they are convex: gaps of others are not measured."""
+def _convex(cloud: Cloud) -> Iterator[tuple[str, Bounds, float]]:
+    """Yield a cloud with convex bounds, for `check_gaps`: gaps of others are not measured, nor the
+    extinction of a grid at its bounds.
+    """
     with suppress(InputError):
-        yield cloud.name, read_bounds(cloud.shape)
+        edge = 0.0 if cloud.density else float(cloud.largest.max())
+        yield cloud.name, read_bounds(cloud.shape), edge
 
 
 def _check_far(reference: ReferenceScene) -> None:
@@ -141,7 +146,7 @@ def _check_far(reference: ReferenceScene) -> None:
     from the zenith; lower ones may be cut, and then miss the thin upper part of the fog.
     """
     if not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
-        raise InputError(
+        raise CannotTrace(
             "volpath: the scene's bounding box is not valid, so lights from infinity start within "
             "it"
         )
@@ -157,7 +162,7 @@ def _check_far(reference: ReferenceScene) -> None:
     elif isinstance(medium, GridMedium):
         needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
     if radius < needed:
-        raise InputError(
+        raise CannotTrace(
             "volpath: the light paths of a sun or a sky end within the fog, since the shapes of "
             f"the scene have a radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or "
             "lower the cap of height fog"

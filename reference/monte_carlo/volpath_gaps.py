@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies of media so thin, or so near to each other, that Mitsuba's rays leap over them or the gap.
+"""Bodies of media so thin or dense, or so near to each other, that Mitsuba's rays leap over a part of
+their light or over the gap.
 
 Past the boundary of a medium Mitsuba starts the ray again, further on by
 
@@ -10,6 +11,12 @@ km. Where the next body begins nearer than d, the ray starts within it, meets no
 the body for vacuum: `volpath` would lose light and not say so. In a row of boxes 2 mm apart, of 2
 km, it loses 2 % of the first order and half of all orders. In a body that is thinner than d the ray
 starts beyond the other side, in fog that never ends.
+
+The layer that is leapt over scatters nothing: of the light of a body about the part d/w is lost, w
+its width, or a mean free path where that is less. Measured, 8e6 paths to 4 x 4 pixels, lamp and
+camera 2 m away: -2.76 +- 0.20 % in a slab of 1 cm (d/w is 2.68 %), -0.34 +- 0.08 % in one of 10 cm
+(0.27 %), and -1.57 +- 0.04 % there with a mean free path of 2 cm (1.34 %). Spheres of 1 cm are as
+far off, too bright about their rims.
 """
 
 from collections.abc import Sequence
@@ -24,26 +31,35 @@ from airlight.reference.scene.convex_bounds import Bounds, Sphere, largest_ball
 
 Array = NDArray[np.float64]
 
+#: The largest part of a body's light that may be lost. Reports judge volpath by +-1 % and run until
+#: intervals are within 0.4 of that: with a bias of half a percent these still lie within it.
+_LOST = 0.005
 
-def check_gaps(bodies: Sequence[tuple[str, Bounds]]) -> None:
-    """Refuse disjoint convex bodies, by their names, that are thinner, or nearer to each other, than
-    rays leap.
+
+class CannotTrace(InputError):
+    """A scene of which Mitsuba's volpath would give wrong light."""
+
+
+def check_gaps(bodies: Sequence[tuple[str, Bounds, float]]) -> None:
+    """Refuse disjoint convex bodies of which rays leap over a visible part, or that are nearer to
+    each other than rays leap: each has a name, bounds, and the extinction at them [1/m].
     """
-    for name, body in bodies:
-        leap = _leap(*_box(body))
-        if (width := _width(body)) <= leap:
-            raise InputError(
-                f"volpath: the medium in '{name}' is {width:.2g} m thick, and Mitsuba's rays leap "
-                f"{leap:.2g} m, beyond its other side; expected a thicker body, or a smaller unit "
-                "of length: take another --estimator"
+    for name, body, sigma_t in bodies:
+        leap, width = _leap(*_box(body)), _width(body)
+        if leap * max(1 / width, sigma_t) > _LOST:
+            free = f", with a mean free path of {1 / sigma_t:.2g} m" if sigma_t * width > 1 else ""
+            raise CannotTrace(
+                f"volpath: the medium in '{name}' is {width:.3g} m thick{free}, and Mitsuba's rays "
+                f"leap over {leap:.2g} m of it; expected {leap / _LOST:.2g} m at least, or a "
+                "smaller unit of length: take another --estimator"
             )
-    for (name, body), (other_name, other) in combinations(bodies, 2):
+    for (name, body, _), (other_name, other, _) in combinations(bodies, 2):
         (low, high), (other_low, other_high) = _box(body), _box(other)
         leap = _leap(low, high, other_low, other_high)
         apart = float(np.maximum(low - other_high, other_low - high).max())
         gap = apart if apart > leap else _gap(body, other)
         if gap <= leap:
-            raise InputError(
+            raise CannotTrace(
                 f"volpath: the media in '{name}' and '{other_name}' are {max(gap, 0.0):.2g} m "
                 f"apart, and Mitsuba's rays leap {leap:.2g} m, over the boundary of the next one; "
                 "expected a wider gap: take another --estimator"

@@ -31,7 +31,8 @@ and a sun of irradiance E adds the same with E for I edge f(r) w(r), and `suns` 
     ends           none; planes:NEAR:FAR or spheres:NEAR:FAR: the fog begins and ends there [m]
     fade           none; START:END: q falls along a line in the depth z, 1 at START and 0 at END [m];
                    it is above 1 before START, and no ambient light or constant source has it
-    source         lights; constant:R,G,B: C (1 - exp(-a tau_c)) and no light of lamps and suns
+    source         lights; constant:R,G,B: C (1 - exp(-a tau_c)) and no light of lamps and suns,
+                   whose terms but for those of surfaces have no place beside it
     cap            none; the most that 1 - exp(-a tau_c) of a constant source can be, and the most
                    that it hides of a surface
     lobe           none; n[:START]: each sun adds E max(cos, 0)^n (1 - exp(-a tau_c)) to a constant
@@ -202,6 +203,18 @@ class Model:
             raise wrong("cap", self.cap, "a constant source beside it")
         if self.lobe != "none" and not self.constant:
             raise wrong("lobe", self.lobe, "a constant source beside it")
+        # No light of lamps and suns is in the fog of a constant source, nor is it faded.
+        for name in ("phase", "fade", "lit", "lamps", "suns") if self.constant else ():
+            value, usual = getattr(self, name), getattr(type(self), name)
+            if value != usual:
+                raise wrong(
+                    name, value, f"{usual} beside a constant source: it has no effect there"
+                )
+        if self.constant and self.light_length:
+            expected = (
+                "on, off or a fraction beside a constant source: its light path is of surfaces"
+            )
+            raise wrong("light-path", self.light_path, expected)
         # Without attenuation and without an end the light of a lamp must fall as 1/r^2 at least.
         bare = self.camera_scale == 0 and self.light_scale == 0
         no_end = self.range == "none" and math.isinf(self.ends_of.far)

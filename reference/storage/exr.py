@@ -31,6 +31,8 @@ TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
 MODEL = "airlight:model"  #: header attribute: the model of a reference that is not physical
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
+#: header attribute: the standard error of the mean of a layer over the mean of those of its values
+SHARED = "airlight:shared"
 #: header attribute: of what kind the error in the layer `<layer>_bound` is. Files of airlight 1.0
 #: say `estimated` there too; since then such an error is the layer `<layer>_error`
 BOUND = "airlight:bound"

@@ -12,7 +12,7 @@ Read in this order:
 - `reference.py`: `reference`; `rays.py`: `rays`, the camera rays of a scene
 - `compare.py`: `compare`, with `--diagnose` and `--fit`
 - `check.py`: `check`, relations between frames
-- `report.py`: `report`; `engines.py`: that on engines of others
+- `report.py`: `report`; `engines.py`: that on engines of others; `command.py`: what makes either again
 - `diff.py`: `diff` of two reports; `paper.py`: `paper`
 - `sweep.py`: `sweep`
 - `challenge.py`: `challenge_new`, `challenge_score`, `challenge_board`

@@ -59,7 +59,7 @@ def compare(
     all_metrics: bool = False,
     diagnose: bool = False,
     fit: Words | None = None,
-    frames: File | None = None,
+    sequence: File | None = None,
     output: Files = (),
     progress: Progress = None,
 ) -> "ImageComparison | SceneComparison | ImageDiagnosis | FramesComparison | FittedFog":
@@ -72,7 +72,7 @@ def compare(
 
     `--diagnose` predicts the image that each of a hundred faults would make, of medium, lights,
     camera and encoding, and ranks them by evidence. `--fit` finds the parameters of the fog that
-    explain the image, each with its 95 % interval. `--frames` compares all frames of a scene that
+    explain the image, each with its 95 % interval. `--sequence` compares all frames of a scene that
     changes with the reference of each: flicker, lag, ghosts. Independent renders of one frame tell
     bias from noise. See docs/your-engine.md.
 
@@ -85,7 +85,7 @@ def compare(
     test
         The image to judge, an EXR file; from Python also a result or an array. With a scene also
         several files, # for each digit of their number, such as frames/####.exr: the frames of
-        `--frames`, or independent renders.
+        `--sequence`, or independent renders.
     layer
         Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight. With a scene NAME=airlight,
         =surface or =total says what it contains; by default what its name says.
@@ -115,7 +115,7 @@ def compare(
         With a scene: which parameters to fit, such as sigma_t,albedo (each also with .r, .g or .b), phase.g, intensity,
         exposure, light.x, light.y, light.z; sigma_t:NAME for one medium or light. sigma_t=0.1 starts the fit at
         that value; without a value it starts at the scene's.
-    frames
+    sequence
         With a scene: the file frames.json that says what each frame shows.
     output
         Write the difference: a .png file shows the signed relative error of each pixel in false
@@ -173,21 +173,21 @@ def compare(
             "model": model,
             "margin_total": margin_total,
         }
-        exclude("compare", "two images have no scene", {**of_scenes, "frames": frames})
+        exclude("compare", "two images have no scene", {**of_scenes, "sequence": sequence})
     if diagnose:
         exclude(
             "diagnose",
             "asks about all pixels of one image",
-            {"fit": fit, "mask": mask, "frames": frames, "margin_total": margin_total, **about},
+            {"fit": fit, "mask": mask, "sequence": sequence, "margin_total": margin_total, **about},
         )
     if fit is not None:
-        beside = {"frames": frames, "margin_total": margin_total, **about}
+        beside = {"sequence": sequence, "margin_total": margin_total, **about}
         exclude("fit", "asks for the fog of one image", beside)
     check_scene(scene)
     # Several files: frames of an animation with frames.json, or independent renders of one frame.
     # Both are judged as a whole, so that a choice of pixels or a diagnosis of one image has no
     # place.
-    if frames is not None or (scene is not None and _are_several(test)):
+    if sequence is not None or (scene is not None and _are_several(test)):
         if diagnose or fit is not None:
             option = "diagnose" if diagnose else "fit"
             raise InputError(
@@ -201,7 +201,7 @@ def compare(
         )
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         how["changes"] = changes_of(change)
-        return _several(str(scene), test, frames, progress=progress, **how)
+        return _several(str(scene), test, sequence, progress=progress, **how)
     # One image from here on.
     files = output_files(output, ".exr (values)", ".png (a picture)")
     # A fit activates Mitsuba itself, once it has read the image.
@@ -243,13 +243,13 @@ def _are_several(test: Any) -> bool:
 
 
 def _several(
-    scene: str, test: Any, frames: Any, *, progress: Any, **how: Any
+    scene: str, test: Any, sequence: Any, *, progress: Any, **how: Any
 ) -> "FramesComparison":
-    """Compare frames that `frames` tells of, or independent renders."""
+    """Compare frames that `sequence` tells of, or independent renders."""
     # The number of a frame is read from the name of its file.
     if not isinstance(test, str | os.PathLike):
         raise InputError(
-            "frames: expected the files of all frames, such as 'frames/####.exr'; save the images "
+            "test: expected the files of all frames, such as 'frames/####.exr'; save the images "
             "first"
         )
     from airlight.reports.api.comparisons import FramesComparison
@@ -262,8 +262,8 @@ def _several(
         how["progress"] = tell
         compared = (
             compare_runs(scene, test, **how)
-            if frames is None
-            else compare_frames(scene, test, frames, **how)
+            if sequence is None
+            else compare_frames(scene, test, sequence, **how)
         )
     return FramesComparison(compared=compared)
 

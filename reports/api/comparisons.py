@@ -359,7 +359,8 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
 
 
 def _differences(files: Sequence[tuple[str, str]]) -> dict[str, Any]:
-    return {"difference": files[-1][0]} if files else {}
+    paths = [path for path, _ in files]
+    return {"difference": paths[-1], "differences": paths} if paths else {}
 
 
 def _difference_lines(files: Sequence[tuple[str, str]]) -> list[str]:

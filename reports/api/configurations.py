@@ -91,7 +91,7 @@ def asked_configurations(
                 )
             chosen += chosen_configurations() if usual is None else usual
         elif isinstance(method, Configuration):
-            chosen.append(method)
+            chosen.append(configuration_of(method, named_kernels, given))
         # A function of Python: it cannot be imported by name, so that it runs here.
         elif not isinstance(method, str):
             chosen += [

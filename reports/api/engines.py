@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.report` of engines: scenes rendered in engines that others wrote, and judged."""
 
-import shlex
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -9,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airlight.errors import InputError, nearest
-from airlight.reports.api.capture import check_limit
+from airlight.reports.api.capture import LIMIT, check_limit
+from airlight.reports.api.command import report_command, setting_words
 from airlight.reports.api.inputs import pixels_of, several, telling
 from airlight.reports.machine.engine_adapter import CannotError, adapter_names
 from airlight.reports.machine.environment import MissingError, activate
@@ -111,6 +111,12 @@ def report_on_engines(
                 f"engines: got {name!r}, expected {ALL} or some of {', '.join(known)}"
                 f"{nearest(name, known)}"
             )
+    for name in of_engine:
+        if name not in chosen:
+            raise InputError(
+                f"set: got a setting of {name}, expected one of {', '.join(chosen)}, which render: "
+                "name it among the engines, or leave the setting out"
+            )
     if kept is not None:
         names = [str(scene) for scene in scenes] or kept.scenes
         pixels = kept.size
@@ -119,24 +125,23 @@ def report_on_engines(
 
     from airlight.reference.storage.files import ensure_folder
     from airlight.reports.engines.measure import Wanted, write_engines
-    from airlight.reports.engines.record import engines_file, named_files, read_engines
+    from airlight.reports.engines.record import STRIP, engines_file, named_files, read_engines
     from airlight.reports.report.staged import staged
 
     def named_before(folder: Path) -> list[str]:
         file = engines_file(folder)
-        names = [] if file is None else named_files(read_engines(file))
+        names = [] if file is None else [*named_files(read_engines(file)), STRIP]
         return [name for name in names if Path(name).name == name]
 
-    words = ["airlight", "report", *scenes, "--engines", ",".join(asked)]
-    words += [
-        word
-        for name, value in of_engine.items()
-        for one in value
-        for word in ("--set", f"{name}.{one}")
-    ]
-    asked_size = None if size is None else f"{pixels[0]}x{pixels[1]}"
-    for name, value in {"images": images, "size": asked_size, "adapters": adapters}.items():
-        words += [f"--{name}", str(value)] if value is not None else []
+    options = {
+        "engines": ",".join(asked),
+        "images": images,
+        "size": None if size is None else pixels,
+        "adapters": adapters,
+        "limit": limit if limit != LIMIT else None,
+        "diagnose": diagnose,
+    }
+    given = [f"{name}.{word}" for name, words in of_engine.items() for word in words]
     wanted = Wanted(
         engines=tuple(chosen),
         scenes=tuple(names),
@@ -144,7 +149,7 @@ def report_on_engines(
         needed=() if ALL in asked else tuple(asked),
         set_up=tuple(of_engine),
         diagnose=diagnose,
-        command=shlex.join([*map(str, words), *(["--diagnose"] if diagnose else [])]),
+        command=report_command(options, scenes, settings=given),
     )
     activate()
     target = ensure_folder(output)
@@ -156,13 +161,8 @@ def report_on_engines(
 
 def _settings(settings: Any) -> dict[str, list[str]]:
     """Return the settings NAME=VALUE of each engine, from words ENGINE.NAME=VALUE."""
-    given = (
-        [f"{name}={value}" for name, value in settings.items()]
-        if isinstance(settings, Mapping)
-        else [str(word) for word in several(settings)]
-    )
     found: dict[str, list[str]] = {}
-    for word in given:
+    for word in setting_words(settings):
         engine, dot, rest = word.partition(".")
         if not (dot and engine and "=" in rest):
             raise InputError(

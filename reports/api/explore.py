@@ -87,6 +87,15 @@ def describe(
         exclude("variants", "are those of a scene as it is", beside)
         return _variants(scene, size, several(output))
     files = output_files(output, ".glb", ".pbrt", ".vol")
+    by_ending = {
+        ending: [path for path in files if path.suffix.lower() == ending]
+        for ending in (".glb", ".pbrt", ".vol")
+    }
+    for ending, paths in by_ending.items():
+        if len(paths) > 1:
+            raise InputError(
+                f"output: got {' and '.join(map(str, paths))}, expected one {ending} file at most"
+            )
     check_scene(scene)
     changes, chosen = changes_of(change), chosen_model(model)
     from airlight.reference.storage.files import write_text
@@ -99,10 +108,6 @@ def describe(
     loaded = opened(scene, size, changes, chosen)
     # The ending says what is written; a .vol file holds a medium that varies, sampled to a grid.
     described = describe_scene(loaded)
-    by_ending = {
-        ending: [path for path in files if path.suffix.lower() == ending]
-        for ending in (".glb", ".pbrt", ".vol")
-    }
     # A scene may fit one kind of file alone: it is refused before any is written.
     pbrt = {str(path): pbrt_scene(loaded) for path in by_ending[".pbrt"]}
     grids = [_write_grid(path, loaded) for path in by_ending[".vol"]]

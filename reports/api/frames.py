@@ -163,7 +163,7 @@ def rendered_animation(
             del frame  # the next one needs its room
             tell(number / frames, f"frame {number} of {frames}")
             moving = stopwatch()
-    # NAME.json lies beside EXR files only, the files that `compare --frames` reads.
+    # NAME.json lies beside EXR files only, the files that `compare --sequence` reads.
     about = [
         written
         for path in files
@@ -251,7 +251,7 @@ def _write_frames(
     changes: list[dict[str, tuple[float, ...]] | None],
     objects: dict[str, Any],
 ) -> tuple[str, ...]:
-    """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads,
+    """Write NAME.json beside the frames NAME-0001.exr, which `compare --sequence` reads,
     where changes have names.
     """
     from airlight.reference.storage.files import write_text

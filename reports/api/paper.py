@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def paper(
     name: str | None = None,
     *,
-    figures: File | None = None,
+    pictures: File | None = None,
     quick: bool = False,
     progress: Progress = None,
 ) -> "PaperVerdicts":
@@ -35,7 +35,7 @@ def paper(
     name
         biri, billeter, ali or bouthors: also the numbers of the paper that have no verdict, such as
         frame rates of graphics cards. By default the verdicts of all papers.
-    figures
+    pictures
         Also draw the pictures of the papers in our scenes into this folder, as PDF
         and PNG with their data.
     quick
@@ -65,11 +65,11 @@ def paper(
     with telling(progress, "paper") as tell:
         rows = measure_claims(chosen, quick=quick, progress=tell)
     written: tuple[str, ...] = ()
-    if figures is not None:
+    if pictures is not None:
         from airlight.reports.figures.papers import write_figures
 
-        with telling(progress, "figures") as tell:
-            written = write_figures(Path(figures), name, quick=quick, progress=tell)
+        with telling(progress, "pictures") as tell:
+            written = write_figures(Path(pictures), name, quick=quick, progress=tell)
     return PaperVerdicts(
         measured=date(),
         environment=describe_environment(),

@@ -124,7 +124,7 @@ def render(
         measured at pixel centres.
     frames
         Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the
-        changes of lights, colours or a homogeneous medium, for `compare --frames`. Further frames
+        changes of lights, colours or a homogeneous medium, for `compare --sequence`. Further frames
         of an earlier run by this name are removed.
     animate
         The motion: light, objects, medium, colour, or several with commas; the
@@ -164,6 +164,10 @@ def render(
     whole_numbers(samples=samples, frames=frames, run=run, frame=frame)
     files = output_files(output, ".exr (all layers)", ".png (a picture)")
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
+    if plan:
+        of_method = {"method": method != "ray-march", "kernel": kernel, "run": run or None}
+        of_method |= {"frame": frame or None, **dict.fromkeys(parameters, True)}
+        exclude("plan", "renders nothing, by no method", of_method)
     # Both select random numbers and have to fit a signed 32-bit number.
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:

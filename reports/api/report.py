@@ -2,8 +2,7 @@
 """`airlight.report`: the error report."""
 
 import os
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from airlight.errors import InputError
 from airlight.reports.api.capture import LIMIT
+from airlight.reports.api.command import report_command
 from airlight.reports.api.inputs import (
     File,
     Kernels,
@@ -294,9 +294,8 @@ def report(
     places["model"] = model if model is None or isinstance(model, str) else model.terms
     # report.json says how to make it again.
     pixels = pixels_of(size)
-    asked_size = None if pixels is None else f"{pixels[0]}x{pixels[1]}"
-    efforts = {"quick": quick, "full": full, "size": asked_size, "fresh": fresh}
-    command = _command(*asked, {**efforts, **places})
+    efforts = {"quick": quick, "full": full, "size": pixels, "fresh": fresh}
+    command = report_command({**efforts, **places}, *asked)
     data = _measured(
         target,
         effort,
@@ -311,55 +310,6 @@ def report(
     )
     written = _figures(target, figures, [], []) if figures else ()
     return Report(folder=target, data=data, done=_done(data), figures=written)
-
-
-def _command(
-    scenes: Sequence[Any],
-    methods: Sequence[Any],
-    kernels: Sequence[Any],
-    settings: Any,
-    options: Mapping[str, Any],
-) -> str:
-    """Return what makes a report again: a command where all has a name,
-    else the call from Python.
-    """
-    # Settings from Python may be a mapping, settings of a command line are words.
-    values = (
-        [f"{name}={value}" for name, value in settings.items()]
-        if isinstance(settings, Mapping)
-        else settings
-    )
-    named = {"method": methods, "kernel": kernels, "set": several(values)}
-    # Defaults are left out of the command.
-    given = {name: value for name, value in options.items() if value}
-    # Words can be typed on a command line. A function or a loaded scene cannot: the call from
-    # Python stands there instead.
-    if all(isinstance(each, str | os.PathLike) for each in (*scenes, *methods, *kernels)):
-        words = ["airlight", "report", *map(str, scenes)]
-        words += [
-            word
-            for name, each in named.items()
-            for value in each
-            for word in (f"--{name}", str(value))
-        ]
-        for name, value in given.items():
-            words += [f"--{name}"] if value is True else [f"--{name}", str(value)]
-        return shlex.join(words)
-    listed = {
-        "settings" if name == "set" else name: value for name, value in named.items() if value
-    }
-    parts = [_python(scenes)] if scenes else []
-    parts += [f"{name}={_python(value)}" for name, value in (listed | given).items()]
-    return f"airlight.report({', '.join(parts)})"
-
-
-def _python(value: Any) -> str:
-    """Return an argument as one writes it in Python; a function stands there by its name."""
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_python, value))}]"
-    if callable(value):
-        return str(value.__name__)
-    return repr(os.fspath(value) if isinstance(value, os.PathLike) else value)
 
 
 def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) -> tuple[str, ...]:
@@ -490,9 +440,25 @@ def _measured(
 
 def _study_of(path: Path) -> "Study":
     """Return the study of a file; one that asks for something that a report drops is refused."""
-    from airlight.validation.study.study import read_study
+    from airlight.validation.study.settings import Measure
+    from airlight.validation.study.study import read_study, standard_study
 
     study = read_study(path)
+    # Growth is timed in the scene of a study of its own, for as long as this one says.
+    growing = standard_study("scaling").scenes
+    if study.growth and not set(growing) <= set(study.scenes):
+        raise InputError(
+            f"study {path}: got growth, which is timed in {', '.join(growing)} alone: add it to the "
+            "scenes, or leave growth out"
+        )
+    measure, usual = study.measure, Measure()
+    staged = ("slow",) if study.growth else ("slow", "seconds")
+    idle = [name for name in staged if getattr(measure, name) != getattr(usual, name)]
+    if idle and measure.times != "stages":
+        raise InputError(
+            f"study {path}: got {', '.join(idle)} of times = 'stages', and times = "
+            f"'{measure.times}': leave one of them out"
+        )
     dropped = ["sizes"] if len(study.sizes) > 1 else []
     dropped += ["media"] if any(study.media) else []
     dropped += study.asked_of("timed", "limit", "retries")

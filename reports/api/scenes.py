@@ -13,6 +13,7 @@ from airlight.reference.scene.model import Model
 from airlight.reference.storage.scene_digest import build_scene
 from airlight.reports.api.inputs import one_error, pixels_of
 from airlight.validation.scenes.bodies import check_bodies
+from airlight.validation.scenes.files.camera import lens_of
 from airlight.validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
 from airlight.validation.scenes.numbers import check_numbers
 
@@ -107,9 +108,19 @@ def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -
             f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}"
         ) from error
     loaded = _from_mitsuba(built)
+    # A camera that was built already tells no lens.
+    cameras = (each for each in scene.values() if _is_camera(each))
+    camera = next(cameras, None)
+    lens = lens_of(camera) if isinstance(camera, Mapping) else None
     if pixels is not None:
-        resize(built, pixels)
-    return loaded
+        resize(built, pixels, lens)
+    return replace(loaded, lens=lens)
+
+
+def _is_camera(part: Any) -> bool:
+    return isinstance(part, mi.Sensor) or (
+        isinstance(part, Mapping) and part.get("type") == "perspective"
+    )
 
 
 def _from_mitsuba(scene: Any) -> OpenScene:

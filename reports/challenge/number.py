@@ -73,19 +73,19 @@ class Combined:
 
 
 def scene_error(reference: Array, stated: Array, test: Array) -> SceneError:
-    """Return the error of the judged values of a scene, (values,) each [W/(m^2 sr)]; see the
-    module.
+    """Return the error of the judged values of a scene, (values,) each [W/(m^2 sr)], of which the
+    stated errors are the smaller part; see the module.
     """
-    whole, rms, known_to = _rms(reference), _rms(test - reference), _rms(stated)
+    whole, off, known_to = rms(reference), rms(test - reference), rms(stated)
     return SceneError(
-        error=rms / whole,
-        low=max(rms - known_to, 0.0) / (whole + known_to),
-        # A reference that is not known at all bounds no error.
-        high=(rms + known_to) / (whole - known_to) if known_to < whole else math.inf,
+        error=off / whole,
+        low=max(off - known_to, 0.0) / (whole + known_to),
+        high=(off + known_to) / (whole - known_to),
     )
 
 
-def _rms(values: Array) -> float:
+def rms(values: Array) -> float:
+    """Return the root mean square of values."""
     return math.sqrt(float(np.mean(np.square(values))))
 
 

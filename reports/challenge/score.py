@@ -26,7 +26,14 @@ from airlight.reports.challenge.entry import (
     read_entry,
 )
 from airlight.reports.challenge.folder import check_scenes
-from airlight.reports.challenge.number import BLACK, FLOOR, rounded, rounded_out, scene_error
+from airlight.reports.challenge.number import (
+    BLACK,
+    FLOOR,
+    rms,
+    rounded,
+    rounded_out,
+    scene_error,
+)
 from airlight.reports.challenge.record import (
     SCHEMA,
     Digests,
@@ -66,15 +73,17 @@ def score_entry(folder: Path, progress: Progress) -> Score:
             progress(number / len(scenes), scene.name)
             reference, judged = scene_reference(place, scene)
             values = reference.airlight[judged]
-            if not values.any():
+            stated = reference.airlight_error[judged]
+            if not rms(stated) < rms(values):
                 raise InputError(
-                    f"seed {found.entry.seed}: no light reaches the view of {scene.name}, so that no "
-                    "error is relative to it; expected a seed without such a scene: take another"
+                    f"seed {found.entry.seed}: the view of {scene.name} has no light beyond the error "
+                    "of its reference, so that no error is relative to it; expected a seed without "
+                    "such a scene: take another"
                 )
             error, bias = BLACK, -1.0
             if scene.name in images:
                 test = images[scene.name][judged]
-                error = scene_error(values, reference.airlight_error[judged], test)
+                error = scene_error(values, stated, test)
                 bias = float((test - values).mean() / values.mean())
             row = SceneScore(
                 name=scene.name,

@@ -23,6 +23,7 @@ from airlight.reports.engines.record import (
     MISSING,
     PAGE,
     SCHEMA,
+    STRIP,
     UNKNOWN,
     Captured,
     Cell,
@@ -112,7 +113,7 @@ def write_engines(folder: Path, wanted: Wanted, render: Render, progress: Progre
     # Data before the page, which is drawn from them alone.
     strip = strip_bytes(data, folder)
     if strip:
-        (folder / "strip.png").write_bytes(strip)
+        (folder / STRIP).write_bytes(strip)
     (folder / FILE).write_text(engines_text(data), encoding="utf-8", newline="\n")
     (folder / PAGE).write_text(render_engines(data, folder), encoding="utf-8", newline="\n")
     return data

@@ -11,7 +11,7 @@ from airlight.reports.data.records import Environment, Size, read_versioned
 from airlight.validation.engine.model_errors import ModelErrors, PartError
 
 SCHEMA = "airlight-engines/1"
-FILE, PAGE = "engines.json", "engines.html"  #: in the folder of the report
+FILE, PAGE, STRIP = "engines.json", "engines.html", "strip.png"  #: in the folder of the report
 
 JUDGED: Final = "judged"
 CANNOT: Final = "cannot"  #: the engine refuses the scene

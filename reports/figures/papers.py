@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pictures and curves of the papers again, in our scenes: for `airlight
-paper NAME --figures DIR`.
+paper NAME --pictures DIR`.
 
 Each figure is PDF and PNG, with its data as EXR files or CSV beside it.
 """

@@ -121,10 +121,16 @@ def _trust(scenes: Scenes) -> list[Claim]:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
         return [_claim("reference", text)]
     estimators = dict.fromkeys(entry.estimator for _, entry in compared)
-    return [
+    said = [
         _verdict(_WORDS[name], [pair for pair in compared if pair[1].estimator == name])
         for name in estimators
     ]
+    # It cannot trace some scenes (`reference.monte_carlo.volpath_gaps`).
+    checked = {name for name, entry in compared if entry.estimator == "volpath"}
+    if left := dict.fromkeys(name for name, _ in compared if name not in checked):
+        text = f"{_WORDS['volpath']} did not check the reference in {', '.join(left)}."
+        said.append(_claim("reference", text))
+    return said
 
 
 def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:

@@ -180,7 +180,7 @@ def motion(
     """Measure how methods flicker, lag and leave ghosts under a light that moves.
 
     Each frame is compared with its own reference. A method that keeps history gets it. See
-    docs/your-engine.md for what the numbers are; `airlight compare --frames` has the same for
+    docs/your-engine.md for what the numbers are; `airlight compare --sequence` has the same for
     frames of other renderers.
 
     Parameters

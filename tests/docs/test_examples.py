@@ -12,6 +12,7 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import mitsuba as mi
 import numpy as np
@@ -297,6 +298,39 @@ def test_scripts_of_engines_refuse_what_they_leave_out(monkeypatch):
         made = cycles.cycles_properties(scene | {"medium": around})
         assert "cannot" not in (made["world"] or {})
         assert made["media"]["body"]["inputs"]["Scatter Coefficients"] == [0.1] * 3
+
+
+def test_luxcore_lights_a_surface_of_one_side_from_there_alone(monkeypatch):
+    """It was lit from behind too: its own matte material has two sides."""
+    monkeypatch.syspath_prepend(str(DOCS / "examples"))
+    monkeypatch.setitem(
+        sys.modules, "pyluxcore", types.SimpleNamespace(Properties=object, Scene=object)
+    )
+    luxcore = importlib.import_module("render_luxcore")
+    wall = {"reflectance": [0.5, 0.4, 0.3]}
+    for two_sided, back in ((True, [0.5, 0.4, 0.3]), (False, [0.0] * 3)):
+        made = luxcore.material("wall", wall | {"two_sided": two_sided})
+        assert made["scene.materials.wall.type"] == "twosided"
+        for side, reflectance in (("front", [0.5, 0.4, 0.3]), ("back", back)):
+            named = made[f"scene.materials.wall.{side}material"]
+            assert made[f"scene.materials.{named}.kd"] == reflectance
+
+
+def test_faults_of_colours_reach_bodies_in_a_vacuum(monkeypatch):
+    """Red and blue changed places in the medium around, and without one the tool ended."""
+    for folder in ("examples", "tools"):
+        monkeypatch.syspath_prepend(str(DOCS / folder))
+    for name in ("bpy", "mathutils"):
+        monkeypatch.setitem(sys.modules, name, MagicMock())
+    faults = importlib.import_module("cycles_faults")
+    inputs = {"Scatter Coefficients": [1.0, 2.0, 3.0], "Absorption Coefficients": [4.0, 5.0, 6.0]}
+    for around in (None, {"inputs": {name: list(value) for name, value in inputs.items()}}):
+        body = {"inputs": {name: list(value) for name, value in inputs.items()}}
+        faults.other_channels(
+            {"world": around, "media": {"body": body}, "lights": [], "materials": {}}
+        )
+        for medium in (body, *([] if around is None else [around])):
+            assert list(medium["inputs"].values()) == [[3.0, 2.0, 1.0], [6.0, 5.0, 4.0]]
 
 
 @pytest.mark.slow

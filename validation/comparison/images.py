@@ -13,7 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from airlight.errors import InputError
-from airlight.reference.storage.exr import BATCHES, BOUND, NOTE, TOTAL, Image, layer_names, read_exr
+from airlight.reference.storage.exr import (
+    BATCHES,
+    BOUND,
+    NOTE,
+    SHARED,
+    TOTAL,
+    Image,
+    layer_names,
+    read_exr,
+)
 from airlight.reference.storage.exr import layer as image_layer
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.columns import columns_of, shown_values
@@ -124,7 +133,9 @@ def compare_images(
     also the layers by order of scattering that both have, such as `airlight_3_4`.
 
     Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both
-    count. The header attribute `airlight:batches` says from how many batch means they come. An
+    count. The header attribute `airlight:batches` says from how many batch means they come, and
+    `airlight:shared` how far pixels share their errors, see `NoisyImage`; without it they are
+    independent. An
     error that is no noise is in the layer `<layer>_bound` of either image where it is proven, and
     in `<layer>_error` where it is estimated; older files have estimates in `<layer>_bound` too, and
     the attribute `airlight:bound` says which it is.
@@ -243,7 +254,13 @@ def _estimate(path: str, image: Image, name: str) -> NoisyImage:
             f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or "
             "remove it"
         )
-    return NoisyImage(image_layer(image, name, path), error, batches)
+    shared = image.attributes.get(SHARED, 0.0)
+    if not isinstance(shared, int | float) or not 0 <= shared < math.inf:
+        raise InputError(
+            f"{path} has the attribute {SHARED} {shared!r}; expected a number from 0 on; correct it "
+            "or remove it"
+        )
+    return NoisyImage(image_layer(image, name, path), error, batches, shared=float(shared))
 
 
 def _stated_errors(

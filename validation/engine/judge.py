@@ -34,6 +34,7 @@ from airlight.reference.storage.exr import (
     BATCHES,
     BOUND,
     NOTE,
+    SHARED,
     TOTAL,
     Attribute,
     Image,
@@ -72,7 +73,7 @@ from airlight.validation.metrics.errors import FLOOR
 from airlight.validation.scenes.changes import UNCHANGED, Changes
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.statistics.comparison import check_margin
-from airlight.validation.statistics.estimate import INTERVAL, Estimate
+from airlight.validation.statistics.estimate import Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 
@@ -356,22 +357,19 @@ def judge_image(
     correct = expected_layer(fitting, judged)
     expected = {name: correct}
     own_error = reference_error(fitting, judged.holds, emitted=judged.emitted)
+    made: dict[str, Attribute] = {BATCHES: REPLICATES}
     if with_errors and own_error is not None:
+        made[SHARED] = shared_part(fitting, judged.holds)
         # Where no path of the image arrived it has no standard error: the reference alone
         # must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
-    made: dict[str, Attribute] = {BATCHES: REPLICATES}
     if with_errors and margin is not None:
-        # A margin holds the error of the reference that is no noise, too, and what its pixels share
-        # of that which is; NaN where nobody knows it.
+        # A margin holds the error of the reference that is no noise, too; NaN where nobody knows it.
         stated = stated_error(fitting, judged.holds)
-        shared = INTERVAL * shared_part(fitting, judged.holds)
         expected[f"{name}_bound"] = (
-            np.full(correct.shape, math.nan)
-            if stated is None
-            else stated[0] + (0.0 if own_error is None else shared * own_error)
+            np.full(correct.shape, math.nan) if stated is None else stated[0]
         )
-        made[BOUND] = "estimated" if stated is None or own_error is not None else stated[1]
+        made[BOUND] = "estimated" if stated is None else stated[1]
     comparison = compare_images(
         Image(expected, attributes=made),
         Image(layers, attributes=image.attributes),

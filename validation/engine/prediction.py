@@ -4,6 +4,7 @@ scene, then changed values.
 """
 
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar, cast
@@ -13,6 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 from airlight.reference.monte_carlo.batches import LAYERS
 from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.engine.observation import Observation, relative_errors
@@ -90,7 +92,8 @@ class SceneLight:
         """Light of higher orders in airlight and surfaces, (2, pixels, 3),
         by Mitsuba's path tracer.
 
-        None where an image is so large that this would take minutes.
+        None where an image is so large that this would take minutes, or where it cannot trace the
+        scene.
         """
         reference = self.reference
         if reference.width * reference.height > 1 << 17:
@@ -98,13 +101,16 @@ class SceneLight:
         # Paths of up to 64 segments less paths of up to two segments, which are single scattering:
         # four batches of 16 paths a pixel, each with one seed for both.
         parts = []
-        for seed in range(4):
-            whole, single = (
-                volpath_batch(reference, seed, 16, max_depth=depth).mean for depth in (64, 2)
-            )
-            parts.append(
-                (whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]]
-            )
+        with suppress(CannotTrace):
+            for seed in range(4):
+                whole, single = (
+                    volpath_batch(reference, seed, 16, max_depth=depth).mean for depth in (64, 2)
+                )
+                parts.append(
+                    (whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]]
+                )
+        if not parts:
+            return None
         image = np.mean(parts, axis=0).reshape(2, reference.height, reference.width, 3)
         # It is smooth except for edges, and noisy: a filter of a fortieth of the image's width.
         width = reference.width / 40

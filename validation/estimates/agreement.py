@@ -22,12 +22,14 @@ trust (DESIGN section 6.6). Lights with extent leave out none: their fluence is 
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import cast
 
 import numpy as np
 
 from airlight.analytic.clock import stopwatch
 from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, allocated
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import REPLICATES
@@ -150,20 +152,22 @@ def agreements(
 
     By estimator there are the `margins` of the relative bias [1] and the `samples`; each takes so
     many `batches` and `seconds` at most; `points`: see `agreement`. The result is by estimator and
-    layer, as in 'volpath airlight'.
+    layer, as in 'volpath airlight', without volpath where it cannot trace the scene.
     """
     by_name: dict[str, Agreement] = {}
     for estimator, margin in margins.items():
-        by_layer = agreement(
-            scene,
-            estimator=estimator,
-            margin=margin,
-            batches=batches,
-            samples=(samples or {}).get(estimator, _SAMPLES),
-            seconds=seconds,
-            points=points,
-            spread=spread,
-        )
+        by_layer: dict[str, Agreement] = {}
+        with suppress(CannotTrace):
+            by_layer = agreement(
+                scene,
+                estimator=estimator,
+                margin=margin,
+                batches=batches,
+                samples=(samples or {}).get(estimator, _SAMPLES),
+                seconds=seconds,
+                points=points,
+                spread=spread,
+            )
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 

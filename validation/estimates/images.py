@@ -34,7 +34,7 @@ from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
-from airlight.reference.storage.exr import BATCHES, BOUND, MODEL, Image
+from airlight.reference.storage.exr import BATCHES, BOUND, MODEL, SHARED, Image
 from airlight.reference.storage.scene_digest import scene_digest
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
@@ -43,7 +43,7 @@ from airlight.validation.estimates.monte_carlo import (
     check_model,
     monte_carlo_batches,
 )
-from airlight.validation.estimates.quadrature import stated_error
+from airlight.validation.estimates.quadrature import shared_part, stated_error
 from airlight.validation.scenes.loading import LoadedScene
 from airlight.validation.scenes.models import model_words
 
@@ -114,6 +114,7 @@ def layered_reference(
         made[BOUND] = "proven"
     if reference.airlight_se is not None:
         made[BATCHES] = REPLICATES
+        made[SHARED] = max(shared_part(reference, layer) for layer in LAYERS)
     return Image(layers, reference.distance, made)
 
 

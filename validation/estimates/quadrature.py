@@ -7,7 +7,7 @@ import numpy as np
 
 from airlight.reference.monte_carlo.batches import LAYERS
 from airlight.reference.quadrature.image import ReferenceImage
-from airlight.reference.quadrature.replicates import standard_error
+from airlight.reference.quadrature.replicates import REPLICATES, standard_error
 from airlight.reference.storage.exr import TOTAL
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.statistics.estimate import INTERVAL, UNKNOWN, Estimate, Kind
@@ -107,22 +107,21 @@ def off_by(
     if not light > 0:
         return math.inf, math.inf
     apart = float(np.linalg.norm(np.where(finite, drawn, 0.0).sum(axis=2)))
-    pooled = max(apart, shared_part(reference, layer) * float(drawn[finite].sum()))
+    together = widened(shared_part(reference, layer), REPLICATES - 1.0)
+    pooled = max(apart, together * float(drawn[finite].sum()))
     root = float(np.sqrt(((stated[0] + drawn)[finite] ** 2).mean()))
     return (float(stated[0][finite].sum()) + pooled) / light, root * int(finite.sum()) / light
 
 
 def shared_part(reference: ReferenceImage, layer: str) -> float:
-    """Return the standard error of the mean of a layer by its replicates, widened by Student's law,
-    over the mean of those of its values [1]: 0 without any, about 1 where all have one error.
+    """Return the standard error of the mean of a layer by its replicates, over the mean of those of
+    its values [1]: 0 without any, about 1 where all have one error.
     """
     values, parts = reference_error(reference, layer, emitted=False), reference.replicate_means
     if values is None or parts is None or not np.any(values):
         return 0.0
     means = parts.sum(axis=0) if layer == TOTAL else parts[LAYERS.index(layer)]
-    freedom = len(means) - 1.0
-    error = widened(float(standard_error(means.mean(axis=1))), freedom)
-    return error / float(np.mean(values))
+    return float(standard_error(means.mean(axis=1))) / float(np.mean(values))
 
 
 def known_words(estimate: Estimate) -> str:

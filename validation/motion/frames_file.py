@@ -143,7 +143,7 @@ def frame_paths(
     start, digits = text.find(_MARK), text.count(_MARK)
     if not digits or _MARK * digits not in text:
         raise InputError(
-            f"frames: got {text}, expected the files of all frames with # for each digit, such as "
+            f"test: got {text}, expected the files of all frames with # for each digit, such as "
             "frames/####.exr"
         )
     paths = []

@@ -566,7 +566,7 @@ def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
         raise InputError(
             f"{pattern}: {len(paths)} files have such a name; expected two or more independent "
             "renders, # for each "
-            "digit of their numbers, such as runs/####.exr, or --frames for the frames of a scene "
+            "digit of their numbers, such as runs/####.exr, or --sequence for the frames of a scene "
             "that changes"
         )
     return paths

@@ -14,7 +14,7 @@ import numpy as np
 
 from airlight.errors import InputError
 from airlight.realtime.scene.camera import read_camera, resized_camera
-from airlight.realtime.scene.media.light_paths import BoundedMedium
+from airlight.realtime.scene.media.facet_paths import BoundedMedium
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.read_scene import Scene

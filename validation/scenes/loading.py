@@ -27,6 +27,7 @@ from airlight.validation.scenes.changes import (
     isotropic_media,
     scene_with_lobes,
 )
+from airlight.validation.scenes.files.camera import Lens, x_fov
 from airlight.validation.scenes.files.text import named_in
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.models import DEFAULT, model_of
@@ -51,6 +52,7 @@ class LoadedScene:
     animation: Animation = field(default_factory=Animation)  #: what moves in it
     model: Model = PHYSICAL  #: the equation that its file names
     fog_engine: str = ""  #: the engine whose height fog its file has
+    lens: Lens | None = None  #: of its description; None for a horizontal angle of view
 
 
 def load_scene(
@@ -89,7 +91,7 @@ def load_scene(
         )
     else:
         path = scene_file(name_or_path)
-        scene, named = _read(path, size), named_in(path, DEFAULT)
+        (scene, lens), named = _read(path), named_in(path, DEFAULT)
         loaded = LoadedScene(
             path.stem,
             scene,
@@ -98,6 +100,7 @@ def load_scene(
             path,
             model=PHYSICAL if named.model is None else _model(path, named.model),
             fog_engine=named.engine,
+            lens=lens,
         )
     # Changes are checked first: Mitsuba must not build a phase function of an impossible g.
     if changes:
@@ -112,14 +115,12 @@ def load_scene(
     }
     if lobes:
         scene = (
-            scene_with_lobes(record.build(), lobes)
-            if record is not None
-            else _read(path, size, lobes)
+            scene_with_lobes(record.build(), lobes) if record is not None else _read(path, lobes)[0]
         )
         name_shapes(scene)
         loaded = replace(loaded, scene=scene)
     if size is not None:
-        resize(loaded.scene, size)
+        resize(loaded.scene, size, loaded.lens)
     # After the size: a size that is given removes a crop, or a film that is too large.
     _check_films(loaded)
     if changes:
@@ -209,13 +210,11 @@ def _check_films(loaded: LoadedScene) -> None:
 
 
 def _read(
-    path: Path,
-    size: tuple[int, int] | None,
-    lobes: Mapping[str, float] = MappingProxyType({}),
-) -> mi.Scene:
+    path: Path, lobes: Mapping[str, float] = MappingProxyType({})
+) -> tuple[mi.Scene, Lens | None]:
     from airlight.validation.scenes.files.read import read_file
 
-    scene = read_file(path, lobes, size)
+    scene, lens = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):
         raise InputError(
             f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole "
@@ -224,7 +223,7 @@ def _read(
     name_shapes(scene)
     check_numbers(scene)
     check_bodies(scene)
-    return scene
+    return scene, lens
 
 
 def _model(path: Path, words: str) -> Model:
@@ -253,17 +252,18 @@ def _check_size(size: tuple[int, int]) -> None:
         )
 
 
-def resize(scene: mi.Scene, size: tuple[int, int]) -> None:
+def resize(scene: mi.Scene, size: tuple[int, int], lens: Lens | None = None) -> None:
     """Set the image size of all cameras of a scene in place, width and height [pixels]; horizontal
-    angles of view stay.
+    angles of view stay, but for the `lens` of the first camera if there is one.
     """
     _check_size(size)
-    for sensor in scene.sensors():
+    for number, sensor in enumerate(scene.sensors()):
         parameters = mi.traverse(sensor)
         parameters["film.size"] = list(size)
         parameters["film.crop_size"] = list(size)
         parameters["film.crop_offset"] = [0, 0]
         if "x_fov" in parameters:
             # The sensor recomputes its projection only when one of its own parameters is set.
-            parameters["x_fov"] = parameters["x_fov"]
+            kept = parameters["x_fov"]
+            parameters["x_fov"] = kept if lens is None or number else x_fov(lens, size)
         parameters.update()

@@ -6,7 +6,8 @@ Each of the two images has a mean per value (a value is one channel of one pixel
 standard error: with r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2.
 Both variances are used, and none is raised to a floor: a dim image is tested as sharply as a bright
 one. The two images must be independent, and so must be the errors of two pixels of one image (box
-filter, seeds of their own); channels of a pixel may depend on one another.
+filter, seeds of their own), but for what an image says that they share; channels of a pixel may
+depend on one another.
 
 **Values.** z = d / s follows Student's law if the errors are normal and the standard errors come
 from K batch means. For two random images the degrees of freedom are Welch and Satterthwaite's,
@@ -47,6 +48,10 @@ order in the errors dB = (dT - (1 + B) dR) / R, so with independent pixels
 v is the variance of a sum of fully dependent channels, the largest that there can be (Minkowski's
 inequality): channels share their paths, and the interval must not be too narrow for it. It is up to
 sqrt(channels) too wide if they do not.
+
+Where all pixels have the same samples, as of a sky, the variance of a sum is that of the error that
+they share, (`shared` times the sum of s)^2, if that is the larger one: of the image, and of each
+block.
 
 **Heavy tails.** The errors of pixels are independent but heavy tailed (P(X > x) ~ x^(-3/2) next to
 the light), and the sums are normal only if many pixels of similar weight add up.
@@ -109,6 +114,9 @@ class NoisyImage:
     batches: int | None = None
     #: over the pixels compared, of every batch, (batches,) or (batches, channels)
     batch_means: ArrayLike | None = None
+    #: standard error of the mean over the mean of `standard_error`: 0 where pixels are independent,
+    #: about 1 where all have one error
+    shared: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +127,22 @@ class _Side:
     error: Array  #: standard error, of the same shape
     batches: int | None = None  #: how many gave the standard errors; None for exact ones
     batch_means: Array | None = None  #: mean over the image of every batch, (batches,)
+    shared: float = 0.0  #: as of `NoisyImage`
+
+    def of_image(self, scale: float) -> tuple[float, float]:
+        """Return the variance of the sum over the image, times a scale squared, and its spread."""
+        parts = (scale * self.error.sum(axis=2)) ** 2
+        together = (scale * self.shared * float(self.error.sum())) ** 2
+        if together > parts.sum():
+            return together, float(self.spread(np.asarray(together)))
+        return float(parts.sum()), float(self.spread(parts).sum())
+
+    def of_blocks(self) -> tuple[Array, Array]:
+        """Return the variance of the sum over each block, and its spread."""
+        squares, together = self.error**2, (self.shared * block_sums(self.error)) ** 2
+        apart, spread = block_sums(squares), block_sums(self.spread(squares))
+        shares = together > apart
+        return np.where(shares, together, apart), np.where(shares, self.spread(together), spread)
 
     def spread(self, variance: Array) -> Array:
         """Return v^2 / (K - 1), which `satterthwaite` asks for; zero for exact variances."""
@@ -232,8 +256,7 @@ def _block_tests(expected: _Side, tested: _Side) -> dict[str, int]:
     difference = block_sums(
         np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0)
     )
-    variance = block_sums(expected.error**2 + tested.error**2)
-    spread = block_sums(expected.spread(expected.error**2) + tested.spread(tested.error**2))
+    variance, spread = np.add(expected.of_blocks(), tested.of_blocks())
     random = variance > 0
     z = difference[random] / np.sqrt(variance[random])
     p = two_sided_p(z, satterthwaite(variance, spread)[random])
@@ -288,7 +311,7 @@ def _side(
             "error"
         )
     if estimate.batch_means is None or not with_batches:
-        return _Side(mean, error, estimate.batches)
+        return _Side(mean, error, estimate.batches, shared=estimate.shared)
     means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
     means = means.reshape(len(means), -1).mean(axis=1)
     # Means over other pixels would give the interval of another number. Sums of float32 agree to
@@ -300,7 +323,7 @@ def _side(
             "the pixels compared "
             f"{bias * scale:.6g}; give two or more, taken over the same pixels"
         )
-    return _Side(mean, error, estimate.batches, means)
+    return _Side(mean, error, estimate.batches, means, estimate.shared)
 
 
 # The relative bias of the whole image
@@ -328,18 +351,16 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> _Bias:
         return _Bias()
     # From the difference, not from the ratio: no cancellation for images that nearly agree.
     value = float((test.mean - reference.mean).sum()) / bright
-    sides = ((test, 1.0), (reference, (1 + value) ** 2))  # with the weight of its variance
-    variance = np.zeros(reference.mean.shape[:2])
-    spread = of_reference = 0.0
-    for side, weight in sides:
-        part = weight * (side.error.sum(axis=2) / bright) ** 2
-        variance += part
-        spread += float(side.spread(part).sum())
-        of_reference = float(part.sum())  # the reference is the last
-    total = float(variance.sum())
+    sides = ((test, 1 / bright), (reference, (1 + value) / bright))  # with the scale of its error
+    pixels_variance = np.zeros(reference.mean.shape[:2])
+    total = spread = of_reference = 0.0
+    for side, scale in sides:
+        pixels_variance += (scale * side.error.sum(axis=2)) ** 2
+        of_reference, part = side.of_image(scale)  # the reference is the last
+        total, spread = total + of_reference, spread + part
     freedom, error = float(satterthwaite(total, spread)), float(np.sqrt(total))
     interval, reach = _interval(value, total, freedom)
-    interval_batches, reach_batches = _from_batches(value, sides, bright, pixels)
+    interval_batches, reach_batches = _from_batches(value, sides, pixels)
     bias = _Bias(
         relative_bias=value,
         relative_bias_se=error,
@@ -355,26 +376,26 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> _Bias:
         bias,
         relative_bias_p=float(two_sided_p(np.asarray(value / error), np.asarray(freedom))),
         reference_variance_fraction=of_reference / total,
-        largest_fraction=float(variance.max()) / total,
+        largest_fraction=float(pixels_variance.max()) / total,
     )
 
 
 def _from_batches(
-    value: float, sides: tuple[tuple[_Side, float], ...], bright: float, pixels: int
+    value: float, sides: tuple[tuple[_Side, float], ...], pixels: int
 ) -> tuple[tuple[float, float] | None, float]:
     """Return the interval from the spread of batch means, and the bias it would detect."""
     if all(side.batch_means is None for side, _ in sides):
         return None, 0.0
     total = spread = 0.0
-    for side, weight in sides:
+    for side, scale in sides:
         if side.batch_means is None:
-            parts = weight * (side.error.sum(axis=2) / bright) ** 2
-            total, spread = total + float(parts.sum()), spread + float(side.spread(parts).sum())
+            part, part_spread = side.of_image(scale)
         else:
             count = len(side.batch_means)
             values = pixels * side.mean.shape[2]
-            part = weight * float(side.batch_means.var(ddof=1)) / count * (values / bright) ** 2
-            total, spread = total + part, spread + part**2 / (count - 1)
+            part = float(side.batch_means.var(ddof=1)) / count * (values * scale) ** 2
+            part_spread = part**2 / (count - 1)
+        total, spread = total + part, spread + part_spread
     return _interval(value, total, float(satterthwaite(total, spread)))
 
 

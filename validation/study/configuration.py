@@ -143,9 +143,14 @@ def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False)
     """Return the frame renderer of a configuration for a scene;
     `extra_layers` as of `frame_renderer`.
 
-    Raises InputError if the method refuses.
+    Raises InputError if the method refuses, and for a kernel that has no effect in the scene.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
+    if has_idle_kernel(scene, chosen):
+        raise InputError(
+            f"kernel: got {chosen.kernel}, which has no effect where all lights are suns; expected "
+            "exact, the default"
+        )
     return frame_renderer(
         scene,
         find_method(chosen.method),
@@ -153,6 +158,15 @@ def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False)
         extra_layers=extra_layers,
         **dict(chosen.parameters),
     )
+
+
+def has_idle_kernel(scene: Scene, chosen: Configuration) -> bool:
+    """Return whether a kernel was chosen that has no effect: all lights are suns, whose airlight no
+    kernel integrates. A user's method may do anything with it.
+    """
+    if not chosen.kernel or is_users(chosen.method) or find_kernel(chosen.kernel).exact:
+        return False
+    return bool(scene.lights) and not (scene.area_lights or any(each.w for each in scene.lights))
 
 
 def rendered_lights(scene: Scene, chosen: Configuration) -> int:

@@ -25,7 +25,7 @@ from airlight.reference.quadrature.reference import (
 from airlight.reference.storage.scene_digest import scene_content, scene_digest
 from airlight.reference.storage.store import Kept
 from airlight.validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
-from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.configuration import Configuration, has_idle_kernel
 from airlight.validation.study.study import Cell, Study
 
 
@@ -95,11 +95,11 @@ class SceneStudy:
     @contextmanager
     def at(self, size: tuple[int, int]) -> Iterator[mi.Scene]:
         """Give the scene another size [pixels] within a block: it is loaded once."""
-        resize(self.loaded.scene, size)
+        resize(self.loaded.scene, size, self.loaded.lens)
         try:
             yield self.loaded.scene
         finally:
-            resize(self.loaded.scene, self.size)
+            resize(self.loaded.scene, self.size, self.loaded.lens)
 
     def reference_of(self, pixel: str) -> ReferenceImage:
         """Return the quadrature reference at pixel centres, or its means over their
@@ -135,7 +135,8 @@ def configurations_for(
 ) -> tuple[Configuration, ...]:
     """Return the configurations that differ in this scene from the ones before them.
 
-    Variants of the shadows are left out if nothing casts a shadow. The published treatment of
+    Variants of the shadows are left out if nothing casts a shadow, and other kernels than `exact`
+    if all lights are suns. The published treatment of
     bounded media is left out if the scene has none, or if they do not lie in vacuum, and so are
     light samples where there is no area light. Where nothing else is asked for, all stay.
     """
@@ -144,5 +145,9 @@ def configurations_for(
     without_effect = set() if scene.features.shadows else {"shadow", "order", "map"}
     without_effect |= set() if scene.medium.clear else {"media"}
     without_effect |= set() if scene.area_lights else {"points", "pattern"}
-    kept = [each for each in configurations if not without_effect & set(dict(each.parameters))]
+    kept = [
+        each
+        for each in configurations
+        if not (without_effect & set(dict(each.parameters)) or has_idle_kernel(scene, each))
+    ]
     return tuple(kept or configurations)

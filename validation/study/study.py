@@ -282,6 +282,8 @@ def parse_study(data: Mapping[str, object], *, folder: Path = Path(), name: str 
         )
     scenes = data.get("scenes", [])
     read_scene_name = partial(_scene, folder=folder)
+    # Scenes at half the width are named as scenes are; a study of ours has more than it measures.
+    settings["half"] = tuple(read_scene_name("half", each) for each in settings.get("half", ()))
     return Study(
         **{"name": name, **settings},
         scenes=tuple(FOG_SCENES)
@@ -405,7 +407,7 @@ def _scene(what: str, value: object, *, folder: Path) -> str:
     if word in SCENES:
         if SCENES[word].clouds:
             raise InputError(
-                f"scenes: {word} scatters light many times; a sweep is of single scattering, leave "
+                f"{what}: {word} scatters light many times; a sweep is of single scattering, leave "
                 "it out"
             )
         return word
@@ -413,14 +415,14 @@ def _scene(what: str, value: object, *, folder: Path) -> str:
         seed = seed_of(word)
         if seed is None or seed > LARGEST_SEED:
             raise InputError(
-                f"scenes: got {word!r}, expected random:SEED with a whole number from 0 to "
+                f"{what}: got {word!r}, expected random:SEED with a whole number from 0 to "
                 f"{LARGEST_SEED:g}"
             )
         return word
     path = folder / word
     if not path.is_file():
         raise InputError(
-            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML or "
+            f"{what}: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML or "
             "pbrt file beside the study" + nearest(word, SCENES)
         )
     return str(path.resolve())

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
 
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace
 from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.scene.model import Model
 from airlight.reference.storage.scene_digest import scene_content
@@ -25,7 +26,7 @@ from airlight.reference.storage.store import Content, Inputs, Kept, is_kept, sto
 from airlight.validation.estimates.agreement import agreements
 from airlight.validation.estimates.monte_carlo import ElsewhereFor
 from airlight.validation.estimates.multiple_scattering import multiple_scattering_fraction
-from airlight.validation.statistics.records import Agreement, MultipleScattering
+from airlight.validation.statistics.records import Agreement, Fraction, MultipleScattering
 from airlight.validation.study.configuration import Configuration, configuration_work
 from airlight.validation.study.cost import Work, reference_work, sampled_work
 from airlight.validation.study.run import with_times
@@ -48,6 +49,7 @@ if TYPE_CHECKING:  # what only reports of images need is imported there
 
 #: Size of the image whose fraction of multiple scattering is measured [pixels].
 _MULTIPLE = (64, 48)
+_EDGES = 64  #: of its paths at most
 
 
 @dataclass(frozen=True)
@@ -226,5 +228,15 @@ def multiple_scattering(scene: mi.Scene, batches: int, samples: int) -> Kept[Mul
     `validation.estimates.multiple_scattering`.
     """
     inputs = MultipleInputs(scene_content(scene), batches, samples)
-    compute = partial(multiple_scattering_fraction, scene, batches=batches, samples=samples)
+
+    def compute() -> MultipleScattering:
+        with suppress(CannotTrace):
+            return multiple_scattering_fraction(
+                scene, max_depth=_EDGES, batches=batches, samples=samples
+            )
+        unknown = Fraction(value=None, interval=(None, None))
+        return MultipleScattering(
+            medium=unknown, everything=unknown, max_depth=_EDGES, batches=batches, samples=samples
+        )
+
     return stored(inputs, compute, MultipleScattering)

@@ -53,7 +53,8 @@ Read in this order:
 - `height_fog.py`: density by height: optical depths and suns in closed form;
 - `density_grid.py`: density on a grid, marched;
 - `bounded.py`: homogeneous media with bounds, in vacuum or in another; clouds;
-- `light_paths.py`: how much of the paths from a light to the points of a ray
-  lies in a convex medium;
+- `facet_paths.py`: where the paths from a light to the points of a ray cross the planes of a convex
+  medium;
+- `light_paths.py`: how much of them lies in it, and how fast that changes along the ray;
 - `bounded_rays.py`: their airlight: the bends of these paths, and how long panels may be.
 """

@@ -20,7 +20,8 @@ from airlight.errors import InputError
 from airlight.realtime.numerics.functions import opacity
 from airlight.realtime.scene.density import Density
 from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces
-from airlight.realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
+from airlight.realtime.scene.media.facet_paths import BoundedMedium
+from airlight.realtime.scene.media.light_paths import chord, paths_from
 from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.scene.phase import Phase
 

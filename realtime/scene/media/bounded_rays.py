@@ -31,12 +31,15 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.numerics.functions import exp_bounded
+from airlight.realtime.scene.media.facet_paths import Envelopes
 from airlight.realtime.scene.media.integrate import Node, Start, integral
-from airlight.realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
+from airlight.realtime.scene.media.light_paths import LightPaths, beyond, paths_from
 from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Rays, optical_reach
 from airlight.realtime.scene.rule_reach import CHANGE
 
-_MOST = 1000  # panels of a segment, and more where paths pass from facet to facet
+# Panels of a segment, and more where paths pass from facet to facet: thin fog, seen over a hundred
+# metres in the light that a box of 1000 mean free paths lets by, takes more than 10 000 of them.
+_MOST = 100_000
 
 
 @dataclass(frozen=True)

@@ -173,6 +173,10 @@ def test_kept_images_are_judged_alike_and_a_change_is_seen(written, tmp_path, ca
         ),
         (["--engines", "fake", "--set", "fake.odd=3"], "fake: it has no fog"),
         (
+            ["--engines", "fake", "--set", "picky.steps=3"],
+            "set: got a setting of picky, expected one of fake",
+        ),
+        (
             ["--engines", "fake", "--method", "all"],
             "engines: no method is measured; leave out method",
         ),
@@ -266,6 +270,16 @@ def test_an_equation_that_nobody_told_is_not_taken_for_that_of_physics(variant, 
         "total": pytest.approx(0.03, abs=1e-4),
     }
     assert "Equation: not known" in (out / "engines.html").read_text(encoding="utf-8")
+
+
+def test_a_strip_goes_with_the_images_that_it_showed(written, adapters, tmp_path):
+    """A report of no image into the folder of one with images."""
+    out = shutil.copytree(written[0], tmp_path / "out")
+    made = airlight.report(
+        "mist", engines="fake", size=SIZE, adapters=adapters, limit=9, output=out
+    )
+    assert sorted(path.name for path in out.glob("*.png")) == ["mist.png"]
+    assert made.data.command.endswith(" --limit 9")
 
 
 def test_data_of_another_version_are_refused(tmp_path):

@@ -13,6 +13,7 @@ import airlight
 from airlight.errors import InputError
 from airlight.realtime.errors import NoDriverError
 from airlight.reference.storage import exr
+from airlight.reports.api.configurations import asked_configurations
 from airlight.reports.api.inputs import (
     changes_of,
     configuration_of,
@@ -67,6 +68,14 @@ def test_a_configuration_has_its_own_kernel_and_parameters(variant):
         airlight.InputError, match=r"its own kernel and parameters; leave out kernel, points$"
     ):
         configuration_of(chosen, "exact", {"points": 3})
+
+
+def test_a_configuration_of_a_report_is_not_measured_without_its_settings(variant):
+    march = configuration("ray-march", None, {"steps": 8})
+    assert asked_configurations([march], (), {}) == ([march], True)
+    for kernels, settings in ((["taylor"], {}), ((), {"steps": 4})):
+        with pytest.raises(InputError, match="a configuration has its own kernel and parameters"):
+            asked_configurations([march], kernels, settings)
 
 
 def test_files_have_one_of_the_endings_and_none_is_no_file(tmp_path):
@@ -136,7 +145,7 @@ OF_SCENE = {"reference": "open-fog", "test": np.ones((3, 4, 3))}
         (airlight.compare, OF_SCENE | {"fit": "sigma_t,,g"}, "none of them"),
         (
             airlight.compare,
-            OF_SCENE | {"frames": "f.json"},
+            OF_SCENE | {"sequence": "f.json"},
             "save the images",
         ),
         (

@@ -41,6 +41,24 @@ def test_a_dictionary_has_its_own_size_and_one_that_mitsuba_refuses_says_why(var
     assert "\n" not in str(raised.value)
 
 
+LENSES = ({}, {"fov": 40}, *({"fov": 40, "fov_axis": axis} for axis in ("y", "larger")))
+
+
+@pytest.mark.parametrize("lens", LENSES, ids=str)
+def test_a_dictionary_keeps_its_angle_of_view_along_the_axis_that_it_says(variant, lens):
+    """Without a film too, whose size Mitsuba chooses then. A camera that is built tells no axis."""
+
+    def angle(size=None, more=None, **film):
+        sensor = {"type": "perspective", **lens, **film}
+        scene = airlight.load_scene({"type": "scene", **(more or {}), "sensor": sensor}, size=size)
+        return float(mi.traverse(scene.scene.sensors()[0])["x_fov"][0])
+
+    expected = angle(film={"type": "hdrfilm", "width": 31, "height": 12})
+    assert angle((31, 12)) == angle((31, 12), film=DARK["sensor"]["film"]) == expected
+    built = {"first": mi.load_dict({"type": "perspective", "fov": 50.0})}
+    assert angle((31, 12), built) == 50
+
+
 def test_a_scene_of_another_variant_says_when_to_build_it(variant):
     other = type("Scene", (), {"__module__": "mitsuba.scalar_rgb"})()
     with pytest.raises(

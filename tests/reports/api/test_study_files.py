@@ -17,6 +17,12 @@ from airlight.reports.api.sweep import sweep
         ("retries = 1", "got retries, but"),
         ('times = "alone"\ntimed = 3', "got timed, but"),
         ("media = [{}]", None),
+        (
+            'growth = ["size"]',
+            "got growth, which is timed in colonnade alone: add it to the scenes",
+        ),
+        ("seconds = 2", "got seconds of times = 'stages', and times = 'with'"),
+        ('slow = 0.1\ntimes = "alone"', "got slow of times = 'stages', and times = 'alone'"),
     ],
 )
 def test_what_a_report_would_drop_is_refused(tmp_path, line, dropped):

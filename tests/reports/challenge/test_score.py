@@ -2,12 +2,15 @@
 """Scores of entries: who is best, which bytes come out twice, and what is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.reports.challenge import score
 from airlight.reports.challenge.number import FLOOR
+from airlight.reports.challenge.score import scene_reference
 from airlight.reports.commands.main import run
 from tests.helpers.challenge import drawn
 
@@ -105,6 +108,19 @@ def test_the_words_of_an_entry_are_its_seed(perfect, small, tmp_path, capsys):
     (entry / "entry.toml").write_text(text.replace("commit abc", "commit abd"))
     assert run(["challenge", "score", str(entry)]) == 2
     assert "has the seed" in capsys.readouterr().err
+
+
+def test_a_scene_darker_than_the_error_of_its_reference_is_refused(perfect, monkeypatch, capsys):
+    """Its error had no upper end: `inf` in a table, and a score that JSON has no number for."""
+
+    def dark(folder, scene):
+        reference, judged = scene_reference(folder, scene)
+        return replace(reference, airlight_error=reference.airlight), judged
+
+    monkeypatch.setattr(score, "scene_reference", dark)
+    assert run(["challenge", "score", str(perfect("dark"))]) == 2
+    said = capsys.readouterr().err
+    assert "random-1 has no light beyond the error of its reference" in said
 
 
 def test_times_stand_beside_the_errors_and_move_no_number(perfect, tmp_path):

@@ -152,7 +152,8 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
     relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
     np.testing.assert_allclose(layers["relative"][2:], relative[2:], rtol=1e-4, atol=1e-6)
     assert not layers["total"][:2].any()
-    assert printed(capsys, *images, "-o", str(picture))["difference"] == str(picture)
+    both = printed(capsys, *images, "-o", str(values), "-o", str(picture))
+    assert both["differences"] == [str(values), str(picture)]
     shown = np.asarray(Picture.open(picture))
     assert shown.shape == SHAPE
     red, blue = shown[..., 0].astype(int), shown[..., 2].astype(int)

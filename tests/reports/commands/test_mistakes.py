@@ -19,6 +19,8 @@ MISTAKES = (
     ("render open-fog --sampels 3", "Did you mean --samples"),
     ("render open-fog --frames 3", "frames: got no place"),
     ("render open-fog --samples 3 --frames 3 -o x.exr", "leave out samples"),
+    ("compare open-fog a.exr --sequnce frames.json", "Did you mean --sequence"),
+    ("paper --figures out", "Did you mean --pictures"),
     ("render open-fog --size 8x6 --frames 3 --animate lamp -o x.exr", "got 'lamp'"),
     (
         "render open-fog --size 8x6 --frames 3 --animate objects -o x.exr",
@@ -89,6 +91,8 @@ MISTAKES = (
     ("compare smoke image.exr --fit sigma_t", "the medium is a density grid"),
     ("compare smoke image.exr --diagnose", "the medium is a density grid"),
     ("describe open-frog", "did you mean 'open-fog'"),
+    ("render open-fog --plan --set steps=3 --run 3", "by no method; leave out run, steps"),
+    ("describe open-fog -o a.glb -o b.glb", "a.glb and b.glb, expected one .glb file at most"),
     ("describe open-fog -o fog.gltf", "expected a name that ends in .glb or .pbrt or .vol"),
     ("study integrals rays.csv --phase mie:51", "--phase"),
     ("study slab --tau 2", "--tau"),

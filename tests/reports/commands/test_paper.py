@@ -76,7 +76,7 @@ def test_figures_are_drawn_into_the_folder_with_their_data(
     }
     monkeypatch.setattr("airlight.reports.figures.papers._FIGURES", shown)
     folder = tmp_path / "figures"
-    assert cli.run(["paper", "bouthors", "--quick", "--figures", str(folder)]) == 0
+    assert cli.run(["paper", "bouthors", "--quick", "--pictures", str(folder)]) == 0
     names = ["slab.pdf", "slab.png", "slab-picture.exr", "slab.csv"]
     assert capfd.readouterr().out.splitlines()[-4:] == [str(folder / name) for name in names]
     assert sorted(path.name for path in folder.iterdir()) == sorted(names)

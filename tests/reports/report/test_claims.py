@@ -96,6 +96,12 @@ def test_claims_on_a_reference_that_is_not_confirmed():
     assert "fog" not in trust
 
 
+def test_scenes_that_volpath_did_not_check_are_named():
+    data = scenes()
+    data[1]["agreement"] = {"airlight": agreed(True, 0.004, estimator="single-scatter")}
+    assert "Mitsuba's volpath did not check the reference in hall." in texts(data)
+
+
 def out_of_time(interval):
     comparison = agreed(False, 0.02, margin=0.005)
     comparison["statistics"]["relative_bias_ci"] = interval

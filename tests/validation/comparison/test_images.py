@@ -4,6 +4,7 @@ order, with failures by name.
 """
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,12 @@ def test_metrics_and_statistics_of_a_layer(pair):
     assert abs(comparison.statistics.z_mean) < 0.23
     assert comparison.statistics.equivalent is True
     assert comparison.failures == ()
+
+
+def test_what_pixels_share_of_their_errors_is_a_number(pair):
+    own = replace(pair[0], attributes={"airlight:shared": "all"})
+    with pytest.raises(InputError, match="airlight:shared 'all'; expected a number from 0 on"):
+        compare_images(own, pair[1])
 
 
 def test_failures_name_what_is_wrong(pair):

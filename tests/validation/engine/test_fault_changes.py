@@ -13,6 +13,7 @@ import pytest
 from scipy.integrate import quad
 
 from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace
 from airlight.reference.scene.model import Law, Range
 from airlight.validation.engine import prediction
 from airlight.validation.engine.fault import Fault, factor_name
@@ -483,3 +484,13 @@ def test_higher_orders_are_the_light_beyond_one_scattering_smoothed(monkeypatch)
     assert sorted(asked) == [(seed, depth) for seed in sorted(seeds) for depth in (2, 64)]
     assert len(seeds) > 1
     assert SceneLight(SimpleNamespace(width=1 << 9, height=1 << 9)).higher_orders is None
+
+
+def test_light_of_higher_orders_is_unknown_where_mitsuba_cannot_trace_it(monkeypatch):
+    """Bodies that touch ended a diagnosis with a line about estimators."""
+
+    def batch(*args, **options):
+        raise CannotTrace("volpath: 0 m apart")
+
+    monkeypatch.setattr(prediction, "volpath_batch", batch)
+    assert SceneLight(SimpleNamespace(width=16, height=12)).higher_orders is None

@@ -25,6 +25,7 @@ from airlight.validation.estimates.quadrature import (
     reference_error,
     reference_layer,
     relative_error,
+    shared_part,
 )
 from airlight.validation.metrics.errors import error_metrics
 from airlight.validation.scenes.loading import load_scene
@@ -246,9 +247,8 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(
     sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
     image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
     reference = tmp_path / "reference.exr"
-    write_exr(
-        reference, Image({layer: values, f"{layer}_se": errors}, attributes={"airlight:batches": 8})
-    )
+    made = {"airlight:batches": 8, "airlight:shared": shared_part(expected, layer)}
+    write_exr(reference, Image({layer: values, f"{layer}_se": errors}, attributes=made))
     by_file = compare_images(
         read_exr(reference), read_exr(write(**image)), layer=layer, margin=0.01
     ).statistics

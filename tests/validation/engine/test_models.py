@@ -261,7 +261,7 @@ def test_each_hypothesis_says_its_terms(fault):
 
 def test_terms_in_words():
     model = Model(
-        light_path="length:4",
+        light_path="off",
         camera_path="0.5",
         law="clamped:0.1",
         range="cut:7",
@@ -272,13 +272,15 @@ def test_terms_in_words():
         surface_law="power:1",
     )
     assert model_sentence(model) == (
-        "the fog counts 4 m for the way from the light, the way to the camera counts 0.5 times, "
+        "the way from the light is not attenuated, the way to the camera counts 0.5 times, "
         "light falls as 1/r^2, and no more within 0.1 m, lamps end at 7 m, depth along the axis of "
         "the camera stands for distance, the fog has the colour (0.1, 0.2, 0.3) W/(m^2 sr), "
         "whatever the lights, it covers 0.5 at most, the way from the light to surfaces is "
         "attenuated, on surfaces light falls as 1/r^1"
     )
     assert model_sentence(replace(model, cap="1")).count("covers") == 0
+    length = Model(light_path="length:4")
+    assert model_sentence(length) == "the fog counts 4 m for the way from the light"
     assert model_sentence(PHYSICAL) == "it is the physical one"
     words, values = "playcanvas:range={0},extinction={1}", (7.99996, 1.00001)
     assert asked_words(words, values) == "playcanvas:range=8,extinction=1"

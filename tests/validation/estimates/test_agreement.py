@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from airlight.reference.monte_carlo.volpath_gaps import CannotTrace
 from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates import agreement as agreement_module
@@ -33,6 +34,19 @@ def false_reference(monkeypatch, change):
         "reference_image",
         lambda *args, **kwargs: change(true(*args, **kwargs)),
     )
+
+
+def test_volpath_is_left_out_of_scenes_that_it_cannot_trace(monkeypatch):
+    """Bodies that touch ended a report, which has no other estimator to take."""
+
+    def compared(scene, *, estimator, **options):
+        if estimator == "volpath":
+            raise CannotTrace("volpath: 0 m apart")
+        return {"airlight": estimator}
+
+    monkeypatch.setattr(agreement_module, "agreement", compared)
+    found = agreement_module.agreements(None, {"volpath": 0.01, "single-scatter": 0.01})
+    assert found == {"single-scatter airlight": "single-scatter"}
 
 
 @pytest.mark.claim("volpath-agrees")

@@ -14,6 +14,7 @@ from airlight.reference.quadrature.reference import reference_image
 from airlight.reference.quadrature.replicates import PointPlan
 from airlight.reference.scene.read import read_reference
 from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.reference.storage.exr import Image
 from airlight.validation.comparison.images import compare_images
 from airlight.validation.estimates.agreement import layer_masks, reference_estimate
 from airlight.validation.estimates.images import layered_reference
@@ -133,7 +134,7 @@ def test_a_mean_may_be_off_by_less_than_its_values():
     assert off_by(replace(reference, surface_error=None), "surface") == (np.inf, np.inf)
 
 
-def test_an_error_that_all_pixels_share_stays_in_their_mean():
+def test_an_error_that_all_pixels_share_stays_in_their_mean(variant):
     """All rays have the same directions of a sky: its error was divided by the root of the pixels."""
     layer, random = np.ones((12, 16, 3)), np.random.default_rng(3)
     for shared in (False, True):
@@ -151,6 +152,14 @@ def test_an_error_that_all_pixels_share_stays_in_their_mean():
                 assert mean == pytest.approx(2.3646 * spread.mean(), rel=1e-4)
             else:
                 assert mean < 3 * value / np.sqrt(12 * 16)
+        # A comparison of its file has the same interval. Only the airlight is lit.
+        dark = replace(sampled, surface=0 * layer)
+        written = layered_reference(LoadedScene("a", mi.load_dict(tiny_scene()), "", ""), dark)
+        found = compare_images(written, Image({"airlight": layer})).statistics
+        half = 0.5 * (found.relative_bias_ci[1] - found.relative_bias_ci[0])
+        assert half == pytest.approx(off_by(sampled, "airlight")[0], rel=1e-2 if shared else 0.1)
+        # Nor is a block rejected for an error of all.
+        assert found.rejected_blocks == 0
 
 
 def test_variances_of_the_total_add_up():

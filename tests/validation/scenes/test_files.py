@@ -266,6 +266,29 @@ def test_scattering_and_absorption_become_extinction_and_albedo(load, capfd, ver
     assert "sigma_t 0.17, 2, 0.17 and albedo 0.882353, 0.75, 0.823529" in said.err
 
 
+@pytest.mark.parametrize(("version", "key"), [("3.0.0", "sigma_t"), ("0.6.0", "density")])
+def test_one_extinction_of_a_heterogeneous_medium_is_noted_where_mitsuba_ends_it(
+    load, capfd, version, key
+):
+    """Mitsuba 3 has a `constvolume` in the unit cube of its to_world, and vacuum around it."""
+    volume = f'<volume type="constvolume" name="{key}"><float name="value" value="0.23"/></volume>'
+    media = FOG.replace("homogeneous", "heterogeneous").replace(
+        '<float name="sigma_t" value="0.23"/>', volume
+    )
+    read = read_reference(load(LAMP, media=media, version=version)).medium
+    np.testing.assert_allclose(read.sigma_t, 0.23, rtol=1e-6)
+    assert ("Mitsuba 3 also ends it at the unit cube" in capfd.readouterr().err) == (
+        key != "density"
+    )
+
+
+def test_a_light_that_mitsuba_never_samples_shines(load):
+    """`volpath` had no light of a light of weight 0, and Mitsuba no scene with it alone."""
+    dark = LAMP.replace("</emitter>", '<float name="sampling_weight" value="0"/></emitter>')
+    (light,) = load(dark).emitters()
+    assert light.sampling_weight() == 1
+
+
 def medium(inside):
     return f'<medium type="homogeneous" id="fog">{inside}</medium>'
 
@@ -289,6 +312,18 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "light 'gobo', of type 'spot', has a texture": (
         {},
         '<emitter type="spot" id="gobo"><texture type="checkerboard" name="texture"/></emitter>',
+    ),
+    "irregular of medium 'fog' is a spectrum.*expected an 'rgb' value": (
+        {
+            "media": medium(
+                '<spectrum type="irregular" name="sigma_t"><string name="wavelengths" '
+                'value="400, 700"/><string name="values" value="0.1, 0.6"/></spectrum>'
+            )
+        },
+    ),
+    "blackbody of emitter 'coal' is a spectrum.*expected an 'rgb' value": (
+        {},
+        '<emitter type="point" id="coal"><spectrum type="blackbody" name="intensity"/></emitter>',
     ),
     "light 'sun' is of type 'sunsky'": ({}, '<emitter type="sunsky" id="sun"/>'),
     'write another up, for example up="0, 1, 0"': (

@@ -12,7 +12,7 @@ import pytest
 from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference
-from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.loading import load_scene, resize
 from tests.helpers.bad_inputs import cloud, scene
 from tests.helpers.scenes import scene_xml
 
@@ -79,6 +79,11 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
     """For Mitsuba's own rays and for both readers."""
     expected = mi.load_string(scene_xml(size=size, fov=41.7).replace(FOV, lens))
     small_file.write_text(SMALL.replace(FOV, lens))
+    loaded = load_scene(str(small_file))
+    resize(loaded.scene, size, loaded.lens)  # as a study does to its scene
+    np.testing.assert_array_equal(
+        read_reference(loaded.scene).direction, read_reference(expected).direction
+    )
     resized = load_scene(str(small_file), size).scene
     np.testing.assert_array_equal(
         read_reference(resized).direction, read_reference(expected).direction

@@ -36,6 +36,8 @@ GIVEN = {
     "flax": "cell=0.4",
     "filament": "color=1,2,3",
 }
+BESIDE = {"phase": "none", "fade": "2:5", "lit": "1", "lamps": "2", "suns": "0"}
+BESIDE["light-path"] = "length:3"
 SCENE = """<scene version="3.0.0">{}
 <sensor type="perspective"><float name="fov" value="41.7"/><ref id="fog" name="medium"/>
 <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film></sensor>
@@ -171,6 +173,11 @@ def test_terms_after_a_preset_override_it_and_change_its_name():
         ("law=powder:2", "law is 'powder:2'; expected power:d"),
         ("=3", "got '=3', expected NAME=VALUE"),
         ("three:decay=inf", "law is 'clamped:0.1:inf'"),
+        # Terms of the light of lamps and suns in fog, which a constant source has not.
+        *(
+            (f"o3de:{term}={value}", f"{term} is '{value}'; expected .* beside a constant source")
+            for term, value in BESIDE.items()
+        ),
     ],
 )
 def test_other_words_are_refused_in_one_line(words, expected):

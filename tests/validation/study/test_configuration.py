@@ -213,6 +213,7 @@ def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
     ("data", "message"),
     [
         ({"scenes": ["spere-spot"]}, "'spere-spot', expected .* did you mean 'sphere-spot'"),
+        ({"half": ["fense"]}, "half: got 'fense', expected .* did you mean 'fence'"),
         ({"scenes": ["cumulus"]}, "cumulus scatters light many times"),
         ({"scenes": ["windows", "windows"]}, "scenes: 'windows' is there twice"),
         ({"sceens": ["windows"]}, "got sceens, expected one of .* did you mean 'scenes'"),

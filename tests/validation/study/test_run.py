@@ -23,6 +23,7 @@ from airlight.reference.quadrature.image import ReferenceImage
 from airlight.reference.quadrature.reference import reference_of_pixels
 from airlight.reports.commands.main import run as run_command
 from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.scenes.loading import load_scene
 from airlight.validation.study import cost as expected_work
 from airlight.validation.study import reference as sampled
 from airlight.validation.study import run as module
@@ -46,7 +47,7 @@ def scene_with(*, shadows=True, clear=False, area_lights=("disk",)):
     """Return of a scene what decides which configurations differ in it."""
     features = SceneFeatures(shadows=shadows, surfaces=True)
     return SimpleNamespace(
-        features=features, medium=SimpleNamespace(clear=clear), area_lights=area_lights
+        features=features, medium=SimpleNamespace(clear=clear), area_lights=area_lights, lights=()
     )
 
 
@@ -275,6 +276,16 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
     assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(
         len(beyond)
     )
+
+
+def test_a_kernel_that_has_no_effect_is_refused_and_no_row_of_a_report(variant):
+    """All kernels rendered one image of a scene of suns, in rows with the names of each."""
+    scene = read_scene(load_scene("windows", SIZE).scene)
+    useful = configurations_for(scene, STANDARD)
+    assert {each.kernel for each in useful} == {None, "exact"}
+    assert {"unshadowed", "shadow-planes", "light-volumes"} < {each.method for each in useful}
+    with pytest.raises(InputError, match="got taylor, which has no effect where all lights are su"):
+        prepared(scene, configuration("unshadowed", "taylor"))
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():

@@ -68,6 +68,7 @@ _ADVICE = (
     (r"Invalid RGB reflectance", "expected colours from 0 to 1"),
 )
 _COLOURS = re.compile("albedo|reflectance|color")
+_SPECTRA = ("blackbody", "irregular", "regular")  # which Mitsuba evaluates at wavelengths alone
 
 
 def in_words(error: Exception) -> str:
@@ -120,9 +121,17 @@ def _is_grid(path: Path) -> bool:
 
 
 def check_colours(state: mi.parser.ParserState) -> None:
-    """Refuse colours of materials and albedos of media that are above 1 or below 0."""
+    """Refuse colours of materials and albedos of media that are above 1 or below 0, and spectra
+    that Mitsuba cannot evaluate as RGB.
+    """
     for index in used(state):
         props = properties(state, index)
+        if props.plugin_name() in _SPECTRA:
+            raise InputError(
+                f"{_name(state, index)} is a spectrum, which Mitsuba does not make into RGB; "
+                "expected an 'rgb' value, or wavelengths and values in one <spectrum>, as in "
+                'value="400:0.2, 700:0.6"'
+            )
         for key in list(props.keys()):
             if props.type(key) != mi.Properties.Type.Color or not _COLOURS.search(key):
                 continue

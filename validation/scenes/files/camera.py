@@ -9,12 +9,17 @@ references and methods leave nothing out.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import mitsuba as mi
 import numpy as np
 
 from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 from airlight.reference.scene.varying import is_grid
+
+Lens = Mapping[str, float | str]  #: what a description says of a camera's angle of view
 
 _USUAL_NEAR = 1e-2  # Mitsuba's near plane [m] where the file gives none
 
@@ -31,6 +36,20 @@ def check_camera(props: mi.Properties) -> None:
         key = f"principal_point_offset_{axis}"
         if key in props and float(props[key]):
             raise InputError(f"{name} has {key} = {float(props[key]):g}; expected none: remove it")
+
+
+def lens_of(camera: mi.Properties | Mapping[str, Any]) -> Lens:
+    """Return what a description says of the angle of view of a perspective camera."""
+    names = ("fov", "fov_axis") if "fov" in camera else ("focal_length",)
+    return {name: camera[name] for name in names if name in camera}
+
+
+def x_fov(lens: Lens, size: tuple[int, int]) -> mi.Float:
+    """Return the horizontal angle of view [degrees] that Mitsuba gives a lens at a size [pixels]:
+    it depends on the aspect where the lens says an angle along another axis.
+    """
+    film = {"type": "hdrfilm", "width": size[0], "height": size[1]}
+    return mi.traverse(mi.load_dict({"type": "perspective", **lens, "film": film}))["x_fov"]
 
 
 def clip_notes(scene: mi.Scene) -> list[str]:

@@ -28,7 +28,7 @@ def give_extinction(state: mi.parser.ParserState) -> list[str]:
     notes = []
     for index in of_kind(state, "Medium"):
         props = properties(state, index)
-        _make_homogeneous(state, props)
+        notes += _make_homogeneous(state, props)
         if props.plugin_name() != "homogeneous":
             continue
         _refuse_names(props)
@@ -68,12 +68,14 @@ def _set_extinction(props: mi.Properties, sigma_t: Array) -> None:
     props["sigma_t"] = mi.ScalarColor3d(*(sigma_t / above).tolist())
 
 
-def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> None:
-    """Make a heterogeneous medium homogeneous if its extinction is the same everywhere.
+def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> list[str]:
+    """Make a heterogeneous medium homogeneous if its extinction is the same everywhere; return a
+    note where Mitsuba 3 has it in a box alone.
 
     Files of version 0.5 and 0.6 call the extinction density.
     """
-    if props.plugin_name() == "heterogeneous" and "density" in props and "sigma_t" not in props:
+    old = "density" in props and "sigma_t" not in props
+    if props.plugin_name() == "heterogeneous" and old:
         props["sigma_t"] = props["density"]
         del props["density"]
     # No volume at all means a plain number; `constvolume` is a volume with one value.
@@ -89,6 +91,13 @@ def _make_homogeneous(state: mi.parser.ParserState, props: mi.Properties) -> Non
         for key in ("majorant_resolution_factor", "majorant_grid", "majorant_factor"):
             if key in props:
                 del props[key]
+        if not old:
+            return [
+                f"medium '{props.id()}': heterogeneous of one sigma_t is read as homogeneous, which "
+                "ends at its shape alone; Mitsuba 3 also ends it at the unit cube, or where the "
+                "to_world of its volume takes that: make it 'homogeneous' in a shape of these bounds"
+            ]
+    return []
 
 
 def grey_densities(state: mi.parser.ParserState) -> None:

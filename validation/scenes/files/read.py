@@ -15,7 +15,7 @@ from airlight.reference.storage.files import temporary_folder
 from airlight.reference.storage.scene_digest import description_digest, give_description
 from airlight.validation.scenes.changes import give_lobes
 from airlight.validation.scenes.files.advice import check_colours, check_files, in_words
-from airlight.validation.scenes.files.camera import check_camera, clip_notes
+from airlight.validation.scenes.files.camera import Lens, check_camera, clip_notes, lens_of
 from airlight.validation.scenes.files.grids import give_grids
 from airlight.validation.scenes.files.media import (
     give_extinction,
@@ -55,12 +55,12 @@ _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_
 def read_file(
     path: Path,
     lobes: Mapping[str, float] = MappingProxyType({}),
-    size: tuple[int, int] | None = None,
-) -> mi.Object:
-    """Read a scene file: an `mi.Scene`, or another object of Mitsuba where the file has no scene.
+) -> tuple[mi.Object, Lens | None]:
+    """Read a scene file: an `mi.Scene` with the lens of its first camera, or another object of
+    Mitsuba where the file has no scene.
 
-    Isotropic media get the mean cosines that `lobes` has for their ids, films the width and height
-    of `size` [pixels] if there is one. Features that no command can take are refused.
+    Isotropic media get the mean cosines that `lobes` has for their ids. Features that no command
+    can take are refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
     # The resolver is global in Mitsuba: files beside this scene must not be found from the next
@@ -70,9 +70,9 @@ def read_file(
         mi.set_file_resolver(mi.FileResolver(resolver))
         mi.file_resolver().prepend(str(path.parent))
         if is_pbrt(path):
-            return _translated(config, path, lobes, size)
+            return _translated(config, path, lobes)
         check_text(path)
-        return _built(config, _parsed(config, path), path, lobes, size)
+        return _built(config, _parsed(config, path), path, lobes)
     except (InputError, MissingError):
         raise
     # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
@@ -83,11 +83,8 @@ def read_file(
 
 
 def _translated(
-    config: mi.parser.ParserConfig,
-    path: Path,
-    lobes: Mapping[str, float],
-    size: tuple[int, int] | None,
-) -> mi.Object:
+    config: mi.parser.ParserConfig, path: Path, lobes: Mapping[str, float]
+) -> tuple[mi.Object, Lens | None]:
     """Read a file of pbrt: its translation is treated as every other file."""
     # The meshes of the translation are files, which must be there until the scene is built.
     with temporary_folder() as folder:
@@ -95,7 +92,7 @@ def _translated(
         for note in translation.notes:
             mi.Log(mi.LogLevel.Warn, note)
         state = mi.parser.parse_string(config, translation.xml)
-        return _built(config, _resolved(config, state), path, lobes, size)
+        return _built(config, _resolved(config, state), path, lobes)
 
 
 def _parsed(config: mi.parser.ParserConfig, path: Path) -> mi.parser.ParserState:
@@ -129,17 +126,16 @@ def _built(
     state: mi.parser.ParserState,
     path: Path,
     lobes: Mapping[str, float],
-    size: tuple[int, int] | None,
-) -> mi.Object:
+) -> tuple[mi.Object, Lens | None]:
     if kind(state, 0) != "Scene":
-        return mi.parser.instantiate(config, state)
+        return mi.parser.instantiate(config, state), None
     _mend(state, path)
+    cameras = of_kind(state, "Sensor")
+    lens = lens_of(properties(state, cameras[0])) if cameras else None
     give_lobes(state, lobes)
     # The identity of the scene is that of the repaired description, before shapes are rewritten by
     # what Mitsuba builds.
     digest = description_digest(state)
-    if size is not None:
-        _give_size(state, size)
     with temporary_folder() as folder:
         notes = cylinders_as_meshes(state, folder)
         # which takes the nodes apart
@@ -156,7 +152,7 @@ def _built(
     for note in [*notes, *rooms, *touching(scene), *clip_notes(scene)]:
         mi.Log(mi.LogLevel.Warn, note)
     give_description(scene, digest)
-    return scene
+    return scene, lens
 
 
 def _mend(state: mi.parser.ParserState, path: Path) -> None:
@@ -179,9 +175,12 @@ def _mend(state: mi.parser.ParserState, path: Path) -> None:
 
 def _leave_out_rendering(state: mi.parser.ParserState) -> None:
     """Leave out integrators, samplers and filters: no method uses them, and Mitsuba 3 lacks some
-    that old files name.
+    that old files name. Leave out the weights by which lights are sampled: `volpath` would never
+    sample a light of weight 0.
     """
     for node in state.nodes:
+        if "sampling_weight" in node.props:
+            del node.props["sampling_weight"]
         for key, at in references(node.props):
             if kind(state, at) in ("Integrator", "Sampler"):
                 del node.props[key]
@@ -193,18 +192,6 @@ def _leave_out_rendering(state: mi.parser.ParserState) -> None:
                     if name in film:
                         plain_film[name] = film[name]
                 state.nodes[at].props = plain_film
-
-
-def _give_size(state: mi.parser.ParserState, size: tuple[int, int]) -> None:
-    """Give all films another size, whole: Mitsuba takes the angle of view along the axis of the
-    camera's `fov_axis`, which a camera that is built does not tell.
-    """
-    for index in of_kind(state, "Film"):
-        film = properties(state, index)
-        for name in _FILM:
-            if name in film:
-                del film[name]
-        film["width"], film["height"] = size
 
 
 def check_kinds(state: mi.parser.ParserState) -> None:

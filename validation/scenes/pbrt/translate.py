@@ -10,8 +10,8 @@ is right-handed and stays as it is. Where det M < 0, the picture shows the world
 a positive determinant, the image of F p under it is that of p under M, and distances are the same.
 
 **Angle of view.** `fov` is the angle across -1 to 1 of the screen, whose shorter side is that by
-default; `screenwindow` says another part of the screen. Half of its width times tan(fov/2) is the
-tangent of half of the horizontal angle.
+default, at any size; `screenwindow` says another part of the screen. Half of its width times
+tan(fov/2) is the tangent of half of the horizontal angle.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ class _Camera:
 
     to_world: Array  #: Mitsuba's, (4, 4)
     flip: Array  #: from pbrt's world to ours, (4, 4)
-    x_fov: float  #: horizontal angle [degrees]
+    fov: float  #: angle of view [degrees]
+    fov_axis: str  #: along which it is, as Mitsuba names it
     size: tuple[int, int]  #: [pixels]
 
 
@@ -239,13 +240,14 @@ def _camera(scene: PbrtScene) -> _Camera:
     flip = np.diag([np.sign(np.linalg.det(axes)), 1.0, 1.0, 1.0])
     placed = np.eye(4)
     placed[:3] = np.column_stack([first @ last, matrix[:3, 3]])
-    x_fov = _x_fov(directive, *width_height)
-    return _Camera(flip @ placed, flip, x_fov, width_height)
+    return _Camera(flip @ placed, flip, *_fov(directive, *width_height), width_height)
 
 
-def _x_fov(directive: Directive, width: int, height: int) -> float:
-    aspect = number(directive, "frameaspectratio", width / height)
-    window = array(directive, "float", "screenwindow")
+def _fov(directive: Directive, width: int, height: int) -> tuple[float, str]:
+    """Return the angle of view [degrees], and the axis along which it is."""
+    given = number(directive, "frameaspectratio", 0.0)
+    aspect, window = given or width / height, array(directive, "float", "screenwindow")
+    usual = not given and window is None
     if window is None:
         window = np.array([-1.0, 1.0, -1.0, 1.0]) * np.repeat(
             [max(aspect, 1), max(1 / aspect, 1)], 2
@@ -262,8 +264,10 @@ def _x_fov(directive: Directive, width: int, height: int) -> float:
     fov = number(directive, "fov", 90.0)
     if not 0 < fov < 180:
         raise directive.error(f"fov is {fov:g}; expected an angle above 0 and below 180 degrees")
+    if usual:
+        return fov, "smaller"
     tangent = np.tan(np.deg2rad(0.5 * fov)) * 0.5 * wide
-    return float(2 * np.rad2deg(np.arctan(tangent)))
+    return float(2 * np.rad2deg(np.arctan(tangent))), "x"
 
 
 def _sensor(camera: _Camera, medium: str | None) -> str:
@@ -271,8 +275,8 @@ def _sensor(camera: _Camera, medium: str | None) -> str:
     within = f'<ref name="medium" id={quoteattr(medium)}/>' if medium else ""
     # Clip planes that take nothing away from Mitsuba's own image of a usual scene.
     return (
-        f'<sensor type="perspective" id="camera"><float name="fov" value="{camera.x_fov!r}"/>'
-        '<string name="fov_axis" value="x"/><float name="near_clip" value="1e-5"/>'
+        f'<sensor type="perspective" id="camera"><float name="fov" value="{camera.fov!r}"/>'
+        f'<string name="fov_axis" value="{camera.fov_axis}"/><float name="near_clip" value="1e-5"/>'
         f'<float name="far_clip" value="1e5"/>{to_world(camera.to_world)}{within}'
         f'<film type="hdrfilm"><integer name="width" value="{width}"/>'
         f'<integer name="height" value="{height}"/></film></sensor>'

@@ -228,6 +228,19 @@ def test_a_box_that_lets_no_red_through_has_the_colours_of_three_grey_ones(varia
         assert relative_rmse(found[..., channel], grey[..., channel]) < 1e-4
 
 
+def test_thin_fog_around_a_box_of_a_thousand_mean_free_paths(variant):
+    """Panels ran out in a quarter of the pixels: 1000 do not reach through the thin fog."""
+    around = {"type": "ref", "id": "thin"}
+    box = bounded_medium({"type": "cube"}, 500.0, (0.8,) * 3) | {"exterior": around}
+    lamp = {"type": "point", "position": [1.5, -2, 1.3], "intensity": 2.0}
+    scene = {"type": "scene", "thin": {"type": "homogeneous", "sigma_t": 0.1, "albedo": 0.8}}
+    scene |= clear_scene(size=(8, 8), lamp=lamp, box=box)
+    look = mi.ScalarTransform4f().look_at([3.5, -4, 2.2], [0, 0, 0], [0, 0, 1])
+    scene["sensor"] |= {"fov": 45.0, "to_world": look, "medium": around}
+    expected = reference_image(mi.load_dict(scene)).airlight
+    assert relative_rmse(frames.render(scene).airlight, expected) < 1e-4
+
+
 def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
     """A sum of some of the panels was a dark pixel in silence."""
     monkeypatch.setattr("airlight.realtime.scene.media.bounded_rays._MOST", 1)
