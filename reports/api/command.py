@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What makes a report again, as its record says: a command, or the call from Python."""
+"""The command, or the call from Python, that makes a report again, as its record says."""
 
 import os
 import shlex

@@ -347,7 +347,9 @@ def _concluded(
 ) -> Diagnosis:
     """Return a diagnosis with what a search has found."""
     candidates, chosen = attempt.candidates, attempt.candidates.chosen
-    if chosen.faults and candidates.is_named(chosen):
+    # Values that stop at one number are a fact, in however few pixels.
+    is_cut = chosen.names == ("clamp",) and compared.hints.stops
+    if chosen.faults and (is_cut or candidates.is_named(chosen)):
         first = chosen.names[0]
     elif candidates.blocks.is_noise(candidates.right) and compared.verdict.noise_alone:
         # Noise alone makes blocks differ: that is no fault, and the comparison says so too.

@@ -49,6 +49,7 @@ class Hints:
     words: tuple[str, ...]  #: a sentence for each suspect
     corrected: Array = field(repr=False, compare=False)  #: the image without what was suspected
     reason: str = ""  #: why there is no factor
+    stops: bool = False  #: whether values stop at the largest one where they should be larger
 
 
 def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
@@ -72,7 +73,9 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
         dark = "wherever the reference is lit" if np.any(np.nan_to_num(tst)) else "everywhere"
         return Hints(math.nan, math.nan, (), tst, f"the image is black {dark}")
     corrected, words = _suspects(ref, tst, mean)
-    return Hints(factor, _rmse(ref, factor * tst) / mean, (*words, *_clipped(ref, tst)), corrected)
+    clipped = _clipped(ref, tst)
+    left = _rmse(ref, factor * tst) / mean
+    return Hints(factor, left, (*words, *clipped), corrected, stops=bool(clipped))
 
 
 def _mean(ref: Array, tst: Array) -> float:

@@ -58,7 +58,7 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
     moves = ("--method", "shadow-planes", "--frames", "3", "--animate", "objects")
     run("sphere-spot", *SMALL, *moves, "-o", str(tmp_path / "a.exr"))
     found = airlight.compare(
-        "sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json"
+        "sphere-spot", str(tmp_path / "a-####.exr"), sequence=tmp_path / "a.json"
     )
     assert found.compared.verdict.kind == "exact"
 
