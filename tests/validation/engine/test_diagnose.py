@@ -379,6 +379,7 @@ def test_what_nothing_explains_is_told_with_what_comes_nearest():
         "It may be the algorithm: few steps, froxels, a shadow map or a low resolution.",
         told,
     ]
+    assert replace(nearest, place="").lines[1] == "Nothing here explains it (not right)."
     # One that takes nothing away is not near, and of a mark on the image nobody asks.
     assert told not in replace(nearest, left=0.0699).lines
     assert replace(nearest, few="all is right but 3 pixels").lines[1:] == [
