@@ -18,11 +18,12 @@ from airlight.reference.scene.model import Law, Range
 from airlight.validation.engine import prediction
 from airlight.validation.engine.fault import Fault, factor_name
 from airlight.validation.engine.faults import FAULTS
-from airlight.validation.engine.prediction import Guess, SceneLight
+from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
 from airlight.validation.engine.targets import position_held, scaled
 from airlight.validation.engine.transforms import OPTICS
 from airlight.validation.fog_model.laws import LawFactor, Window
 from airlight.validation.fog_model.radiance import Fog
+from airlight.validation.fog_model.view import Scenery
 
 FOG = Fog(
     sigma_t=((0.5, 0.5, 0.4), (0.0, 0.0, 0.0)),
@@ -307,6 +308,25 @@ def test_a_light_whose_shadows_are_held_moves_its_fog_alone():
     held = position_held(spot, Guess(FOG), (1.0, 2.0, 3.0), (0.5, 2.0, 2.0))
     assert held.scenery.moved == ((1.0, 2.0, 3.0),)
     assert held.fog.moved == FOG.moved
+
+
+def test_surfaces_with_paths_of_their_own_keep_the_lights_where_they_are():
+    """Paths of the fog alone are held while a light moves."""
+    asked = {}
+
+    def radiance(observation, scenery, fog, layer):
+        asked[layer] = scenery, fog.moved
+        return np.ones((2, 3))
+
+    light = SimpleNamespace(radiance=radiance, view=lambda *_: SimpleNamespace(pixels=np.arange(2)))
+    observation = SimpleNamespace(holds="total")
+    predictor = Predictor(observation, light)
+    vars(predictor)["unchanged"] = Guess(FOG)  # what a predictor keeps of itself
+    held, own = replace(FOG, moved=((1.0, 2.0, 3.0),)), Scenery(shadows=False)
+    predictor.layers(Guess(held, surfaces=own))
+    assert asked == {0: (Scenery(), held.moved), 1: (own, FOG.moved)}
+    predictor.layers(Guess(held))
+    assert asked[1] == (Scenery(), held.moved)
 
 
 def test_values_and_the_camera_by_hand():

@@ -4,6 +4,7 @@ closed form, with true errors.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -169,6 +170,16 @@ def test_light_of_one_age_is_a_ghost():
     response = [each.value for each in found.lag.response]
     assert 1 + int(np.argmax(response[1:])) in (6, 7)
     assert motion_verdict(found).kind == "ghost"
+    # A filter that explains half of what a response does is no lag.
+    half = replace(averaged_measures(), described=0.5)
+    assert motion_verdict(replace(measured(averaged(LIGHT)), lag=half)).kind != "lag"
+
+
+def averaged_measures():
+    """Return the lag of an average, of which all is explained."""
+    found = measured(averaged(LIGHT))
+    assert motion_verdict(found).kind == "lag"
+    return found.lag
 
 
 @pytest.mark.claim("sequence-lag")

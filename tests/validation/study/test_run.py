@@ -29,7 +29,7 @@ from airlight.validation.study import reference as sampled
 from airlight.validation.study import run as module
 from airlight.validation.study import variation
 from airlight.validation.study.configuration import STANDARD, Configuration, configuration, prepared
-from airlight.validation.study.cost import Work, check_work, reference_work
+from airlight.validation.study.cost import Work, check_work, frame_work, reference_work
 from airlight.validation.study.reference import cell_reference, load_cell
 from airlight.validation.study.row import row_values
 from airlight.validation.study.run import run
@@ -339,6 +339,9 @@ def test_a_user_is_told_before_a_command_runs_for_minutes(variant, monkeypatch):
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
     size, scale = (160, 120), 160 * 120 / 2
     assert check_work("x", [reference_work(size)]) == ()
+    # A scene without a light is counted as one with a light.
+    alone, two = (frame_work(size, lights=lights).seconds for lights in (1, 2))
+    assert two == 2 * alone == 2 * frame_work(size, lights=0).seconds
     (words,) = check_work("x", [reference_work(size, pixel="area")])
     least, most = 49 * 100e-6 * scale, 1361 * 100e-6 * scale
     assert words.startswith(
