@@ -99,6 +99,25 @@ def test_a_bias_of_the_midpoints_is_found_by_the_same_test(variant):
     assert least_p(noise + fixed) < 1e-6
 
 
+@pytest.mark.parametrize("method", ["equi-angular", "ray-march"])
+def test_frames_go_on_by_the_golden_ratio_where_they_are_asked_to(variant, method):
+    """The first frame is that of the pattern itself."""
+    scene, noisy = tiny_scene(size=SIZE), {"jitter": "white"}
+    own, golden = (
+        renderer(scene, find_method(method), **noisy, **more)
+        for more in ({}, {"animate": "golden"})
+    )
+    frames = [
+        [render_frame(replace(made, frame=number)).airlight for number in range(8)]
+        for made in (own, golden)
+    ]
+    np.testing.assert_array_equal(frames[0][0], frames[1][0])
+    # Eight samples a ray that lie evenly are nearer to the integral than eight by chance.
+    reference = reference_of(scene).airlight
+    errors = [np.abs(np.mean(each, axis=0) - reference).mean() for each in frames]
+    assert errors[1] < 0.7 * errors[0]
+
+
 def test_surfaces_are_lit_by_many_lights_as_they_are_by_each(variant):
     """A method that is given all lights at once has the surfaces of one that is
     given one after the other.

@@ -231,7 +231,11 @@ def test_messages_of_other_drivers_are_read(tmp_path, log, words):
         ("// vec3 airlight(Ray ray) {}\n", r"fog\.glsl: no function vec3 airlight\(Ray ray\)"),
         (
             f"#pragma airlight pass half size=W/2xH/2\n{_BLACK}",
-            "no function vec4 half",
+            r"no function vec4 half\(Ray ray\)",
+        ),
+        (
+            f"#pragma airlight pass cells size=8x8x8\n{_BLACK}",
+            r"no function vec4 cells\(ivec3 cell, ivec3 cells\)",
         ),
         ("#pragma airlight pass half size=2W\n", "line 1: got `pass half size=2W`, expected"),
         ("#pragma airlight pass half size=W/0xH\n", "line 1: got `pass half size=W/0xH`, expected"),

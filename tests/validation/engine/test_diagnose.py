@@ -26,6 +26,7 @@ from airlight.validation.engine.diagnose import (
     diagnose_file,
     diagnose_image,
 )
+from airlight.validation.engine.error_place import _is_ringed
 from airlight.validation.engine.fault import Fault, Number
 from airlight.validation.engine.faults import FAULTS
 from airlight.validation.engine.observation import judged_layer, observation_of
@@ -403,6 +404,15 @@ def test_a_rest_that_a_comparison_calls_right_is_nothing_to_it(reference, size, 
     rest = _right_rest(predictor, explain(predictor, [factor]))
     said = "nothing to a comparison: means over 2 x 2 pixels are within 0."
     assert rest.startswith(said) if right else not rest
+
+
+def test_rings_are_told_from_noise():
+    generator = np.random.default_rng(3)
+    angle = generator.uniform(0, 2, 4096)
+    noise = 0.01 * generator.standard_normal(4096)
+    assert not _is_ringed(noise, angle)
+    assert not _is_ringed(noise + 0.5, angle)
+    assert _is_ringed(noise + 0.02 * np.sign(np.sin(20 * angle)), angle)
 
 
 def test_a_search_about_a_start_ends_at_the_starts_beside_it():

@@ -146,6 +146,9 @@ def test_frames_of_another_number_are_late(delay, sigma):
     assert found.lag.delay_margin.exceeds(0.0, 4.0) is Answer.YES
     verdict = motion_verdict(found)
     assert verdict.kind == "late"
+    # A delay that explains half of what a response does is none; one to the front needs no response.
+    half = replace(found, lag=replace(found.lag, described=0.5))
+    assert (motion_verdict(half).kind == "late") == (delay < 0)
     assert f"{'late' if delay > 0 else 'early'} by {abs(delay)} frame" in verdict.words
 
 
