@@ -167,6 +167,20 @@ def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(varia
 # Penumbrae on surfaces ----------------------------------------------------------------------------
 
 
+def test_a_flat_light_leaves_dark_what_none_of_its_points_sees(variant):
+    """A plate before a rectangle, where all pixels ask all points and a filter smooths their share."""
+    scene = load_scene("penumbra-plane", (32, 24)).scene
+    shown = render_frame(
+        prepared(read_scene(scene), configuration("soft-shafts", None, {"interleave": False}))
+    )
+    expected = reference_image(scene).surface
+    umbra = expected.max(axis=2) == 0
+    assert 0.02 < umbra.mean() < 0.9
+    # The filter takes some light over the edge of the umbra.
+    assert np.median(shown.surface[umbra]) < 1e-3 * expected.mean()
+    assert shown.surface.mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
 def staircase_error(width, levels, hd):
     """Return the RMS error of a linear penumbra, `width` pixels wide, from N levels
     filtered by a Gaussian of `hd`.
