@@ -30,6 +30,7 @@ from airlight.reference.storage.files import NO_SPACE, atomic_path
 TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
 MODEL = "airlight:model"  #: header attribute: the model of a reference that is not physical
+PIXEL = "airlight:pixel"  #: header attribute: 'centre' or 'area', what the values of a pixel are
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
 #: header attribute: the standard error of the mean of a layer over the mean of those of its values
 SHARED = "airlight:shared"

@@ -16,7 +16,9 @@ from airlight.errors import InputError
 from airlight.reference.storage.exr import (
     BATCHES,
     BOUND,
+    MODEL,
     NOTE,
+    PIXEL,
     SHARED,
     TOTAL,
     Image,
@@ -157,12 +159,33 @@ def compare_images(
     return replace(
         whole,
         orders=by_order,
-        notes=tuple(
-            f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes
+        notes=(
+            *(
+                f"{path}: {image.attributes[NOTE]}"
+                for path, image in named
+                if NOTE in image.attributes
+            ),
+            *_apart(named),
         ),
         failures=whole.failures
         + tuple(f"{each.layer}: {why}" for each in by_order for why in each.failures),
     )
+
+
+def _apart(named: Sequence[tuple[str, Image]]) -> list[str]:
+    """Return a note for each attribute by which two images should differ."""
+    notes = []
+    for key, words in ((PIXEL, "a pixel"), (MODEL, "the equation")):
+        said = []
+        for path, image in named:
+            # Only our own files say nothing of an equation that is the physical one.
+            own = key == MODEL and any(each.startswith("airlight:") for each in image.attributes)
+            value = image.attributes.get(key, "physical" if own else None)
+            if value is not None:
+                said.append(f"in {path} {words} is {value}")
+        if len(said) == 2 and said[0].rpartition(" is ")[2] != said[1].rpartition(" is ")[2]:
+            notes.append(", ".join(said))
+    return notes
 
 
 def _compared(

@@ -20,7 +20,7 @@ from airlight.reference.quadrature.surface import emitted_light, surface_hits
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.scene.varying import GridMedium
-from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names, read_exr
+from airlight.reference.storage.exr import PIXEL, TOTAL, Image, layer, layer_names, read_exr
 from airlight.validation.arrays import Array, Bools, Index
 from airlight.validation.estimates.quadrature import reference_layer
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
@@ -344,7 +344,7 @@ def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
     """
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"pixel: got {pixel}, expected 'centre' or 'area'")
-    kind = pixel or image.attributes.get("airlight:pixel")
+    kind = pixel or image.attributes.get(PIXEL)
     if kind in PIXELS:
         return (str(kind),)
     # Images of ours without that word: methods render pixel centres, path tracing means over areas.

@@ -34,7 +34,7 @@ from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.clouds import read_clouds
 from airlight.reference.scene.model import PHYSICAL, Model
 from airlight.reference.scene.read import ReferenceScene, read_reference
-from airlight.reference.storage.exr import BATCHES, BOUND, MODEL, SHARED, Image
+from airlight.reference.storage.exr import BATCHES, BOUND, MODEL, PIXEL, SHARED, Image
 from airlight.reference.storage.scene_digest import scene_digest
 from airlight.validation.arrays import Array, Bools, Progress
 from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
@@ -109,7 +109,7 @@ def layered_reference(
         "airlight:scene": loaded.name,
         "airlight:estimator": "quadrature",
     }
-    made |= {"airlight:pixel": pixel, **_digest_of(loaded), **_model_of(model)}
+    made |= {PIXEL: pixel, **_digest_of(loaded), **_model_of(model)}
     if "airlight_bound" in layers:
         made[BOUND] = "proven"
     if reference.airlight_se is not None:

@@ -154,6 +154,23 @@ def test_a_kind_of_error_that_nobody_knows_is_refused():
         compare_images(bounded(values, values, "certain"), Image({"airlight": values}))
 
 
+def test_images_of_two_equations_or_kinds_of_pixels_say_so():
+    """A mean over pixels and a value at centres, a model and physics, should differ."""
+    layers = {"airlight": np.ones((3, 4, 3))}
+
+    def notes(*attributes):
+        return compare_images(*(Image(layers, attributes=each) for each in attributes)).notes
+
+    centre, area = {"airlight:pixel": "centre"}, {"airlight:pixel": "area"}
+    model = centre | {"airlight:model": "three"}
+    assert notes(centre, area) == ("in reference a pixel is centre, in test a pixel is area",)
+    assert notes(model, centre) == (
+        "in reference the equation is three, in test the equation is physical",
+    )
+    # An image of another program says neither.
+    assert notes(model, {}) == notes({}, {}) == notes(model, dict(model)) == ()
+
+
 def test_a_mask_from_a_file(pair, tmp_path):
     mask = np.zeros(SHAPE, dtype=np.float32)
     mask[3:5, :, 1] = 1

@@ -200,11 +200,11 @@ def check_kinds(state: mi.parser.ParserState) -> None:
         for index in of_kind(state, part):
             props = properties(state, index)
             if props.plugin_name() not in types:
-                name = (
-                    f"{_WORDS[part]} '{props.id()}'"
-                    if props.id()
-                    else f"a {_WORDS[part]} of the scene"
-                )
+                name = f"{_WORDS[part]} '{props.id()}'" if props.id() else f"a {_WORDS[part]}"
+                for medium in of_kind(state, "Medium"):
+                    of_medium = properties(state, medium)
+                    if any(at == index for _, at in references(of_medium)):
+                        name += f" of medium '{of_medium.id()}'"
                 raise InputError(
                     f"{name} is of type '{props.plugin_name()}'; expected one of "
                     f"{', '.join(types)}: replace it" + " or remove it" * (part == "Emitter")

@@ -168,5 +168,6 @@ class _Space:
                     raise InputError(
                         f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as "
                         f"{side}, where there "
-                        f"is {words}; expected no medium on it, or the one that it stands in"
+                        f"is {words}; expected no medium on it, the one that it stands in, or "
+                        '<bsdf type="null"/> where it is the bound of a medium'
                     )
