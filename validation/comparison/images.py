@@ -175,16 +175,16 @@ def compare_images(
 def _apart(named: Sequence[tuple[str, Image]]) -> list[str]:
     """Return a note for each attribute by which two images should differ."""
     notes = []
-    for key, words in ((PIXEL, "a pixel"), (MODEL, "the equation")):
+    for key, words in ((PIXEL, "pixels"), (MODEL, "equation")):
         said = []
         for path, image in named:
             # Only our own files say nothing of an equation that is the physical one.
             own = key == MODEL and any(each.startswith("airlight:") for each in image.attributes)
             value = image.attributes.get(key, "physical" if own else None)
             if value is not None:
-                said.append(f"in {path} {words} is {value}")
-        if len(said) == 2 and said[0].rpartition(" is ")[2] != said[1].rpartition(" is ")[2]:
-            notes.append(", ".join(said))
+                said.append((path, value))
+        if len({value for _, value in said}) == 2:
+            notes.append("; ".join(f"{words} of {path}: {value}" for path, value in said))
     return notes
 
 

@@ -163,9 +163,11 @@ def test_images_of_two_equations_or_kinds_of_pixels_say_so():
 
     centre, area = {"airlight:pixel": "centre"}, {"airlight:pixel": "area"}
     model = centre | {"airlight:model": "three"}
-    assert notes(centre, area) == ("in reference a pixel is centre, in test a pixel is area",)
+    assert notes(centre, area) == (
+        "pixels of the reference: centre; pixels of the test image: area",
+    )
     assert notes(model, centre) == (
-        "in reference the equation is three, in test the equation is physical",
+        "equation of the reference: three; equation of the test image: physical",
     )
     # An image of another program says neither.
     assert notes(model, {}) == notes({}, {}) == notes(model, dict(model)) == ()
