@@ -125,6 +125,8 @@ _OUTPUT = Annotated[
 ]
 #: options that are not written as their parameter
 _SPELT = {"output": ("--output", "-o"), "settings": "--set"}
+#: Options that had another name, by their command: scripts that have it go on working.
+_BEFORE = {("compare", "--frames"): "--sequence", ("paper", "--figures"): "--pictures"}
 _ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
 #: Options of `render` that ask for something else than a picture.
 _NO_PICTURE = ("output", "plan", "timed", "frames")
@@ -385,7 +387,7 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
         )
     try:
         # Cyclopts would take pytest's options for its own: they go behind a `--`.
-        words = [_at_home(word) for word in arguments]
+        words = [_today(arguments[0], _at_home(word)) for word in arguments]
         if words[:1] == ["test"] and "--" not in words:  # pytest has its own options
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
             words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
@@ -448,6 +450,12 @@ def _at_home(word: str) -> str:
     if word.startswith("~"):
         return os.path.expanduser(word)
     return f"{option}={os.path.expanduser(value)}" if option.startswith("-") and equals else word
+
+
+def _today(command: str, word: str) -> str:
+    """Return a word with the name that an option of a command has today."""
+    option, equals, value = word.partition("=")
+    return _BEFORE.get((command, option), option) + equals + value
 
 
 def _fail(message: str, status: int) -> int:

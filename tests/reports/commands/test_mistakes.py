@@ -20,7 +20,9 @@ MISTAKES = (
     ("render open-fog --frames 3", "frames: got no place"),
     ("render open-fog --samples 3 --frames 3 -o x.exr", "leave out samples"),
     ("compare open-fog a.exr --sequnce frames.json", "Did you mean --sequence"),
-    ("paper --figures out", "Did you mean --pictures"),
+    # The name of before goes on working, and a file that is not there is named.
+    ("compare open-fog a.exr --frames none.json", "none.json"),
+    ("compare open-fog a.exr --frames=none.json", "none.json"),
     ("render open-fog --size 8x6 --frames 3 --animate lamp -o x.exr", "got 'lamp'"),
     (
         "render open-fog --size 8x6 --frames 3 --animate objects -o x.exr",
