@@ -31,6 +31,7 @@ html_theme = "furo"
 html_title = f"airlight {__version__}"
 html_static_path = ["_static"]
 html_css_files = ["airlight.css"]
+html_js_files = ["keyboard.js"]
 html_copy_source = False
 html_show_copyright = False
 html_show_sphinx = False
