@@ -347,6 +347,14 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "camera 'eye' has principal_point_offset_x": (
         {"camera": CAMERA.format(INSIDE + '<float name="principal_point_offset_x" value="0.1"/>')},
     ),
+    "a bumpmap of the scene is of a 'checkerboard'": (
+        {},
+        shape(
+            "sphere",
+            '<bsdf type="bumpmap"><texture type="checkerboard" name="arbitrary"/>'
+            '<bsdf type="diffuse"/></bsdf>',
+        ),
+    ),
     "phase function of medium 'fog' is of type 'sggx'": (
         {"media": FOG.replace("</medium>", '<phase type="sggx"/></medium>')},
     ),

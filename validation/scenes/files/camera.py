@@ -81,9 +81,10 @@ def clip_notes(scene: mi.Scene) -> list[str]:
             depth = np.append(depth, (corners - matrix[:3, 3]) @ matrix[:3, 2])
     if "sigma_t.value.value" in parameters:
         sigma_t = float(np.min(parameters["sigma_t.value.value"]) * parameters["scale"])
-        before, beyond = (
-            f" (an optical depth of {sigma_t * length:.3g})" for length in (near, far)
-        )
+        if sigma_t > 0:
+            before, beyond = (
+                f" (an optical depth of {sigma_t * length:.3g})" for length in (near, far)
+            )
         # Beyond an optical depth of 17 the light is lost in the rounding of float32:
         # exp(-17) = 2^-24.
         unbounded &= sigma_t * far < 17.0

@@ -24,7 +24,14 @@ from airlight.validation.scenes.files.media import (
     mirrored_grids,
     pass_where_no_material,
 )
-from airlight.validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
+from airlight.validation.scenes.files.nodes import (
+    child,
+    kind,
+    name_nodes,
+    of_kind,
+    properties,
+    references,
+)
 from airlight.validation.scenes.files.references import leave_out_media, touching
 from airlight.validation.scenes.files.shapes import (
     cylinders_as_meshes,
@@ -211,6 +218,15 @@ def check_kinds(state: mi.parser.ParserState) -> None:
                 )
     for index in of_kind(state, "Emitter"):
         _check_light(state, index)
+    for index in of_kind(state, "BSDF"):
+        relief = child(state, index, "Texture")
+        if relief is None or properties(state, index).plugin_name() != "bumpmap":
+            continue
+        if (made := properties(state, relief).plugin_name()) != "bitmap":
+            raise InputError(
+                f"a bumpmap of the scene is of a '{made}', whose slope Mitsuba does not have; "
+                "expected a 'bitmap': replace it, or take the surface without the bumpmap"
+            )
     sensors = of_kind(state, "Sensor")
     if sensors:
         check_camera(properties(state, sensors[0]))
