@@ -20,7 +20,6 @@ from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.engine.curves import to_srgb
 from airlight.validation.engine.decide import Blocks
 from airlight.validation.engine.diagnose import (
-    Diagnosis,
     Ranked,
     _right_rest,
     diagnose_file,
@@ -35,6 +34,7 @@ from airlight.validation.engine.search import Explanation, _between, _Search, ex
 from airlight.validation.fog_model.radiance import FogModel, scene_fog
 from airlight.validation.fog_model.view import Scenery, scattering_paths, view_of
 from airlight.validation.scenes.loading import load_scene
+from tests.helpers.diagnoses import diagnosis
 from tests.helpers.injected_faults import INJECTED
 from tests.helpers.scenes import FOG, scene_xml
 
@@ -359,20 +359,9 @@ def test_a_place_is_found_where_pixels_are_lit_or_dark():
 
 
 def test_what_nothing_explains_is_told_with_what_comes_nearest():
-    nearest = Diagnosis(
-        scene="scene",
-        path="path",
-        layer="total",
-        pixel="centre",
-        first="unexplained",
+    nearest = diagnosis(
         ranked=(Ranked("light-path", (), "the way is not attenuated", 0.05, 50.0, ()),),
-        residual=0.07,
-        left=0.05,
-        rest="",
-        explained=False,
         place="beside the light",
-        few="",
-        verdict="not right",
     )
     told = "The nearest to it, light-path, leaves 5 % of 7 %: the way is not attenuated."
     assert nearest.lines[1:] == [

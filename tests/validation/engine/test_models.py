@@ -19,7 +19,6 @@ from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.engine import stages
 from airlight.validation.engine.decide import LEAST_EVIDENCE, Candidates
 from airlight.validation.engine.diagnose import (
-    Diagnosis,
     _alike,
     _concluded,
     diagnose_file,
@@ -40,6 +39,7 @@ from airlight.validation.engine.search import Explanation
 from airlight.validation.fog_model.equation import fog_of_model
 from airlight.validation.scenes.loading import load_scene
 from airlight.validation.scenes.models import PRESETS, model_of
+from tests.helpers.diagnoses import diagnosis
 from tests.helpers.model_images import model_image
 
 EQUATIONS = [fault for fault in FAULTS if fault.equation]
@@ -407,21 +407,7 @@ def test_values_that_stop_are_named_in_however_few_pixels(monkeypatch, stops):
     hints = SimpleNamespace(stops=stops)
     compared = SimpleNamespace(hints=hints, verdict=verdict)
     monkeypatch.setattr("airlight.validation.engine.diagnose.place_words", lambda *_: "")
-    begun = Diagnosis(
-        scene="scene",
-        path="path",
-        layer="total",
-        pixel="area",
-        first="right",
-        ranked=(),
-        residual=5e-5,
-        left=5e-5,
-        rest="",
-        explained=False,
-        place="",
-        few="",
-        verdict="not right",
-    )
+    begun = diagnosis(first="right", pixel="area", residual=5e-5, left=5e-5)
     said = _concluded(begun, attempt, compared, "")
     assert (said.first, said.explained) == (("clamp", True) if stops else ("unexplained", False))
 
